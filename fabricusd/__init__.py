@@ -1,0 +1,36 @@
+"""fabricusd: woven cloth as USD prims, rendered for review and baked for every other tool.
+
+Importing this module imports neither USD nor Embree; the functions below load what they need.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+
+_WHERE = {
+    "Fabric": "fabricusd.fabric",
+    "Thread": "fabricusd.fabric",
+    "ThreadSet": "fabricusd.fabric",
+    "Weave": "fabricusd.fabric",
+    "TangentCurve": "fabricusd.fabric",
+    "Binding": "fabricusd.fabric",
+    "FabricError": "fabricusd.errors",
+    "load": "fabricusd.schema",
+    "save": "fabricusd.schema",
+    "check": "fabricusd.schema",
+}
+
+__all__ = [*_WHERE, "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _WHERE:
+        return getattr(import_module(_WHERE[name]), name)
+    raise AttributeError(f"module 'fabricusd' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,381 @@
+"""What a woven fabric is: threads, the tangent curve along them, the weave, the thread sets.
+
+Plain immutable values in SI units and radians, with no USD in them. `fabricusd.schema` reads
+and writes them; `fabricusd.appearance` compiles them. Conventions: MODEL, sections 1 and 3
+(`docs/model.md`): end `i` counts along +U, pick `j` along +V, both from 0; warp runs along V.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.errors import FabricError
+
+MODELS = ("thesis", "microcylinder", "conserving")
+"""Thread scattering models, `docs/model.md` section 2."""
+
+DEFAULT_MODEL = "microcylinder"
+PILE_ANGLE = math.radians(85.0)
+"""A curve steeper than this stands up from the cloth and has no height field."""
+
+DEGREE = math.pi / 180.0
+
+
+def _limits(
+    minimum: float | None = None,
+    maximum: float | None = None,
+    *,
+    above: float | None = None,
+    below: float | None = None,
+) -> Mapping[str, Any]:
+    """Field metadata: the closed (`minimum`, `maximum`) and open (`above`, `below`) bounds."""
+    return MappingProxyType(
+        {"minimum": minimum, "maximum": maximum, "above": above, "below": below}
+    )
+
+
+def describe_limits(limits: Mapping[str, Any], scale: float = 1.0, unit: str = "") -> str:
+    """The accepted range in words: `at least 1`, `from 0 to 1`, `above 0 and below 90 degrees`."""
+    words = []
+    lo, hi = limits.get("minimum"), limits.get("maximum")
+    if lo is not None and hi is not None:
+        words.append(f"from {lo * scale:.6g} to {hi * scale:.6g}")
+    elif lo is not None:
+        words.append(f"at least {lo * scale:.6g}")
+    elif hi is not None:
+        words.append(f"at most {hi * scale:.6g}")
+    if limits.get("above") is not None:
+        words.append(f"above {limits['above'] * scale:.6g}")
+    if limits.get("below") is not None:
+        words.append(f"below {limits['below'] * scale:.6g}")
+    return " and ".join(words) + (f" {unit}" if unit else "")
+
+
+def within_limits(value: float, limits: Mapping[str, Any]) -> bool:
+    """Whether `value` is a finite number inside `limits`."""
+    if not math.isfinite(value):
+        return False
+    lo, hi = limits.get("minimum"), limits.get("maximum")
+    above, below = limits.get("above"), limits.get("below")
+    return not (
+        (lo is not None and value < lo)
+        or (hi is not None and value > hi)
+        or (above is not None and value <= above)
+        or (below is not None and value >= below)
+    )
+
+
+def _require_limits(owner: Any) -> None:
+    """Raise `FabricError` for the first field of `owner` outside the bounds in its metadata."""
+    for f in fields(owner):
+        if not f.metadata:
+            continue
+        value = getattr(owner, f.name)
+        if value is None:
+            continue
+        for number in value if isinstance(value, tuple) else (value,):
+            if not within_limits(number, f.metadata):
+                raise FabricError(
+                    f.name, f"is {number!r}; it must be {describe_limits(f.metadata)}"
+                )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TangentCurve:
+    """Tangent angle against position along one visible run of a thread.
+
+    positions : (n,) float, n >= 2 - never decreasing; two equal positions are a jump. Only their
+        proportions count: the whole curve is laid once over every run of equal cells.
+    angles : (n,) float - tangent angle psi0 [rad], from -pi/2 to pi/2, positive leaning the
+        thread's normal forward along its axis. Linear between the points.
+
+    Source: [Bisker2011] section 5.2.1.
+    """
+
+    positions: tuple[float, ...] = (0.0, 1.0)
+    angles: tuple[float, ...] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "positions", tuple(float(p) for p in self.positions))
+        object.__setattr__(self, "angles", tuple(float(a) for a in self.angles))
+        p, a = self.positions, self.angles
+        if len(p) != len(a):
+            raise FabricError(
+                "curve", f"has {len(p)} positions and {len(a)} angles; there must be as many"
+            )
+        if len(p) < 2:
+            raise FabricError("curve", f"has {len(p)} points; it must have at least 2")
+        for k, x in enumerate(p):
+            if not math.isfinite(x):
+                raise FabricError(f"curve position {k}", f"is {x}; it must be finite")
+            if k and x < p[k - 1]:
+                raise FabricError(
+                    f"curve position {k}", f"is {x}; it must be at least the one before, {p[k - 1]}"
+                )
+        if not p[-1] > p[0]:
+            raise FabricError("curve", f"spans {p[0]} to {p[-1]}; it must have a length above 0")
+        for k, x in enumerate(a):
+            if not (math.isfinite(x) and abs(x) <= math.pi / 2 + 1e-12):
+                raise FabricError(
+                    f"curve angle {k}",
+                    f"is {math.degrees(x):.6g} degrees; it must be from -90 to 90 degrees",
+                )
+
+    @classmethod
+    def from_lengths(cls, angles: Iterable[float], lengths: Iterable[float]) -> TangentCurve:
+        """From tangent angles [rad] and the lengths *between* them, as the literature prints it."""
+        steps = [float(x) for x in lengths]
+        if any(not x >= 0 for x in steps):
+            raise FabricError("curve length", f"is {min(steps)}; it must be at least 0")
+        return cls(positions=(0.0, *(float(x) for x in np.cumsum(steps))), angles=tuple(angles))
+
+    @property
+    def steepest(self) -> float:
+        """The largest |angle| [rad]."""
+        return max(abs(a) for a in self.angles)
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the thread lies flat everywhere."""
+        return self.steepest == 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thread:
+    """One type of thread: how it scatters, how thick it is, how it bends where it is on top.
+
+    albedo : (3,) float - MODEL's `A`, linear Rec. 709; an albedo only in the `conserving` model
+    ior : float - `eta`, at least 1
+    isotropic : float - `kd`, share of volume scattering without a direction, 0 to 1
+    gamma_surface, gamma_volume : float - lobe standard deviations `gs`, `gv` [rad]
+    surface_gain : float - `ks`, factor on the surface reflectance (`conserving` only)
+    thickness : float - visible width [m]; 0 where it is not known
+    curve : TangentCurve
+    model : str - one of MODELS, or "" for the fabric's
+    color : (3,) float - as a draft draws it, linear Rec. 709; rendering does not use it
+    documentation : str - where the numbers come from
+    """
+
+    albedo: tuple[float, float, float] = field(default=(0.2, 0.2, 0.2), metadata=_limits(0.0))
+    ior: float = field(default=1.5, metadata=_limits(1.0))
+    isotropic: float = field(default=0.3, metadata=_limits(0.0, 1.0))
+    gamma_surface: float = field(default=12 * DEGREE, metadata=_limits(above=0.0, maximum=math.pi))
+    gamma_volume: float = field(default=24 * DEGREE, metadata=_limits(above=0.0, maximum=math.pi))
+    surface_gain: float = field(default=1.0, metadata=_limits(0.0))
+    thickness: float = field(default=0.0, metadata=_limits(0.0))
+    curve: TangentCurve = TangentCurve()
+    model: str = ""
+    color: tuple[float, float, float] = field(default=(0.5, 0.5, 0.5), metadata=_limits(0.0))
+    documentation: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("albedo", "color"):
+            value = tuple(float(x) for x in getattr(self, name))
+            if len(value) != 3:
+                raise FabricError(name, f"has {len(value)} numbers; it must have 3")
+            object.__setattr__(self, name, value)
+        for name in (
+            "ior", "isotropic", "gamma_surface", "gamma_volume", "surface_gain", "thickness",
+        ):  # fmt: skip
+            object.__setattr__(self, name, float(getattr(self, name)))
+        _require_limits(self)
+        if self.model and self.model not in MODELS:
+            raise FabricError("model", f"is '{self.model}'; it must be one of {', '.join(MODELS)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Weave:
+    """Which thread is on top at each crossing.
+
+    cells : (m, n) bool - `cells[i, j]` is True where end `i` (along +U) lies over pick `j`
+        (along +V). A copy is kept, read-only.
+    name : str - how it was made, for people: "satin 5 step 2", "8452.wif"
+    """
+
+    cells: NDArray[np.bool_]
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        cells = np.array(self.cells, order="C")
+        if cells.ndim != 2 or cells.size == 0:
+            raise FabricError(
+                "weave", f"has shape {cells.shape}; it must have at least one end and one pick"
+            )
+        if cells.dtype != np.bool_:
+            if not np.isin(cells, (0, 1)).all():
+                raise FabricError("weave", "has cells other than 0 (weft on top) and 1 (warp)")
+            cells = cells.astype(np.bool_)
+        cells.flags.writeable = False
+        object.__setattr__(self, "cells", cells)
+
+    @property
+    def ends(self) -> int:
+        """Warp threads in the repeat, `m`."""
+        return int(self.cells.shape[0])
+
+    @property
+    def picks(self) -> int:
+        """Weft threads in the repeat, `n`."""
+        return int(self.cells.shape[1])
+
+    @property
+    def warp_share(self) -> float:
+        """Share of the cells with warp on top, `c_warp`."""
+        return float(np.count_nonzero(self.cells)) / self.cells.size
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Weave):
+            return NotImplemented
+        return self.name == other.name and np.array_equal(self.cells, other.cells)
+
+    def __hash__(self) -> int:
+        return hash((self.cells.shape, self.cells.tobytes(), self.name))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThreadSet:
+    """The warp or the weft: which thread each place takes, how close they lie, what they cover.
+
+    sequence : (k,) int - indices into `Fabric.threads`, repeated without end: end `i` of the cloth
+        is `sequence[i % k]`
+    density : float - threads per metre
+    coverage : float or None - share `a` of the cloth's area that the set covers, None to derive it
+        from the weave and the threads' thickness
+    """
+
+    sequence: tuple[int, ...] = (0,)
+    density: float = field(default=2000.0, metadata=_limits(above=0.0))
+    coverage: float | None = field(default=None, metadata=_limits(0.0, 1.0))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sequence", tuple(int(k) for k in self.sequence))
+        object.__setattr__(self, "density", float(self.density))
+        if self.coverage is not None:
+            object.__setattr__(self, "coverage", float(self.coverage))
+        if not self.sequence:
+            raise FabricError("sequence", "is empty; it must name at least one thread")
+        _require_limits(self)
+
+    @property
+    def pitch(self) -> float:
+        """Distance from one thread to the next [m]."""
+        return 1.0 / self.density
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fabric:
+    """A woven fabric.
+
+    threads : name -> Thread, in the order that `ThreadSet.sequence` counts
+    weave : Weave
+    warp, weft : ThreadSet - warp runs along V, weft along U
+    model : str - one of MODELS, for every thread that names none
+    opaque : bool - no light passes: cloth with a backing, or pile
+    masking_width : float - standard deviation of `u`, the correlation of shadowing and masking in
+        azimuth [rad]; 20 degrees in [Sadeghi2013]
+    back : Fabric or None - the other side where it is a fabric of its own; None mirrors this one
+    documentation : str - where the numbers come from
+    """
+
+    name: str = "Fabric"
+    threads: Mapping[str, Thread] = field(default_factory=lambda: {"Thread": Thread()})
+    weave: Weave = field(default_factory=lambda: Weave(np.eye(2, dtype=bool), "plain"))
+    warp: ThreadSet = ThreadSet()
+    weft: ThreadSet = ThreadSet()
+    model: str = DEFAULT_MODEL
+    opaque: bool = False
+    masking_width: float = field(
+        default=20 * DEGREE, metadata=_limits(above=0.0, maximum=2 * math.pi)
+    )
+    back: Fabric | None = None
+    documentation: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "threads", MappingProxyType(dict(self.threads)))
+        if not self.threads:
+            raise FabricError("threads", "is empty; a fabric must have at least one thread")
+        if self.model not in MODELS:
+            raise FabricError("model", f"is '{self.model}'; it must be one of {', '.join(MODELS)}")
+        _require_limits(self)
+        for label, thread_set in (("warp", self.warp), ("weft", self.weft)):
+            for k, index in enumerate(thread_set.sequence):
+                if not 0 <= index < len(self.threads):
+                    raise FabricError(
+                        f"{label} thread {k}",
+                        f"is {index}; it must be from 0 to {len(self.threads) - 1}, "
+                        f"the fabric has {len(self.threads)} thread(s)",
+                    )
+        total = (self.warp.coverage or 0.0) + (self.weft.coverage or 0.0)
+        if total > 1.0 + 1e-9:
+            raise FabricError(
+                "coverage", f"of warp and weft together is {total:.6g}; it must be at most 1"
+            )
+        if self.back is not None and self.back.back is not None:
+            raise FabricError("back", "names a fabric that has a back itself; it must have none")
+
+    @property
+    def thread_list(self) -> tuple[Thread, ...]:
+        """The threads in index order."""
+        return tuple(self.threads.values())
+
+    def model_of(self, thread: Thread) -> str:
+        """The scattering model that `thread` is evaluated with in this fabric."""
+        return thread.model or self.model
+
+    def __hash__(self) -> int:
+        return hash((self.name, tuple(self.threads.items()), self.weave, self.warp, self.weft))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Binding:
+    """How a fabric lies on a mesh: which UVs, at which scale, turned and shifted by how much.
+
+    fabric : Fabric
+    uv_set : str - name of the texture coordinate primvar
+    metres_per_uv : float - length of one UV unit on the cloth [m]; 0 to measure it from the mesh
+    threads_per_uv : (2,) float - (ends per unit of u, picks per unit of v); where they are not 0
+        they take precedence over `metres_per_uv`
+    rotation : float - of the grain, from the mesh's u axis to the weft, counter-clockwise [rad]
+    offset : (2,) float - in UV units, added after the rotation
+    """
+
+    fabric: Fabric
+    uv_set: str = "st"
+    metres_per_uv: float = field(default=0.0, metadata=_limits(0.0))
+    threads_per_uv: tuple[float, float] = field(default=(0.0, 0.0), metadata=_limits(0.0))
+    rotation: float = 0.0
+    offset: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _require_limits(self)
+        if (self.threads_per_uv[0] == 0) != (self.threads_per_uv[1] == 0):
+            raise FabricError(
+                "threads_per_uv", f"is {self.threads_per_uv}; set both numbers, or neither"
+            )
+
+    def weave_coordinates(
+        self, uv: NDArray[np.float64], metres_per_uv: float = 0.0
+    ) -> NDArray[np.float64]:
+        """(n, 2) UV -> (n, 2) float64 weave coordinates in threads: (ends along U, picks along V).
+
+        `metres_per_uv` is the mesh's measured scale, used where the binding states none.
+        """
+        c, s = math.cos(self.rotation), math.sin(self.rotation)
+        uv = np.asarray(uv, np.float64)
+        # Turning the grain by +rotation is reading the weave at the UV turned by -rotation.
+        u = c * uv[..., 0] + s * uv[..., 1] + self.offset[0]
+        v = -s * uv[..., 0] + c * uv[..., 1] + self.offset[1]
+        scale_u, scale_v = self.threads_per_uv
+        if not scale_u:
+            metres = self.metres_per_uv or metres_per_uv
+            if not metres > 0:
+                raise FabricError("metres_per_uv", f"is {metres}; it must be above 0")
+            scale_u, scale_v = metres * self.fabric.warp.density, metres * self.fabric.weft.density
+        return np.stack((u * scale_u, v * scale_v), axis=-1)

@@ -1,0 +1,1 @@
+"""The reference path tracer: scene, acceleration structure, lights, cameras, film."""

@@ -1,0 +1,1 @@
+"""Fabrics as USD prims: schema, reading, writing, checking, presets, weave importers."""

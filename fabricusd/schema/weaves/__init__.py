@@ -1,0 +1,1 @@
+"""Weaves from a name, an expression, an image or a WIF draft."""
