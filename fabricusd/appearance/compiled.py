@@ -177,7 +177,7 @@ def _half_thickness(fabric: Fabric, share: Coverage, pitch: NDArray[np.float64])
 
 
 def _curve_tables(fabric: Fabric) -> dict[str, NDArray[np.float64]]:
-    """The linear pieces of every type's curve, padded to the longest with starts that none reach."""
+    """The linear pieces of every type's curve, padded to the longest by starts that none reach."""
     found = [pieces(t.curve) for t in fabric.thread_list]
     shape = (len(found), max(len(p.start) for p in found))
     start, angle = np.full(shape, 2.0), np.zeros(shape)

@@ -88,14 +88,11 @@ def angle_on(R, cloth, thread, s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=FAST)
-def height_on(R, cloth, thread, s, length):  # type: ignore[no-untyped-def]
-    """Height [m] of the axis at `s` on a run of `length` [m]: minus the integral of tan(angle).
+def rise_on(R, cloth, thread, k, s):  # type: ignore[no-untyped-def]
+    """Height at `s` on linear piece `k` of the thread's curve, in run lengths.
 
-    In closed form as `curve._rise`; 0 on pile.
+    Minus the integral of tan(angle), in closed form as `curve._rise`.
     """
-    if cloth.pile[thread] != 0 or length == R(0):
-        return R(0)
-    k = piece_of(R, cloth, thread, s)
     part = s - cloth.curve_start[thread, k]
     first = cloth.curve_angle[thread, k]
     slope = cloth.curve_slope[thread, k]
@@ -103,13 +100,19 @@ def height_on(R, cloth, thread, s, length):  # type: ignore[no-untyped-def]
     if abs(change) < R(1e-3):
         # Second-order Taylor about the middle: the logarithms would cancel in float32.
         tangent = math.tan(first + R(0.5) * change)
-        rise = (
-            -part * tangent * (R(1) + change * change * (R(1) + tangent * tangent) * R(1.0 / 12.0))
-        )
+        rise = -part * tangent * (R(1) + change * change * (R(1) + tangent * tangent) / R(12))
     else:
         ratio = R(-2) * math.sin(first + R(0.5) * change) * math.sin(R(0.5) * change)
         rise = math.log1p(ratio / math.cos(first)) / slope
-    return length * (cloth.curve_height[thread, k] + rise)
+    return cloth.curve_height[thread, k] + rise
+
+
+@njit(cache=True, fastmath=FAST)
+def height_on(R, cloth, thread, s, length):  # type: ignore[no-untyped-def]
+    """Height [m] of the thread's axis at `s` on a visible run of `length` [m]; 0 on pile."""
+    if cloth.pile[thread] != 0:
+        return R(0)
+    return length * rise_on(R, cloth, thread, piece_of(R, cloth, thread, s), s)
 
 
 @njit(cache=True, inline="always", fastmath=FAST)
