@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.coverage import WARP, WEFT
 from fabricusd.appearance.curve import peak
+from fabricusd.appearance.real import INLINE, KERNEL
 from fabricusd.appearance.weave import crown_on, lookup, rise_on, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -32,7 +33,7 @@ same thread is still resolved in float32 and is the tangent to within the curve'
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
-@njit(cache=True, inline="always")
+@njit(**INLINE)
 def crown_of(R, cloth, rounded, which, thread, w):  # type: ignore[no-untyped-def]
     """Height [m] of a thread's visible side over its axis at `w`, flat or round."""
     if rounded != 0:
@@ -40,7 +41,7 @@ def crown_of(R, cloth, rounded, which, thread, w):  # type: ignore[no-untyped-de
     return cloth.half_thickness[which, thread]
 
 
-@njit(cache=True)
+@njit(**KERNEL)
 def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first):  # type: ignore[no-untyped-def]
     """Slope of the steepest line from a point at height `h` [m] to the height field, at least `k`.
 
@@ -72,12 +73,12 @@ def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first): 
     return k
 
 
-@njit(cache=True)
+@njit(**KERNEL)
 def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h, k):  # type: ignore[no-untyped-def]
     """`steepest` over the threads seen in one cell, distances t0 to t1 [m]."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
-    warp = int(cloth.sequence_warp[wrap(end, cloth.sequence_warp.shape[0])])
-    weft = int(cloth.sequence_weft[wrap(pick, cloth.sequence_weft.shape[0])])
+    warp = int(cloth.sequence[WARP, wrap(end, cloth.sequence_length[WARP])])
+    weft = int(cloth.sequence[WEFT, wrap(pick, cloth.sequence_length[WEFT])])
     top = int(cloth.grid[i, j])
     own = end == math.floor(u) if which == WARP else pick == math.floor(v)
     if top == WARP:
@@ -90,20 +91,20 @@ def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h
     low, high = 0.5 - 0.5 * width, 0.5 + 0.5 * width
     if width > 0.0 and cloth.pile[above] == 0:
         a, b = _within(over, over_t, low, high, t0, t1)
-        cells = float(cloth.runs[i, j, 1])
+        cells = float(cloth.runs[i, j, 0, 1])
         mine = own and which == top
         k = _cross_thread(
             cloth, 0 if mine else rounded, above,
             crown if mine else float(cloth.half_thickness[top, above]),
             a, b, h, k, cells * float(crossing),
-            (float(cloth.runs[i, j, 0]) + along) / cells, along_t / cells,
+            (float(cloth.runs[i, j, 0, 0]) + along) / cells, along_t / cells,
             2.0 * (over - 0.5) / width, 2.0 * over_t / width,
         )  # fmt: skip
     if cloth.under == 1 - top and cloth.pile[below] == 0:
         seen = float(cloth.under_width)
         a0, b0 = _within(along, along_t, 0.5 - 0.5 * seen, 0.5 + 0.5 * seen, t0, t1)
         share = 1.0 - width
-        cells = float(cloth.under_runs[i, j, 1])
+        cells = float(cloth.runs[i, j, 1, 1])
         for side in range(2):
             if side == 0:
                 a, b = _within(over, over_t, 0.0, low, a0, b0)
@@ -111,7 +112,7 @@ def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h
             else:
                 a, b = _within(over, over_t, high, 1.0, a0, b0)
                 skipped = width
-            place = float(cloth.under_runs[i, j, 0]) + (over - skipped) / share
+            place = float(cloth.runs[i, j, 1, 0]) + (over - skipped) / share
             mine = own and which != top
             k = _cross_thread(
                 cloth, 0 if mine else rounded, below,
@@ -122,7 +123,7 @@ def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h
     return k
 
 
-@njit(cache=True, inline="always")
+@njit(**INLINE)
 def _within(x, x_t, low, high, t0, t1):  # type: ignore[no-untyped-def]
     """The part of [t0, t1] with x + x_t t from `low` to `high`; empty where its end is less."""
     if x_t == 0.0:
@@ -133,7 +134,7 @@ def _within(x, x_t, low, high, t0, t1):  # type: ignore[no-untyped-def]
     return max(t0, min(a, b)), min(t1, max(a, b))
 
 
-@njit(cache=True)
+@njit(**KERNEL)
 def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w_t):  # type: ignore[no-untyped-def]
     """`steepest` over a stretch of thread: distances a to b [m], position s + s_t t, w + w_t t."""
     if not b > a:
@@ -174,7 +175,7 @@ def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w
     return k
 
 
-@njit(cache=True)
+@njit(**KERNEL)
 def _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t):  # type: ignore[no-untyped-def]
     """Slope from the point to the thread at distance `t` [m]."""
     at = max(0.0, min(1.0, s + s_t * t))
@@ -185,7 +186,7 @@ def _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t):  # ty
     return (length * rise_on(np.float64, cloth, thread, p, at) + crown - h) / t
 
 
-@njit(cache=True)
+@njit(**KERNEL)
 def _summit(cloth, thread, p, half, h, length, s, s_t, w, w_t, t0, t1, k):  # type: ignore[no-untyped-def]
     """Where a round thread stands highest above the line of slope `k`, by golden section.
 
@@ -241,10 +242,10 @@ def _longest_runs(cloth: CompiledFabric, which: int) -> list[tuple[NDArray[np.in
     on_top = cloth.grid == which
     answer = []
     if cloth.width[which] > 0:
-        lengths = np.where(on_top, cloth.runs[..., 1], 0).max(axis=axis)
+        lengths = np.where(on_top, cloth.runs[..., 0, 1], 0).max(axis=axis)
         answer.append((lengths.astype(np.int64), 1.0))
     if cloth.under == which:
-        lengths = np.where(on_top, 0, cloth.under_runs[..., 1]).max(axis=axis)
+        lengths = np.where(on_top, 0, cloth.runs[..., 1, 1]).max(axis=axis)
         answer.append((lengths.astype(np.int64), 1.0 - float(cloth.width[1 - which])))
     return answer
 

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from fabricusd.appearance.compiled import CompiledFabric
 from fabricusd.appearance.coverage import GAP, WARP
 from fabricusd.appearance.height import crown_of, steepest
-from fabricusd.appearance.weave import FAST, find, height_on, wrap
+from fabricusd.appearance.real import INLINE, KERNEL
+from fabricusd.appearance.weave import find, height_on, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -94,7 +95,7 @@ def _diamond_directions(azimuths: int) -> NDArray[np.float64]:
     return found
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True, **KERNEL)
 def _fill(cloth, rounded, highest, directions, table):  # type: ignore[no-untyped-def]
     """The horizon at the centre of every texel, in every direction."""
     ends, picks, slots, rows, columns, azimuths = table.shape
@@ -122,7 +123,7 @@ def _fill(cloth, rounded, highest, directions, table):  # type: ignore[no-untype
                         table[i, j, slot, row, column, a] = np.uint8(255.0 * sine + 0.5)
 
 
-@njit(cache=True)
+@njit(**KERNEL)
 def _texel_centre(cloth, i, j, slot, along, across):  # type: ignore[no-untyped-def]
     """Weave coordinates of a place on a slot's thread, and whether that thread is seen at all."""
     top = int(cloth.grid[i % cloth.grid.shape[0], j % cloth.grid.shape[1]])
@@ -140,7 +141,7 @@ def _texel_centre(cloth, i, j, slot, along, across):  # type: ignore[no-untyped-
     return i + p, j + q, seen
 
 
-@njit(cache=True, inline="always", fastmath=FAST)
+@njit(**INLINE)
 def diamond(R, x, y):  # type: ignore[no-untyped-def]
     """Azimuth of (x, y) from 0 to 4: one per quadrant, linear in y/(|x| + |y|) inside it."""
     whole = abs(x) + abs(y)
@@ -149,7 +150,7 @@ def diamond(R, x, y):  # type: ignore[no-untyped-def]
     return R(2) - y / whole if x < R(0) else R(3) + x / whole
 
 
-@njit(cache=True, inline="always", fastmath=FAST)
+@njit(**INLINE)
 def _cell_of_texels(R, place, count):  # type: ignore[no-untyped-def]
     """Lower of the two texels around `place` in [0, 1], and the share of the upper one."""
     x = max(R(0), min(place * R(count) - R(0.5), R(count - 1)))
@@ -157,17 +158,22 @@ def _cell_of_texels(R, place, count):  # type: ignore[no-untyped-def]
     return k, x - R(k)
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(**INLINE)
+def _between(R, table, i, j, slot, row, column, first, second, c):  # type: ignore[no-untyped-def]
+    """A texel's horizon between two azimuths, c of the way from the first."""
+    low = R(table[i, j, slot, row, column, first])
+    return low + (R(table[i, j, slot, row, column, second]) - low) * c
+
+
+@njit(**INLINE)
 def horizon_sine(R, cloth, table, u, v, which, x, y):  # type: ignore[no-untyped-def]
     """Sine of the horizon's elevation at (u, v) on the thread of set `which` towards (x, y)."""
     end, pick = math.floor(u), math.floor(v)
     i, j = wrap(end, table.shape[0]), wrap(pick, table.shape[1])
     p, q = R(u - end), R(v - pick)
-    top = (
-        which
-        if table.shape[2] == 1
-        else int(cloth.grid[i % cloth.grid.shape[0], j % cloth.grid.shape[1]])
-    )
+    top = which
+    if table.shape[2] > 1:
+        top = int(cloth.grid[wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])])
     if top == WARP:
         p, q = q, p
     width = cloth.width[top]
@@ -185,19 +191,16 @@ def horizon_sine(R, cloth, table, u, v, which, x, y):  # type: ignore[no-untyped
     first = min(int(turn), azimuths - 1)
     c = turn - R(first)
     second = first + 1 if first + 1 < azimuths else 0
-    texels = table[i, j, slot]
-    here = texels[row, column, first] * (R(1) - c) + texels[row, column, second] * c
-    beside = texels[row, column + 1, first] * (R(1) - c) + texels[row, column + 1, second] * c
-    ahead = texels[row + 1, column, first] * (R(1) - c) + texels[row + 1, column, second] * c
-    both = texels[row + 1, column + 1, first] * (R(1) - c) + texels[
-        row + 1, column + 1, second
-    ] * c  # fmt: skip
+    here = _between(R, table, i, j, slot, row, column, first, second, c)
+    beside = _between(R, table, i, j, slot, row, column + 1, first, second, c)
+    ahead = _between(R, table, i, j, slot, row + 1, column, first, second, c)
+    both = _between(R, table, i, j, slot, row + 1, column + 1, first, second, c)
     near = here + (beside - here) * b
     far = ahead + (both - ahead) * b
     return (near + (far - near) * a) * R(1.0 / 255.0)
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True, **KERNEL)
 def _compare(cloth, rounded, highest, table, uv, angle, out):  # type: ignore[no-untyped-def]
     """Elevation of the table minus that of the march [rad]; NaN where nothing casts shadows."""
     for k in prange(uv.shape[0]):

@@ -20,6 +20,9 @@ from numba.extending import overload, register_jitable
 # numpy's error model: a division by zero is an infinity, not an exception that stops vectorising.
 KERNEL: dict[str, Any] = {
     "cache": True,
+    # Kernels allocate nothing, so numba need not count references: in a function that hands a
+    # compiled fabric on, counting its arrays cost five times the work itself.
+    "_nrt": False,
     "nogil": True,
     "error_model": "numpy",
     "fastmath": {"contract", "reassoc", "arcp", "nsz"},

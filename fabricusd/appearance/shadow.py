@@ -29,7 +29,8 @@ from fabricusd.appearance.horizon import (
     horizon_sine,
     horizon_table,
 )
-from fabricusd.appearance.weave import FAST, find, height_on, wrap
+from fabricusd.appearance.real import INLINE, KERNEL
+from fabricusd.appearance.weave import find, height_on, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -117,7 +118,7 @@ def compile_shadow(
     )
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(**INLINE)
 def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: ignore[no-untyped-def]
     """Share of light from direction (x, y, z) in the surface frame that reaches a point: `g`.
 
@@ -159,14 +160,14 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: 
     return R(0) if found > slope else R(1)
 
 
-@njit(cache=True, inline="always", fastmath=FAST)
+@njit(**INLINE)
 def _soft(R, above, softness):  # type: ignore[no-untyped-def]
     """A smooth step from 0 to 1 over `softness`, in how far the light stands above the horizon."""
     t = max(R(0), min(R(1), above / softness + R(0.5)))
     return t * t * (R(3) - R(2) * t)
 
 
-@njit(cache=True)
+@njit(**KERNEL)
 def _to_crest(cloth, shadow, u, v, most):  # type: ignore[no-untyped-def]
     """Distance on the cloth [m] to the nearest of the highest points, at most `most`."""
     end, pick = math.floor(u), math.floor(v)
@@ -182,7 +183,7 @@ def _to_crest(cloth, shadow, u, v, most):  # type: ignore[no-untyped-def]
     return best
 
 
-@njit(cache=True)
+@njit(**KERNEL)
 def _crest_in_cell(cloth, shadow, u, v, end, pick, best):  # type: ignore[no-untyped-def]
     """The smaller of `best` and the distance [m] to the highest points in one cell."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
@@ -193,12 +194,12 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):  # type: ignore[no-unt
         which = top if slot == 0 else 1 - top
         visible = width if slot == 0 else float(cloth.under_width)
         if which == WARP:
-            thread = int(cloth.sequence_warp[wrap(end, cloth.sequence_warp.shape[0])])
+            thread = int(cloth.sequence[WARP, wrap(end, cloth.sequence_length[WARP])])
         else:
-            thread = int(cloth.sequence_weft[wrap(pick, cloth.sequence_weft.shape[0])])
+            thread = int(cloth.sequence[WEFT, wrap(pick, cloth.sequence_length[WEFT])])
         share = 1.0 if slot == 0 else 1.0 - width
-        place = float(cloth.runs[i, j, 0] if slot == 0 else cloth.under_runs[i, j, 0])
-        cells = float(cloth.runs[i, j, 1] if slot == 0 else cloth.under_runs[i, j, 1])
+        place = float(cloth.runs[i, j, slot, 0])
+        cells = float(cloth.runs[i, j, slot, 1])
         height = cells * share * float(cloth.pitch[1 - which]) * float(
             shadow.crest_height[thread]
         ) + float(cloth.half_thickness[which, thread])
@@ -226,7 +227,7 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):  # type: ignore[no-unt
     return best
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True, **KERNEL)
 def lit_all(R, cloth, shadow, uv, wi, out):  # type: ignore[no-untyped-def]
     """`lit` at weave coordinates uv (n, 2) float64 for light wi (n, 3), into out (n,)."""
     n = uv.shape[0]
