@@ -1,12 +1,11 @@
 """Importance sampling of one thread: directions over the whole sphere, and their density.
 
-A mixture of three lobes, each exact in closed form per steradian:
+A mixture, each of its lobes exact in closed form per steradian:
 
-- surface: theta_i normal around -theta_o with deviation 2 gs, cut at +-90 degrees; azimuth by
-  cos(phi_d/2)/4;
-- volume: the same with 2 gv; azimuth uniform;
-- isotropic: uniform in theta for the published models, whose 1/cos^2(theta_d) lifts grazing
-  directions, uniform on the sphere for `conserving`; azimuth uniform.
+- surface, azimuth by cos(phi_d/2)/4: theta_i normal with about twice gs, cut at +-90 degrees;
+- surface, azimuth uniform: where Fresnel's rise towards phi_d = 180 degrees evens the cosine out;
+- volume: the same with gv, azimuth uniform;
+- isotropic: uniform on the sphere.
 
 The shares follow estimates of the terms' energies; the isotropic lobe keeps at least a tenth, which
 bounds the weight of every direction. Source: MODEL section 6.
@@ -42,27 +41,49 @@ _SQRT_2 = math.sqrt(2.0)
 
 
 @njit(**INLINE)
-def lobe_shares(R, row, cos_o):
-    """(surface, volume): shares of the mixture for the viewer's inclination; isotropic the rest."""
+def inclination_lobe(R, gamma, sin_o, cos_o):
+    """(mean, deviation, narrowing) [rad] of the normal distribution that stands for a lobe.
+
+    The lobe is g(gamma, theta_h) cos^2(theta_i)/cos^2(theta_d); the cosines, to second order around
+    the mirror direction, narrow it and shift it towards the normal plane. Towards grazing views
+    that expansion fails and is faded out. `narrowing` is the deviation over 2 gamma: its energy.
+    """
+    wide = R(2) * gamma
+    narrowing = R(1) / math.sqrt(R(1) + R(1.5) * cos_o * wide * wide)
+    deviation = wide * narrowing
+    shift = sin_o * cos_o * deviation * deviation
+    return shift - atan2(R, sin_o, cos_o), deviation, narrowing
+
+
+@njit(**INLINE)
+def lobe_shares(R, row, cos_o, narrow_s, narrow_v):
+    """(surface by cosine, surface uniform, volume): shares of the mixture; isotropic the rest.
+
+    narrow_s, narrow_v : `narrowing` of `inclination_lobe` for gs and gv
+    """
     kd = row[ISOTROPIC]
+    # F cos(phi_d/2) at theta_d = -theta_o as a + b cos(phi_d/2), through phi_d = 0 and 120 degrees.
+    f_0, transmitted = fresnel(R, row[IOR_EXCESS], cos_o)
+    f_1, _ = fresnel(R, row[IOR_EXCESS], R(0.5) * cos_o)
+    even = max(f_1 - f_0, R(0))
+    by_cosine = max(R(2) * f_0 - f_1, R(0))
     if row[MODEL] == R(CONSERVING):
         through = transmission(R, row, cos_o)
-        surface = R(1) - through
+        surface = (R(1) - through) / max(R(2 * math.pi) * even + R(4) * by_cosine, R(1e-30))
         whole = through * through * row[INVERSE_T_MAX] * row[BRIGHTNESS]
-        volume = (R(1) - kd) * whole
         isotropic = kd * whole
+        volume = (R(1) - kd) * whole
     else:
-        # Along the mirror cone, at an azimuth where half of the reflection lies.
-        reflected, transmitted = fresnel(R, row[IOR_EXCESS], R(0.8) * cos_o)
-        surface = R(8) * reflected
+        surface = R(2) * narrow_s
         whole = R(2 * math.pi) * transmitted * transmitted * row[BRIGHTNESS]
-        whole = whole / max(cos_o, row[GAMMA_VOLUME])
-        volume = (R(1) - kd) * whole
-        isotropic = kd * whole
-    total = surface + volume + isotropic
-    scale = R(1 - ISOTROPIC_SHARE) / max(total, R(1e-30))
+        volume = (R(1) - kd) * whole * narrow_v / max(cos_o, row[GAMMA_VOLUME])
+        isotropic = kd * whole / max(cos_o, R(0.2))
+    even *= R(2 * math.pi) * surface
+    by_cosine *= R(4) * surface
     # A black, unreflecting thread scatters nothing; any density will do.
-    return surface * scale, volume * scale
+    total = max(even + by_cosine + volume + isotropic, R(1e-30))
+    scale = min(R(1) / total, R(1 - ISOTROPIC_SHARE) / max(total - isotropic, R(1e-30)))
+    return by_cosine * scale, even * scale, volume * scale
 
 
 @njit(**INLINE)
@@ -92,35 +113,34 @@ def sample_cut_normal(R, mean, deviation, u):
 def density(R, row, ix, iy, iz, ox, oy, oz):
     """pdf(wi) [1/sr] of `sample_direction`, over the whole sphere."""
     cos_i, cos_o, cos_half = pair_angles(R, iy, iz, oy, oz)
-    theta_i, theta_o = atan2(R, ix, cos_i), atan2(R, ox, cos_o)
-    surface, volume = lobe_shares(R, row, cos_o)
-    inverse_cos = R(1) / max(cos_i, R(COS_MINIMUM))
-    p = surface * cut_normal(R, theta_i, -theta_o, R(2) * row[GAMMA_SURFACE]) * R(0.25) * cos_half
-    p += volume * cut_normal(R, theta_i, -theta_o, R(2) * row[GAMMA_VOLUME]) * R(0.5 / math.pi)
-    p *= inverse_cos
-    sphere = R(0.25 / math.pi)
-    even = R(0.5 / (math.pi * math.pi)) * inverse_cos
-    return p + (R(1) - surface - volume) * (sphere if row[MODEL] == R(CONSERVING) else even)
+    theta_i = atan2(R, ix, cos_i)
+    mean_s, deviation_s, narrow_s = inclination_lobe(R, row[GAMMA_SURFACE], ox, cos_o)
+    mean_v, deviation_v, narrow_v = inclination_lobe(R, row[GAMMA_VOLUME], ox, cos_o)
+    by_cosine, even, volume = lobe_shares(R, row, cos_o, narrow_s, narrow_v)
+    around = R(0.25) * cos_half * by_cosine + R(0.5 / math.pi) * even
+    p = around * cut_normal(R, theta_i, mean_s, deviation_s)
+    p += R(0.5 / math.pi) * volume * cut_normal(R, theta_i, mean_v, deviation_v)
+    isotropic = R(1) - by_cosine - even - volume
+    return p / max(cos_i, R(COS_MINIMUM)) + R(0.25 / math.pi) * isotropic
 
 
 @njit(**KERNEL)
 def sample_direction(R, row, ox, oy, oz, u0, u1, u2):
     """wi in the thread frame for three numbers in [0, 1): lobe, inclination, azimuth."""
     cos_o = cos_inclination(R, oy, oz)
-    theta_o = atan2(R, ox, cos_o)
     sin_phi_o, cos_phi_o = unit_azimuth(R, oy, oz, cos_o)
-    surface, volume = lobe_shares(R, row, cos_o)
-    around = R(math.pi) * (R(2) * u2 - R(1))
-    if u0 < surface:
-        theta = sample_cut_normal(R, -theta_o, R(2) * row[GAMMA_SURFACE], u1)
-        # The integral of cos(phi_d/2)/4 is (1 + sin(phi_d/2))/2.
-        around = R(2) * asin(R, R(2) * u2 - R(1))
-    elif u0 < surface + volume:
-        theta = sample_cut_normal(R, -theta_o, R(2) * row[GAMMA_VOLUME], u1)
-    elif row[MODEL] == R(CONSERVING):
-        theta = asin(R, R(2) * u1 - R(1))
+    mean_s, deviation_s, narrow_s = inclination_lobe(R, row[GAMMA_SURFACE], ox, cos_o)
+    mean_v, deviation_v, narrow_v = inclination_lobe(R, row[GAMMA_VOLUME], ox, cos_o)
+    by_cosine, even, volume = lobe_shares(R, row, cos_o, narrow_s, narrow_v)
+    turn = R(2) * u2 - R(1)
+    # The integral of cos(phi_d/2)/4 is (1 + sin(phi_d/2))/2.
+    around = R(2) * asin(R, turn) if u0 < by_cosine else R(math.pi) * turn
+    if u0 < by_cosine + even:
+        theta = sample_cut_normal(R, mean_s, deviation_s, u1)
+    elif u0 < by_cosine + even + volume:
+        theta = sample_cut_normal(R, mean_v, deviation_v, u1)
     else:
-        theta = R(math.pi) * (u1 - R(0.5))
+        theta = asin(R, R(2) * u1 - R(1))
     s, c = sin(R, around), cos(R, around)
     cos_theta = max(cos(R, theta), R(0))
     return (

@@ -93,7 +93,7 @@ def surface_albedo(gamma_surface: float, ior: float, surface_gain: float) -> NDA
 
 @njit(**KERNEL)
 def _integrate_surface(row, x, x_weight, phi, phi_weight, out):  # type: ignore[no-untyped-def]
-    """`out[k]` = E at sqrt(cos theta) = k/(n-1). The nodes follow the lobe, however narrow it is."""
+    """`out[k]` = E at sqrt(cos theta) = k/(n-1); the nodes follow the lobe, however narrow."""
     R = np.float64
     reach = 2.0 * _REACH * row[column.GAMMA_SURFACE]
     for k in range(out.size):
