@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.coverage import WARP, WEFT
 from fabricusd.appearance.curve import peak
-from fabricusd.appearance.real import INLINE, KERNEL
+from fabricusd.appearance.real import INLINE, LEAN
 from fabricusd.appearance.weave import crown_on, lookup, rise_on, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -41,7 +41,7 @@ def crown_of(R, cloth, rounded, which, thread, w):  # type: ignore[no-untyped-de
     return cloth.half_thickness[which, thread]
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first):  # type: ignore[no-untyped-def]
     """Slope of the steepest line from a point at height `h` [m] to the height field, at least `k`.
 
@@ -73,7 +73,7 @@ def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first): 
     return k
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h, k):  # type: ignore[no-untyped-def]
     """`steepest` over the threads seen in one cell, distances t0 to t1 [m]."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
@@ -134,7 +134,7 @@ def _within(x, x_t, low, high, t0, t1):  # type: ignore[no-untyped-def]
     return max(t0, min(a, b)), min(t1, max(a, b))
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w_t):  # type: ignore[no-untyped-def]
     """`steepest` over a stretch of thread: distances a to b [m], position s + s_t t, w + w_t t."""
     if not b > a:
@@ -175,7 +175,7 @@ def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w
     return k
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t):  # type: ignore[no-untyped-def]
     """Slope from the point to the thread at distance `t` [m]."""
     at = max(0.0, min(1.0, s + s_t * t))
@@ -186,7 +186,7 @@ def _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t):  # ty
     return (length * rise_on(np.float64, cloth, thread, p, at) + crown - h) / t
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def _summit(cloth, thread, p, half, h, length, s, s_t, w, w_t, t0, t1, k):  # type: ignore[no-untyped-def]
     """Where a round thread stands highest above the line of slope `k`, by golden section.
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.compiled import CompiledFabric
 from fabricusd.appearance.coverage import GAP, WARP
 from fabricusd.appearance.height import crown_of, steepest
-from fabricusd.appearance.real import INLINE, KERNEL
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN
 from fabricusd.appearance.weave import find, height_on, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -123,7 +123,7 @@ def _fill(cloth, rounded, highest, directions, table):  # type: ignore[no-untype
                         table[i, j, slot, row, column, a] = np.uint8(255.0 * sine + 0.5)
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def _texel_centre(cloth, i, j, slot, along, across):  # type: ignore[no-untyped-def]
     """Weave coordinates of a place on a slot's thread, and whether that thread is seen at all."""
     top = int(cloth.grid[i % cloth.grid.shape[0], j % cloth.grid.shape[1]])

@@ -29,7 +29,7 @@ from fabricusd.appearance.horizon import (
     horizon_sine,
     horizon_table,
 )
-from fabricusd.appearance.real import INLINE, KERNEL
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN
 from fabricusd.appearance.weave import find, height_on, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -167,7 +167,7 @@ def _soft(R, above, softness):  # type: ignore[no-untyped-def]
     return t * t * (R(3) - R(2) * t)
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def _to_crest(cloth, shadow, u, v, most):  # type: ignore[no-untyped-def]
     """Distance on the cloth [m] to the nearest of the highest points, at most `most`."""
     end, pick = math.floor(u), math.floor(v)
@@ -183,7 +183,7 @@ def _to_crest(cloth, shadow, u, v, most):  # type: ignore[no-untyped-def]
     return best
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def _crest_in_cell(cloth, shadow, u, v, end, pick, best):  # type: ignore[no-untyped-def]
     """The smaller of `best` and the distance [m] to the highest points in one cell."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
