@@ -27,7 +27,7 @@ FABRIC, THREAD, BINDING = "FabricusdFabric", "FabricusdFabricThread", "Fabricusd
 
 @dataclass(frozen=True)
 class Rule:
-    """One rule: its name, its severity, the schema types of the prims that it looks at."""
+    """One rule: its name, its severity, the schema types of the prims it looks at; () for all."""
 
     name: str
     severity: str
@@ -54,7 +54,7 @@ def rule(*schema_types: str, severity: str = "error") -> Callable[[RuleFunction]
 def applies(checked: Rule, prim: Usd.Prim) -> bool:
     """Whether `prim` is of a type that the rule looks at."""
     type_name = f"Fabricusd{prim.GetTypeName()}"
-    if type_name in checked.schema_types:
+    if not checked.schema_types or type_name in checked.schema_types:
         return True
     return BINDING in checked.schema_types and (
         prim.HasAPI("FabricBindingAPI") or prim.HasRelationship("fabric:binding")
@@ -358,10 +358,10 @@ def threads_per_unit_both(prim: Usd.Prim) -> Iterator[Fault]:
         yield name, f"is ({value[0]:g}, {value[1]:g}); both must be 0, or both above 0"
 
 
-@rule(BINDING, severity="warning")
+@rule(severity="warning")
 def binding_api_applied(prim: Usd.Prim) -> Iterator[Fault]:
     """A prim with a fabric:binding relationship has FabricBindingAPI applied."""
-    if not prim.HasAPI("FabricBindingAPI"):
+    if prim.HasRelationship("fabric:binding") and not prim.HasAPI("FabricBindingAPI"):
         yield "fabric:binding", "is authored, but FabricBindingAPI is not in the prim's apiSchemas"
 
 
