@@ -81,12 +81,14 @@ def longest_float(cells: np.ndarray[Any, np.dtype[np.bool_]], axis: int) -> int 
     broken = on_top[~on_top.all(axis=1)]
     if len(broken) < len(on_top):
         return None
-    padded = np.zeros((broken.shape[0], 2 * broken.shape[1] + 2), np.int8)
-    padded[:, 1:-1] = np.tile(broken, (1, 2))
-    change = np.diff(padded, axis=1)
-    starts, ends = np.nonzero(change == 1), np.nonzero(change == -1)
-    lengths = ends[1] - starts[1]
-    return int(lengths.max()) if lengths.size else 0
+    longest = 0
+    # Row by row: the run starts and ends of a whole jacquard would take a gigabyte.
+    for row in broken:
+        start = int(np.argmin(row))
+        breaks = np.flatnonzero(~np.roll(row, -start))
+        gaps = np.diff(np.append(breaks, row.size)) - 1
+        longest = max(longest, int(gaps.max()))
+    return longest
 
 
 def _floats(cells: np.ndarray[Any, np.dtype[np.bool_]]) -> str:
