@@ -38,7 +38,12 @@ def table(name: str) -> list[str]:
 
 def main() -> None:
     """Write the page."""
-    lines = ["# The schema", "", "Made by `make docs` from the schema itself; edit `schema.usda`.", ""]
+    lines = [
+        "# The schema",
+        "",
+        "Made by `make docs` from the schema itself; edit `schema.usda`.",
+        "",
+    ]
     for name, what in TYPES:
         lines += [f"## {name}", "", what, "", *table(name), ""]
     lines += ["## Rules", "", "What `fabricusd check` and USD's own validation report.", ""]

@@ -14,7 +14,9 @@ EPILOG = """example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where to write."""
-    parser.add_argument("-o", "--output", metavar="DIR", default="demo", help="folder (default: demo)")
+    parser.add_argument(
+        "-o", "--output", metavar="DIR", default="demo", help="folder (default: demo)"
+    )
 
 
 def run(options: argparse.Namespace) -> int:

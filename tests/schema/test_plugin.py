@@ -132,14 +132,20 @@ def test_every_attribute_has_a_fallback_and_every_token_its_allowed_values(owner
     ids=lambda entry: entry.name,
 )  # fmt: skip
 def test_fallbacks_and_types_agree_with_the_dataclasses(entry):
-    owner = "FabricBindingAPI" if entry.owner is Binding else (
-        "FabricThread" if entry.owner is Thread else "Fabric"
+    owner = (
+        "FabricBindingAPI"
+        if entry.owner is Binding
+        else ("FabricThread" if entry.owner is Thread else "Fabric")
     )
     attribute = definition(owner).GetAttributeDefinition(entry.name)
     assert attribute.GetTypeName() == entry.type_name
     fallback = attributes.to_si(attribute.GetFallbackValue(), entry)
-    made = {Thread: Thread(), ThreadSet: ThreadSet(), Fabric: Fabric(), Binding: Binding(
-        fabric=Fabric())}[entry.owner]
+    made = {
+        Thread: Thread(),
+        ThreadSet: ThreadSet(),
+        Fabric: Fabric(),
+        Binding: Binding(fabric=Fabric()),
+    }[entry.owner]
     if fallback is None:
         assert getattr(made, entry.field) is None
     else:

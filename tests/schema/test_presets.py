@@ -52,7 +52,9 @@ def test_a_preset_has_the_published_numbers(name, which):
     assert thread_set.coverage == area
     angles = [math.degrees(a) for a in thread.curve.angles]
     assert angles == pytest.approx(list(offsets), rel=1e-14)
-    steps = [b - a for a, b in zip(thread.curve.positions, thread.curve.positions[1:], strict=False)]
+    steps = [
+        b - a for a, b in zip(thread.curve.positions, thread.curve.positions[1:], strict=False)
+    ]
     assert steps == pytest.approx(list(lengths), rel=1e-12, abs=1e-12)
 
 
@@ -63,8 +65,10 @@ def test_a_preset_says_where_its_numbers_come_from(name):
     word = "[Sadeghi2013] Table II" if name in published else "Derived, not published"
     assert word in " ".join(fabric.documentation.split())
     for thread in fabric.thread_list:
-        assert "[Sadeghi2013]" in thread.documentation or "erived" in thread.documentation or (
-            "[Bisker2011]" in thread.documentation
+        assert (
+            "[Sadeghi2013]" in thread.documentation
+            or "erived" in thread.documentation
+            or ("[Bisker2011]" in thread.documentation)
         )
 
 

@@ -50,7 +50,9 @@ def test_usd_validators_report_what_check_reports(rule):
     stage = Usd.Stage.Open(str(BAD / f"{rule.function.__name__}.usda"))
     reported = UsdValidation.ValidationContext([validator]).Validate(stage)
     ours = [f for f in check(str(BAD / f"{rule.function.__name__}.usda")) if f.rule == rule.name]
-    assert [e.GetMessage() for e in reported] == [f"{f.prim} {f.property} {f.problem}" for f in ours]
+    assert [e.GetMessage() for e in reported] == [
+        f"{f.prim} {f.property} {f.problem}" for f in ours
+    ]
 
 
 @pytest.mark.parametrize("name", preset_names())

@@ -66,8 +66,10 @@ def draw_draft(
     loom = thread_loom(draft.weave.cells)
     words = _caption(draft, loom)
     frame = (loom.treadles + 1, loom.shafts + 1)
-    framed = loom.shafts <= MOST_SHAFTS and columns >= frame[0] + SMALLEST
-    framed = framed and rows >= frame[1] + SMALLEST
+    # A frame that leaves too little of the cloth to see is left out.
+    framed = loom.shafts <= MOST_SHAFTS
+    framed = framed and columns - frame[0] >= min(ends, max(columns // 3, SMALLEST))
+    framed = framed and rows - frame[1] >= min(picks, max(rows // 3, SMALLEST))
     if framed:
         columns, rows = columns - frame[0], rows - frame[1]
     shown = min(ends, columns), min(picks, rows)
@@ -76,13 +78,10 @@ def draw_draft(
         canvas = _framed(canvas, loom)
     palette = _palette(draft)
     text = [_line(pair, palette, color, ascii_only) for pair in _pairs(canvas, ascii_only)]
-    left = [
-        f"{n - s} {word}"
-        for n, s, word in zip((ends, picks), shown, ("ends", "picks"), strict=True)
-        if n > s
-    ]
+    sets = zip((ends, picks), shown, ("ends", "picks"), strict=True)
+    left = [f"{total - part} {word}" for total, part, word in sets if total > part]
     if left:
-        text.append(f"… and {', '.join(left)} more".replace("…", "..." if ascii_only else "…"))
+        text.append(("..." if ascii_only else "…") + f" and {', '.join(left)} more")
     return "\n".join([*text, *words])
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
 from fabricusd.schema.weaves.color import srgb_from_linear
-from fabricusd.schema.weaves.files import require_file
+from fabricusd.schema.weaves.files import ordinary_file
 
 
 def read_codes(path: str | os.PathLike[str], largest: int) -> NDArray[np.uint32]:
@@ -20,7 +20,7 @@ def read_codes(path: str | os.PathLike[str], largest: int) -> NDArray[np.uint32]
     """
     import OpenImageIO as oiio
 
-    where = str(require_file(path, "an image"))
+    where = str(ordinary_file(path))
     reader = oiio.ImageInput.open(where)
     if reader is None:
         reason = " ".join(oiio.geterror().split())[:200]
