@@ -14,6 +14,7 @@ from fabricusd.appearance.frame import (
     WARP,
     cos_half_difference,
     cos_inclination,
+    half_inclination,
     unit_azimuth,
 )
 from fabricusd.appearance.lobes import gaussian
@@ -116,9 +117,12 @@ def cell_lobes(R, row, half, c, s, a_i, b_i, iz, a_o, b_o, oz):
 @njit(**INLINE)
 def mean_gaussian(R, width, half_precision, norm, x, reach):
     """Mean of the Gaussian over [x - reach, x + reach]."""
-    # Within a thousandth of its width the difference of error functions would cancel.
-    if reach < R(1e-3) * width:
-        return gaussian(R, half_precision, norm, x)
+    ratio = reach / width
+    if ratio < R(0.05):
+        # The difference of error functions would cancel; two terms of its series do not.
+        z = x / width
+        g = gaussian(R, half_precision, norm, x)
+        return g * (R(1) + (z * z - R(1)) * ratio * ratio * R(1.0 / 6.0))
     scale = R(math.sqrt(0.5)) / width
     high, low = erf(R, (x + reach) * scale), erf(R, (x - reach) * scale)
     return R(0.25) * (high - low) / reach
