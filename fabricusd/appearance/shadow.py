@@ -146,7 +146,7 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: 
         if drop <= R(1e-6) * shadow.highest:
             return R(1)
         # No horizon lower than this one can touch the shadow's edge.
-        lowest = max(z / flat - shadow.softness * (R(1) + z * z / (flat * flat)), R(4e-3))
+        lowest = max(z / flat - shadow.softness * (R(1) + z * z / (flat * flat)), R(1e-6))
         distance = R(_to_crest(cloth, shadow, u, v, float(drop / lowest)))
         reach = math.sqrt(drop * drop + distance * distance)
         return _soft(R, (z * distance - flat * drop) / reach, shadow.softness)

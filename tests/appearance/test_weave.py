@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from fabricusd.appearance.compiled import compile_fabric, true_repeat
 from fabricusd.appearance.coverage import GAP, WARP, WEFT, coverage
 from fabricusd.appearance.curve import height_at
-from fabricusd.appearance.weave import back_of, find, lookup
+from fabricusd.appearance.weave import back_of, find_all, lookup
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, TangentCurve, Thread, ThreadSet, Weave
 from tests.appearance.presets import PLAIN, PRESETS, SATIN_5
@@ -271,8 +271,10 @@ def test_coordinates_without_a_place_are_counted_and_named(place: list[float]) -
     with pytest.raises(FabricError, match=r"has 1 of 3 places .* the first at 1"):
         lookup(PRESETS["linen_plain"], [[0, 0], place, [1, 1]])
     cloth = compile_fabric(PRESETS["linen_plain"], precision=np.float32)
-    _, thread, *numbers = find(np.float32, cloth, *map(float, place))
-    assert thread == 0
+    sets, threads = np.empty(1, np.uint8), np.empty(1, np.int32)
+    numbers = np.zeros((4, 1), np.float32)
+    find_all(np.float32, cloth, np.array([place]), sets, threads, *numbers)
+    assert threads[0] == 0
     assert np.isnan(numbers).all()
 
 
