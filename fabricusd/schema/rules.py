@@ -353,9 +353,10 @@ def binding_uv_set_exists(prim: Usd.Prim) -> Iterator[Fault]:
 def threads_per_unit_both(prim: Usd.Prim) -> Iterator[Fault]:
     """Threads per UV unit are given for both axes or for neither."""
     name = "fabric:binding:threadsPerUnit"
-    value = prim.GetAttribute(name).Get()
-    if value is not None and (value[0] == 0) != (value[1] == 0):
-        yield name, f"is ({value[0]:g}, {value[1]:g}); both must be 0, or both above 0"
+    pair = prim.GetAttribute(name).Get()
+    u, v = (float(x) for x in pair) if pair is not None else (0.0, 0.0)
+    if (u == 0) != (v == 0):
+        yield name, f"is ({u:g}, {v:g}); both must be 0, or both above 0"
 
 
 @rule(severity="warning")

@@ -54,6 +54,10 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
         if layer is None:
             raise FabricError(str(path), "is not USD; it cannot be parsed")
         stage = Usd.Stage.Open(layer)
+        for used in stage.GetUsedLayers():
+            # The process may hold an older reading of the file; edits nobody saved are kept.
+            if not used.dirty and not used.anonymous:
+                used.Reload()
     except Tf.ErrorException as error:
         raise FabricError(str(path), f"cannot be parsed as USD: {_first_line(error)}") from error
     finally:
