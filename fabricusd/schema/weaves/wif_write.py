@@ -41,8 +41,9 @@ def wif_text(draft: Draft) -> str:
     """The text of a WIF file, to be encoded as UTF-8, from which `parse_wif` reads `draft` again.
 
     Colours are written in the draft's own range where that holds them, else in a usual one or
-    the nearest of 16 bits; lengths in centimetres, exactly. Colours that repeat
-    with another length than the weave are written out in full. Raises FabricError where that is more than `LIMIT` threads.
+    the nearest of 16 bits; lengths in centimetres, exactly. Colours that repeat with another
+    length than the weave are written out in full. Raises FabricError where that makes more than
+    `LIMIT` threads.
     """
     ends, picks = _full(draft.warp), _full(draft.weft)
     cells = draft.weave.cells
