@@ -46,9 +46,9 @@ def to_fabric(
     for side in (warp, weft):
         sequence = [kinds.setdefault(kind, len(kinds)) for kind in _kinds(side, base_thread)]
         sequences.append(tuple(sequence))
-    documentation = " ".join(
-        [f"Draft: {draft.source or draft.title or draft.weave.name}.", *losses(draft)]
-    )
+    lines = [f"Draft: {draft.source or draft.title or draft.weave.name}."]
+    lines += [f"Author: {draft.author}."] if draft.author else []
+    documentation = " ".join([*lines, *losses(draft), draft.notes]).strip()
     return Fabric(
         name=name or "Fabric",
         threads=_threads(draft, base_thread, list(kinds)),

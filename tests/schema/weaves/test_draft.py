@@ -85,6 +85,13 @@ def test_unknown_spacing_takes_the_density_asked_for_and_says_so() -> None:
     assert len(losses(Draft(weave=PLAIN))) == 2
 
 
+def test_a_fabric_says_where_its_draft_is_from() -> None:
+    draft = replace(STRIPES, source="d.wif", author="A. Weaver", notes="Two lines\nof notes")
+    text = to_fabric(draft).documentation
+    assert text.startswith("Draft: d.wif. Author: A. Weaver. ")
+    assert text.endswith("Two lines\nof notes")
+
+
 def test_hidden_threads_are_left_out_of_the_cloth() -> None:
     weave = Weave(np.arange(12).reshape(3, 4) % 5 < 2, "three")
     draft = Draft(
