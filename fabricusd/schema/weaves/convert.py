@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from fabricusd.errors import FabricError
-from fabricusd.fabric import Fabric, Thread, ThreadSet, Weave
+from fabricusd.fabric import DEGREE, Fabric, TangentCurve, Thread, ThreadSet, Weave
 from fabricusd.schema.weaves.color import RGB
 from fabricusd.schema.weaves.draft import LIMIT, Draft, Side, known_length
 
-DEFAULT_THREAD = Thread()
+DEFAULT_THREAD = Thread(curve=TangentCurve(angles=(-20 * DEGREE, 20 * DEGREE)))
+"""A spun thread that rises and falls over what it crosses, where no other is asked for."""
 
 
 def albedo_scale(base: Thread) -> float:

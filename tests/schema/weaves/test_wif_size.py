@@ -1,4 +1,4 @@
-"""A large jacquard as WIF: time and memory."""
+"""A large jacquard as WIF: it comes back, within bounded memory. Time is in bench/bench_cli.py."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from fabricusd.fabric import Weave
 from fabricusd.schema.weaves import Draft, read_wif, write_wif
 
 READ = """
-import json, re, sys, time
+import json, re, sys
 from fabricusd.schema.weaves.wif import read_wif
-start = time.process_time()
 cells = read_wif(sys.argv[1]).weave.cells
 # Not ru_maxrss, in which a process starts with the peak of the one that started it.
 peak = int(re.search(r"VmHWM:\\s*(\\d+) kB", open("/proc/self/status").read())[1]) / 1024
-print(json.dumps([time.process_time() - start, peak, int(cells.sum())]))
+print(json.dumps([peak, int(cells.sum())]))
 """
 
 
@@ -40,7 +39,7 @@ def test_a_jacquard_of_4096_by_4096_comes_back_as_it_was_written(
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has /proc")
-def test_a_jacquard_of_4096_by_4096_reads_in_two_seconds_and_500_megabytes(
+def test_a_jacquard_of_4096_by_4096_reads_in_500_megabytes(
     jacquard: tuple[Path, Draft],
 ) -> None:
     import json
@@ -49,7 +48,6 @@ def test_a_jacquard_of_4096_by_4096_reads_in_two_seconds_and_500_megabytes(
     run = subprocess.run(
         [sys.executable, "-c", READ, str(path)], capture_output=True, text=True, check=True
     )
-    seconds, megabytes, lifted = json.loads(run.stdout)
+    megabytes, lifted = json.loads(run.stdout)
     assert lifted == int(draft.weave.cells.sum())
-    assert seconds < 2  # measured 0.9 s
     assert megabytes < 500  # measured 170 to 240
