@@ -85,7 +85,7 @@ def difference(picture: Picture, reference: Picture, *, high_range: bool = True)
         raise FabricError(
             "pictures", f"are {_size(picture)} and {_size(reference)}; they must be of one size"
         )
-    good = np.isfinite(picture).all(axis=2) & np.isfinite(reference).all(axis=2)
+    good = np.asarray(np.isfinite(picture).all(axis=2) & np.isfinite(reference).all(axis=2))
     if not good.any():
         raise FabricError("pictures", "have no pixel that is finite in both")
     a = np.asarray(picture, np.float64)[good]

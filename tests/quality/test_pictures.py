@@ -27,7 +27,7 @@ def test_rmse_and_relative_mse_of_a_constant_offset():
 
 
 def test_delta_e_of_grey_follows_lightness():
-    """Neutral colours differ in L* alone; S_L of CIE 2000 is 1 + .015 (L-50)^2/sqrt(20+(L-50)^2)."""
+    """Neutral colours differ in L* alone, weighted by 1 + .015 (L-50)^2/sqrt(20 + (L-50)^2)."""
     a, b = np.full((1, 1, 3), 0.2, np.float32), np.full((1, 1, 3), 0.25, np.float32)
     la, lb = (116 * y ** (1 / 3) - 16 for y in (0.2, 0.25))
     middle = ((la + lb) / 2 - 50) ** 2
