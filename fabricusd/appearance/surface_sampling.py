@@ -12,6 +12,7 @@ Source: `docs/model.md` section 6. Scalar kernels, for the path tracer and the l
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any, NamedTuple
 
@@ -19,11 +20,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabricusd.appearance.blocks import node_range
 from fabricusd.appearance.coverage import WARP, WEFT, coverage
 from fabricusd.appearance.curve import pieces
-from fabricusd.appearance.far import node_range, normalization
+from fabricusd.appearance.far import normalization
 from fabricusd.appearance.frame import from_thread, to_thread
-from fabricusd.appearance.real import INLINE, KERNEL, atan2, cos, sin
+from fabricusd.appearance.real import INLINE, LEAN, atan2, cos, sin
 from fabricusd.appearance.sampling_lobes import (
     ISOTROPIC,
     STEEPEST,
@@ -138,7 +140,7 @@ def _curve_stretches(curve: TangentCurve, width: float) -> list[tuple[float, flo
     high = float(np.maximum(p.first, p.last)[~level].max())
     count = max(1, math.ceil((high - low) / WIDEST_STRETCH - 1e-9))
     edges = np.linspace(low, high, count + 1)
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in itertools.pairwise(edges):
         a = np.clip(np.minimum(p.first, p.last)[~level], first, last)
         b = np.clip(np.maximum(p.first, p.last)[~level], first, last)
         if (b - a).max() > 1e-9:
@@ -156,7 +158,7 @@ def _owners(rows: NDArray[np.float64], tables: SurfaceTables) -> NDArray[np.int3
     return np.argmin(np.where(other, np.inf, distance), axis=1).astype(np.int32)
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def _measure(R, tables, stretches, owner, energy):
     """Energy of every lobe at every view, each by directions drawn from the lobe itself."""
     for e in range(ELEVATIONS):
@@ -221,10 +223,10 @@ def _lobe_energy(R, tables, stretches, owner, y, lobe, ox, oy, oz):
 
 @njit(**INLINE)
 def _parts(R, tables, k, c, s, a_i, b_i, iz, a_o, b_o, oz):
-    """(surface, directed volume, isotropic volume) of `f_s M cos theta_i` at node k, by brightness."""
+    """`f_s M cos theta_i` at node k in grey: surface, directed volume, isotropic volume."""
     thread = tables.node_thread[k]
     row = tables.threads[thread]
-    surface, volume, _, _, _ = segment(
+    surface, volume = segment(
         R, row[MODEL] == R(THESIS), tables.smooth[thread], tables.overlap_precision,
         c, s, a_i, b_i, iz, a_o, b_o, oz,
     )  # fmt: skip
@@ -257,7 +259,7 @@ def share_at(R, shares, corner, k):
     return low + e * (high - low)
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def far_density(R, sampling, ix, iy, iz, ox, oy, oz):
     """pdf(wi) [1/sr] of `far_direction`; 0 at or below the cloth."""
     if iz <= R(0) or oz <= R(0):
@@ -289,7 +291,7 @@ def uniform_direction(R, u1, u2):
     return flat * cos(R, phi), flat * sin(R, phi), u1
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def far_direction(R, sampling, ox, oy, oz, u0, u1, u2):
     """wi (x, y, z) for a viewer above the cloth and three numbers in [0, 1)."""
     left = u0 - R(UNIFORM)
@@ -338,7 +340,7 @@ def _point_shares(R, sampling, thread_set, thread, psi0, ox, oy, oz):
     return surface * scale, volume * scale, isotropic * scale
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def point_density(R, tables, sampling, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):
     """pdf(wi) [1/sr] of `point_direction`; 0 at or below the cloth."""
     if iz <= R(0) or oz <= R(0):
@@ -361,7 +363,7 @@ def point_density(R, tables, sampling, thread_set, thread, psi0, ix, iy, iz, ox,
     return p + surface * on_surface + volume * on_volume + isotropic * on_isotropic
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def point_direction(R, tables, sampling, thread_set, thread, psi0, ox, oy, oz, u0, u1, u2):
     """wi (x, y, z) at levels `weave` and `thread`, for a viewer above the cloth.
 

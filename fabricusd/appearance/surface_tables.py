@@ -1,8 +1,7 @@
-"""What the surface kernels read: threads, quadrature nodes, sampling lobes. No weave, no heights."""
+"""What the surface kernels read of a fabric: its threads and the nodes over their curves."""
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
