@@ -91,8 +91,10 @@ class SamplingTables(NamedTuple):
 def sampling_tables(fabric: Fabric, tables: SurfaceTables) -> SamplingTables:
     """Stretches of `fabric` and the shares of their lobes, measured on `tables`."""
     R = tables.nodes.dtype.type
-    rows = np.array(_stretches(fabric), np.float64).reshape(-1, STRETCH_COLUMNS)
-    owner = _owners(rows, tables)
+    rows = stretches_of(fabric)
+    psi0 = np.arctan2(tables.nodes[:, NODE_SIN], tables.nodes[:, NODE_COS])
+    sets = np.where(np.arange(len(psi0)) >= tables.warp_start, WARP, WEFT)
+    owner = owners(rows, psi0, sets, tables.node_thread)
     stretches = rows.astype(R)
     energy = np.zeros((ELEVATIONS, AZIMUTHS, 3 * len(rows)))
     _measure(R, tables, stretches, owner, energy)
@@ -103,8 +105,8 @@ def sampling_tables(fabric: Fabric, tables: SurfaceTables) -> SamplingTables:
     return SamplingTables(stretches, np.ascontiguousarray(shares, dtype=R))
 
 
-def _stretches(fabric: Fabric) -> list[tuple[float, ...]]:
-    """Rows of `SamplingTables.stretches`."""
+def stretches_of(fabric: Fabric) -> NDArray[np.float64]:
+    """(s, 8) `SamplingTables.stretches` of a fabric."""
     rows = []
     area = coverage(fabric).type_area
     for j in (WEFT, WARP):
@@ -119,7 +121,7 @@ def _stretches(fabric: Fabric) -> list[tuple[float, ...]]:
                     for g in (thread.gamma_surface, thread.gamma_volume)
                 ]
                 rows.append((j, k, psi0, math.cos(psi0), math.sin(psi0), math.tan(psi0), *widths))
-    return rows
+    return np.array(rows, np.float64).reshape(-1, STRETCH_COLUMNS)
 
 
 def _curve_stretches(curve: TangentCurve, width: float) -> list[tuple[float, float]]:
@@ -149,12 +151,15 @@ def _curve_stretches(curve: TangentCurve, width: float) -> list[tuple[float, flo
     return found
 
 
-def _owners(rows: NDArray[np.float64], tables: SurfaceTables) -> NDArray[np.int32]:
+def owners(
+    rows: NDArray[np.float64],
+    psi0: NDArray[Any],
+    sets: NDArray[np.intp],
+    threads: NDArray[np.int32],
+) -> NDArray[np.int32]:
     """(q,) the stretch that each quadrature node belongs to: the nearest of its thread and set."""
-    psi0 = np.arctan2(tables.nodes[:, NODE_SIN], tables.nodes[:, NODE_COS])
-    sets = np.where(np.arange(len(psi0)) >= tables.warp_start, WARP, WEFT)
     distance = np.abs(psi0[:, None] - rows[:, PSI0])
-    other = (sets[:, None] != rows[:, SET]) | (tables.node_thread[:, None] != rows[:, THREAD])
+    other = (sets[:, None] != rows[:, SET]) | (threads[:, None] != rows[:, THREAD])
     return np.argmin(np.where(other, np.inf, distance), axis=1).astype(np.int32)
 
 
@@ -316,11 +321,11 @@ def far_direction(R, sampling, ox, oy, oz, u0, u1, u2):
 
 
 @njit(**INLINE)
-def _nearest_stretch(R, sampling, thread_set, thread, psi0):
+def nearest_stretch(R, stretches, thread_set, thread, psi0):
     """The stretch of a thread in a set whose tangent angle is nearest to psi0."""
     best, least = 0, R(1e9)
-    for y in range(sampling.stretches.shape[0]):
-        row = sampling.stretches[y]
+    for y in range(stretches.shape[0]):
+        row = stretches[y]
         if int(row[SET]) == thread_set and int(row[THREAD]) == thread:
             distance = abs(row[PSI0] - psi0)
             if distance < least:
@@ -331,7 +336,7 @@ def _nearest_stretch(R, sampling, thread_set, thread, psi0):
 @njit(**INLINE)
 def _point_shares(R, sampling, thread_set, thread, psi0, ox, oy, oz):
     """(surface, volume, isotropic) shares at one tangent angle: those of the stretch it is in."""
-    y = 3 * _nearest_stretch(R, sampling, thread_set, thread, psi0)
+    y = 3 * nearest_stretch(R, sampling.stretches, thread_set, thread, psi0)
     corner = view_corner(R, ox, oy, oz)
     surface = share_at(R, sampling.shares, corner, y + SURFACE)
     volume = share_at(R, sampling.shares, corner, y + VOLUME)
