@@ -19,7 +19,7 @@ from fabricusd.appearance.compiled import CompiledFabric
 from fabricusd.appearance.coverage import GAP, WARP
 from fabricusd.appearance.height import crown_of, steepest
 from fabricusd.appearance.real import INLINE, KERNEL, LEAN
-from fabricusd.appearance.weave import find, height_on, wrap
+from fabricusd.appearance.weave import FARTHEST, find, height_on, split, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -166,14 +166,23 @@ def _between(R, table, i, j, slot, row, column, first, second, c):  # type: igno
 
 
 @njit(**INLINE)
-def horizon_sine(R, cloth, table, u, v, which, x, y):  # type: ignore[no-untyped-def]
-    """Sine of the horizon's elevation at (u, v) on the thread of set `which` towards (x, y)."""
-    end, pick = math.floor(u), math.floor(v)
-    i, j = wrap(end, table.shape[0]), wrap(pick, table.shape[1])
-    p, q = R(u - end), R(v - pick)
-    top = which
-    if table.shape[2] > 1:
-        top = int(cloth.grid[wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])])
+def split_table(table, u, v):  # type: ignore[no-untyped-def]
+    """Cell of the table at weave coordinates, float64; where they are not sound, the first one."""
+    sound = abs(u) <= FARTHEST and abs(v) <= FARTHEST
+    return (
+        wrap(np.floor(u) if sound else 0.0, table.shape[0]),
+        wrap(np.floor(v) if sound else 0.0, table.shape[1]),
+    )
+
+
+@njit(**INLINE)
+def horizon_at(R, cloth, table, i, j, in_u, in_v, p, q, which, x, y):  # type: ignore[no-untyped-def]
+    """Sine of the horizon's elevation on the thread of set `which` towards (x, y).
+
+    (i, j), (in_u, in_v) : the cell, modulo the grid and modulo the table, see `split_table`;
+    (p, q) : place in the cell
+    """
+    top = int(cloth.grid[i, j])
     if top == WARP:
         p, q = q, p
     width = cloth.width[top]
@@ -191,10 +200,10 @@ def horizon_sine(R, cloth, table, u, v, which, x, y):  # type: ignore[no-untyped
     first = min(int(turn), azimuths - 1)
     c = turn - R(first)
     second = first + 1 if first + 1 < azimuths else 0
-    here = _between(R, table, i, j, slot, row, column, first, second, c)
-    beside = _between(R, table, i, j, slot, row, column + 1, first, second, c)
-    ahead = _between(R, table, i, j, slot, row + 1, column, first, second, c)
-    both = _between(R, table, i, j, slot, row + 1, column + 1, first, second, c)
+    here = _between(R, table, in_u, in_v, slot, row, column, first, second, c)
+    beside = _between(R, table, in_u, in_v, slot, row, column + 1, first, second, c)
+    ahead = _between(R, table, in_u, in_v, slot, row + 1, column, first, second, c)
+    both = _between(R, table, in_u, in_v, slot, row + 1, column + 1, first, second, c)
     near = here + (beside - here) * b
     far = ahead + (both - ahead) * b
     return (near + (far - near) * a) * R(1.0 / 255.0)
@@ -213,7 +222,9 @@ def _compare(cloth, rounded, highest, table, uv, angle, out):  # type: ignore[no
             slope = steepest(
                 cloth, rounded, highest, uv[k, 0], uv[k, 1], which, crown, h, x, y, LOWEST, False
             )  # fmt: skip
-            sine = horizon_sine(np.float64, cloth, table, uv[k, 0], uv[k, 1], which, x, y)
+            i, j, _, _, p, q = split(np.float64, cloth, uv[k, 0], uv[k, 1])
+            row, column = split_table(table, uv[k, 0], uv[k, 1])
+            sine = horizon_at(np.float64, cloth, table, i, j, row, column, p, q, which, x, y)
             out[k] = math.asin(min(1.0, sine)) - math.atan(slope)
 
 
