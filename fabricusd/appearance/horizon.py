@@ -144,10 +144,8 @@ def _texel_centre(cloth, i, j, slot, along, across):  # type: ignore[no-untyped-
 @njit(**INLINE)
 def diamond(R, x, y):  # type: ignore[no-untyped-def]
     """Azimuth of (x, y) from 0 to 4: one per quadrant, linear in y/(|x| + |y|) inside it."""
-    whole = abs(x) + abs(y)
-    if y >= R(0):
-        return y / whole if x >= R(0) else R(1) - x / whole
-    return R(2) - y / whole if x < R(0) else R(3) + x / whole
+    part = x / (abs(x) + abs(y))
+    return R(1) - part if y >= R(0) else R(3) + part
 
 
 @njit(**INLINE)
@@ -183,16 +181,14 @@ def horizon_at(R, cloth, table, i, j, in_u, in_v, p, q, which, x, y):  # type: i
     (p, q) : place in the cell
     """
     top = int(cloth.grid[i, j])
-    if top == WARP:
-        p, q = q, p
+    along, over = (q, p) if top == WARP else (p, q)
     width = cloth.width[top]
-    slot = 0
-    if which == top:
-        along, across = p, (q - R(0.5)) / width + R(0.5)
-    else:
-        slot = 1
-        seen = q if q < R(0.5) else q - width
-        along, across = seen / (R(1) - width), (p - R(0.5)) / cloth.under_width + R(0.5)
+    on_top = which == top
+    # Selections, not branches: neither thread nor azimuth can be predicted.
+    seen = (over if over < R(0.5) else over - width) / max(R(1) - width, cloth.tiny)
+    across = ((over if on_top else along) - R(0.5)) / (width if on_top else cloth.under_width)
+    slot = 0 if on_top else table.shape[2] - 1
+    along, across = along if on_top else seen, across + R(0.5)
     row, a = _cell_of_texels(R, along, table.shape[3])
     column, b = _cell_of_texels(R, across, table.shape[4])
     azimuths = table.shape[5]
