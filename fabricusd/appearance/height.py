@@ -15,8 +15,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.coverage import WARP, WEFT
 from fabricusd.appearance.curve import peak
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.real import INLINE, LEAN
 from fabricusd.appearance.weave import crown_on, lookup, rise_on, wrap
 from fabricusd.errors import FabricError

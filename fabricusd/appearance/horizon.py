@@ -16,7 +16,8 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric
-from fabricusd.appearance.coverage import GAP, WARP
+from fabricusd.appearance.coverage import GAP
+from fabricusd.appearance.frame import WARP
 from fabricusd.appearance.height import crown_of, steepest
 from fabricusd.appearance.real import INLINE, KERNEL, LEAN
 from fabricusd.appearance.weave import FARTHEST, find, height_on, split, wrap

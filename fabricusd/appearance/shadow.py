@@ -19,8 +19,9 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.coverage import GAP, WARP, WEFT
+from fabricusd.appearance.coverage import GAP
 from fabricusd.appearance.curve import crest, peak
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.height import crown_of, highest_point, level_is_round, steepest
 from fabricusd.appearance.horizon import (
     AZIMUTHS,

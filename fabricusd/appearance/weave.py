@@ -16,7 +16,8 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.coverage import GAP, WARP, WEFT, coverage
+from fabricusd.appearance.coverage import GAP, coverage
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.real import INLINE, KERNEL, LEAN
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fabricusd.appearance.coverage import GAP, WARP, WEFT, coverage
+from fabricusd.appearance.coverage import GAP, coverage
 from fabricusd.appearance.curve import angle_at
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.fabric import Fabric
 
 

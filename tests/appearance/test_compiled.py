@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given
 
 from fabricusd.appearance.compiled import compile_fabric, true_repeat
-from fabricusd.appearance.coverage import GAP, WARP, coverage
+from fabricusd.appearance.coverage import GAP, coverage
 from fabricusd.appearance.curve import nodes
+from fabricusd.appearance.frame import WARP
 from fabricusd.appearance.weave import lookup
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave

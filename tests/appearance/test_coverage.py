@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from fabricusd.appearance.coverage import GAP, WARP, WEFT, coverage
+from fabricusd.appearance.coverage import GAP, coverage
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.fabric import Fabric, Thread, ThreadSet, Weave
 from tests.appearance.presets import PLAIN, PRESETS, SATIN_5
 from tests.strategies import fabrics

@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fabricusd.appearance.compiled import compile_fabric, true_repeat
-from fabricusd.appearance.coverage import GAP, WARP, WEFT, coverage
+from fabricusd.appearance.coverage import GAP, coverage
 from fabricusd.appearance.curve import height_at
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave import back_of, find_all, lookup
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, TangentCurve, Thread, ThreadSet, Weave
