@@ -179,7 +179,7 @@ def _lit(fabric: Fabric, method: str, level: str, uv: Floats, wi: Floats) -> Flo
     cloth, shadow = _shadowed(fabric, method, level)
     out = np.empty(len(uv))
     real: Any = np.float64
-    lit_all(real, cloth, shadow, uv, np.ascontiguousarray(wi.T), out)
+    lit_all(real, cloth, shadow, uv, wi, out)
     return out
 
 

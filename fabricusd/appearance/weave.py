@@ -26,7 +26,7 @@ FARTHEST = 2.0**52
 """Weave coordinates beyond this have no fraction left in float64."""
 
 
-BLOCK = 1024
+BLOCK = 512
 """Places that a worker looks up at a time: what it notes about them stays in its nearest cache."""
 
 

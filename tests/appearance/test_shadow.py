@@ -281,7 +281,7 @@ def test_what_is_not_a_number_is_counted_or_stays(linen: tuple[CompiledFabric, S
         shadowing(fabric, [[0, 0, 1], [0, 0, 1]], [[math.inf, 0], [0, math.nan]])
     cloth, shadow = linen
     uv, wi = np.full((3, 2), 0.5), np.full((3, 3), 0.5, np.float32)
-    uv[0, 0] = wi[1, 0] = wi[2, 2] = math.nan
+    uv[0, 0] = wi[0, 1] = wi[2, 2] = math.nan
     g = np.zeros(3, np.float32)
     lit_all(np.float32, cloth, shadow, uv, wi, g)
     assert np.isnan(g).all()
