@@ -1,1 +1,31 @@
-"""Fabrics as USD prims: schema, reading, writing, checking, presets, weave importers."""
+"""Fabrics as USD prims: the schema, reading, writing, checking, presets, weave importers.
+
+Importing this registers the schema with USD. Do it before the first stage is opened.
+"""
+
+from __future__ import annotations
+
+from fabricusd.schema.plugin import FOLDER as PLUGIN_PATH
+from fabricusd.schema.plugin import register
+
+register()
+
+from fabricusd.schema.check import Finding, check  # noqa: E402
+from fabricusd.schema.read import load, read_binding, read_fabric  # noqa: E402
+from fabricusd.schema.source import find_fabric, open_stage, preset_names  # noqa: E402
+from fabricusd.schema.write import save, write_binding, write_fabric  # noqa: E402
+
+__all__ = [
+    "PLUGIN_PATH",
+    "Finding",
+    "check",
+    "find_fabric",
+    "load",
+    "open_stage",
+    "preset_names",
+    "read_binding",
+    "read_fabric",
+    "save",
+    "write_binding",
+    "write_fabric",
+]

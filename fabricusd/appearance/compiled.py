@@ -1,0 +1,212 @@
+"""A fabric as contiguous arrays: what the kernels read.
+
+`compile_fabric` turns the frozen dataclasses of `fabricusd.fabric` into a `CompiledFabric`, once
+per fabric and precision. Index conventions: sets are WEFT and WARP of `coverage`, thread types
+count as `Fabric.threads`, the grid is `[end, pick]`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabricusd.appearance.coverage import GAP, WARP, WEFT, Coverage, coverage, sets
+from fabricusd.appearance.curve import is_pile, nodes, pieces
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+
+Reals = NDArray[Any]
+"""float32 or float64, by the precision that the fabric was compiled for."""
+
+
+class CompiledFabric(NamedTuple):
+    """Arrays and scalars of one fabric; `real` below is the precision asked for.
+
+    grid : (m, n) uint8 - 1 where end i lies over pick j
+    runs : (m, n, 2) uint16, uint32 beyond 65535 threads - place of the cell in the visible run of
+        the thread on top (cells from its start along the thread), and length of that run (cells)
+    under_runs : (m, n, 2) - the same for the thread underneath, along its own direction; (1, 1, 2)
+        zeros where no set is seen underneath
+    sequence_weft, sequence_warp : (k,) int32 - thread types, repeated without end
+    width : (2,) real - share of its cells' width that a set takes where it is on top
+    under : int - the set that is seen underneath the other, or GAP
+    under_width : real - share of its width that it shows there
+    area : (2, k) real - share of the cloth that type k of set j covers
+    gap : real - share that no thread covers
+    pitch : (2,) real - distance from one thread of the set to the next [m]
+    half_thickness : (2, k) real - [m]; half the visible width where the thread states none
+    curve_start : (k, p) real - start of each linear piece of a type's curve, in run lengths; 2 pads
+    curve_angle, curve_slope : (k, p) real - angle there [rad], change of angle per run length
+    curve_height : (k, p) real - height there, in run lengths
+    pile : (k,) uint8 - 1 where the type's curve has no height field
+    node_angle, node_weight, node_position : (q,) real - quadrature of the curves: angle [rad],
+        share of the cloth's area (sums to 1 - gap), position in run lengths
+    node_thread, node_set : (q,) int32 - whose node it is
+    masking_width : real - standard deviation of `u` [rad]
+    last : real - the largest number below 1
+    opaque : int - 1 where no light passes
+    """
+
+    grid: NDArray[np.uint8]
+    runs: NDArray[Any]
+    under_runs: NDArray[Any]
+    sequence_weft: NDArray[np.int32]
+    sequence_warp: NDArray[np.int32]
+    width: Reals
+    under: int
+    under_width: Any
+    area: Reals
+    gap: Any
+    pitch: Reals
+    half_thickness: Reals
+    curve_start: Reals
+    curve_angle: Reals
+    curve_slope: Reals
+    curve_height: Reals
+    pile: NDArray[np.uint8]
+    node_angle: Reals
+    node_weight: Reals
+    node_position: Reals
+    node_thread: NDArray[np.int32]
+    node_set: NDArray[np.int32]
+    masking_width: Any
+    last: Any
+    opaque: int
+
+
+def compile_fabric(
+    fabric: Fabric,
+    *,
+    precision: type[np.floating[Any]] = np.float32,
+    error: float | None = None,
+) -> CompiledFabric:
+    """Arrays of `fabric` in `precision`, np.float32 or np.float64.
+
+    error : bound on the relative error of the quadrature over each curve, see `curve.nodes`; None
+        takes nodes at most the surface lobe's width apart
+    """
+    if precision not in (np.float32, np.float64):
+        raise FabricError("precision", f"is {precision!r}; it must be float32 or float64")
+    real = precision
+
+    def reals(x: Any) -> Reals:
+        return np.ascontiguousarray(x, dtype=real)
+
+    share = coverage(fabric)
+    runs, under_runs = _run_tables(fabric.weave.cells, share.under)
+    pitch = np.array([s.pitch for s in sets(fabric)])
+    angle, weight, position, thread, thread_set = _nodes(fabric, share, error)
+    return CompiledFabric(
+        grid=np.ascontiguousarray(fabric.weave.cells, dtype=np.uint8),
+        runs=runs,
+        under_runs=under_runs,
+        sequence_weft=np.array(fabric.weft.sequence, np.int32),
+        sequence_warp=np.array(fabric.warp.sequence, np.int32),
+        width=reals(share.width),
+        under=share.under,
+        under_width=real(share.under_width),
+        area=reals(share.type_area),
+        gap=real(share.gap),
+        pitch=reals(pitch),
+        half_thickness=reals(_half_thickness(fabric, share, pitch)),
+        **{name: reals(table) for name, table in _curve_tables(fabric).items()},
+        pile=np.array([is_pile(t.curve) for t in fabric.thread_list], np.uint8),
+        node_angle=reals(angle),
+        node_weight=reals(weight),
+        node_position=reals(position),
+        node_thread=thread,
+        node_set=thread_set,
+        masking_width=real(fabric.masking_width),
+        last=np.nextafter(real(1), real(0)),
+        opaque=int(fabric.opaque),
+    )
+
+
+def _run_tables(cells: NDArray[np.bool_], under: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """`runs` and `under_runs` of the grid: warp runs go along the picks, weft runs along the ends.
+
+    Along each thread a run is the same stretch of equal cells for the set on top and for the set
+    underneath, so one table per direction serves both.
+    """
+    kind: Any = np.uint16 if max(cells.shape) <= np.iinfo(np.uint16).max else np.uint32
+    by_end = np.empty((*cells.shape, 2), kind)
+    _fill_runs(np.ascontiguousarray(cells), by_end)
+    by_pick = np.empty((*cells.T.shape, 2), kind)
+    _fill_runs(np.ascontiguousarray(cells.T), by_pick)
+    warp_runs, weft_runs = by_end, by_pick.transpose(1, 0, 2)
+    runs = np.where(cells[..., None], warp_runs, weft_runs)
+    if under == GAP:
+        return runs, np.zeros((1, 1, 2), kind)
+    return runs, np.where(cells[..., None], weft_runs, warp_runs)
+
+
+@njit(cache=True)
+def _fill_runs(lines, out):  # type: ignore[no-untyped-def]
+    """(r, n) cells along r threads -> out (r, n, 2): place in its run, length of the run.
+
+    Runs wrap round the repeat; a run without end is one repeat, counted from its border.
+    """
+    n = lines.shape[1]
+    for r in range(lines.shape[0]):
+        # Start where a run starts, so that the one that wraps is met whole.
+        first = 0
+        while first < n and lines[r, first] == lines[r, first - 1]:
+            first += 1
+        if first == n:
+            first = 0
+        start = 0
+        while start < n:
+            end = start + 1
+            value = lines[r, (first + start) % n]
+            while end < n and lines[r, (first + end) % n] == value:
+                end += 1
+            for k in range(start, end):
+                out[r, (first + k) % n, 0] = k - start
+                out[r, (first + k) % n, 1] = end - start
+            start = end
+
+
+def _half_thickness(fabric: Fabric, share: Coverage, pitch: NDArray[np.float64]) -> Reals:
+    """(2, k) half the thickness of each type in each set [m]."""
+    stated = np.array([t.thickness for t in fabric.thread_list])
+    visible = np.maximum(share.width, np.where(np.arange(2) == share.under, 1.0, 0.0)) * pitch
+    return 0.5 * np.where(stated > 0, stated, visible[:, None])
+
+
+def _curve_tables(fabric: Fabric) -> dict[str, NDArray[np.float64]]:
+    """The linear pieces of every type's curve, padded to the longest with starts that none reach."""
+    found = [pieces(t.curve) for t in fabric.thread_list]
+    shape = (len(found), max(len(p.start) for p in found))
+    start, angle = np.full(shape, 2.0), np.zeros(shape)
+    slope, height = np.zeros(shape), np.zeros(shape)
+    for row, (p, thread) in enumerate(zip(found, fabric.thread_list, strict=True)):
+        used = slice(0, len(p.start))
+        start[row, used], angle[row, used] = p.start, p.first
+        slope[row, used] = (p.last - p.first) / p.length
+        height[row, used] = 0.0 if is_pile(thread.curve) else p.height
+    return {
+        "curve_start": start,
+        "curve_angle": angle,
+        "curve_slope": slope,
+        "curve_height": height,
+    }
+
+
+def _nodes(fabric: Fabric, share: Coverage, error: float | None) -> tuple[Any, ...]:
+    """Quadrature nodes of every (set, type) that covers anything, weighted by its area."""
+    columns: list[list[NDArray[Any]]] = [[], [], [], [], []]
+    for j in (WEFT, WARP):
+        for k, thread in enumerate(fabric.thread_list):
+            area = share.type_area[j, k]
+            if not area > 0:
+                continue
+            q = nodes(thread.curve, thread.gamma_surface, error=error)
+            one = np.ones(len(q.angle), np.int32)
+            for column, values in zip(
+                columns, (q.angle, q.weight * area, q.position, one * k, one * j), strict=True
+            ):
+                column.append(values)
+    return tuple(np.concatenate(c) if c else np.zeros(0) for c in columns)

@@ -1,0 +1,255 @@
+"""The weave under a point: which thread, where on its run, where across it, at which angle.
+
+Weave coordinates count threads: u in ends along +U, v in picks along +V, float64. They are split
+into cell and fraction, and the cell reduced modulo the repeat, before anything is float32: at 10^4
+repeats a float32 coordinate would miss the place inside the thread. Rules: `docs/model.md`
+sections 1 and 3.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import ArrayLike, NDArray
+
+from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
+from fabricusd.appearance.coverage import GAP, WARP, WEFT, coverage
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric, ThreadSet, Weave
+
+FARTHEST = 2.0**52
+"""Weave coordinates beyond this have no fraction left in float64."""
+
+FAST = {"contract", "reassoc", "arcp", "nsz"}
+"""LLVM's licence to reorder arithmetic; NaN and infinity keep their meaning, we look for them."""
+
+
+class WeaveHit(NamedTuple):
+    """What lies under each point. GAP and non-finite places hold zeros and NaN respectively.
+
+    set : (n,) uint8 - WEFT, WARP or GAP
+    thread : (n,) int32 - index into `Fabric.threads`
+    position : (n,) float - s on the visible run, from 0 to below 1, growing with +U or +V
+    across : (n,) float - w on the visible width, from -1 to 1, growing along `b = n_t x t`: along
+        +V on the weft and along -U on the warp
+    angle : (n,) float - tangent angle psi0 [rad]
+    height : (n,) float - of the thread's axis over its ends [m]
+    crown : (n,) float - what the thread's round adds to it at `across` [m]
+    gap : (n,) bool - where no thread is seen
+    """
+
+    set: NDArray[np.uint8]
+    thread: NDArray[np.int32]
+    position: NDArray[Any]
+    across: NDArray[Any]
+    angle: NDArray[Any]
+    height: NDArray[Any]
+    crown: NDArray[Any]
+    gap: NDArray[np.bool_]
+
+
+@njit(cache=True, inline="always")
+def wrap(x, period):  # type: ignore[no-untyped-def]
+    """Whole number `x` (float64) modulo `period`, non-negative, as an integer."""
+    p = float(period)
+    r = x - p * math.floor(x / p)
+    # The quotient is rounded: one period off either way where x is a multiple of it.
+    if r < 0.0:
+        r += p
+    if r >= p:
+        r -= p
+    return int(r)
+
+
+@njit(cache=True, inline="always", fastmath=FAST)
+def piece_of(R, cloth, thread, s):  # type: ignore[no-untyped-def]
+    """Index of the linear piece of the thread's curve at `s`, the later one at a jump."""
+    low, high = 0, cloth.curve_start.shape[1]
+    while high - low > 1:
+        middle = (low + high) >> 1
+        if s >= cloth.curve_start[thread, middle]:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True, inline="always", fastmath=FAST)
+def angle_on(R, cloth, thread, s):  # type: ignore[no-untyped-def]
+    """Tangent angle [rad] of thread type `thread` at `s`."""
+    k = piece_of(R, cloth, thread, s)
+    return (
+        cloth.curve_angle[thread, k]
+        + (s - cloth.curve_start[thread, k]) * cloth.curve_slope[thread, k]
+    )
+
+
+@njit(cache=True, fastmath=FAST)
+def height_on(R, cloth, thread, s, length):  # type: ignore[no-untyped-def]
+    """Height [m] of the axis at `s` on a run of `length` [m]: minus the integral of tan(angle).
+
+    In closed form as `curve._rise`; 0 on pile.
+    """
+    if cloth.pile[thread] != 0 or length == R(0):
+        return R(0)
+    k = piece_of(R, cloth, thread, s)
+    part = s - cloth.curve_start[thread, k]
+    first = cloth.curve_angle[thread, k]
+    slope = cloth.curve_slope[thread, k]
+    change = part * slope
+    if abs(change) < R(1e-3):
+        # Second-order Taylor about the middle: the logarithms would cancel in float32.
+        tangent = math.tan(first + R(0.5) * change)
+        rise = (
+            -part * tangent * (R(1) + change * change * (R(1) + tangent * tangent) * R(1.0 / 12.0))
+        )
+    else:
+        ratio = R(-2) * math.sin(first + R(0.5) * change) * math.sin(R(0.5) * change)
+        rise = math.log1p(ratio / math.cos(first)) / slope
+    return length * (cloth.curve_height[thread, k] + rise)
+
+
+@njit(cache=True, inline="always", fastmath=FAST)
+def crown_on(R, cloth, thread_set, thread, w):  # type: ignore[no-untyped-def]
+    """Height [m] that the round of the thread adds at `w`: half the thickness, sqrt(1 - w^2)."""
+    return cloth.half_thickness[thread_set, thread] * math.sqrt(max(R(0), R(1) - w * w))
+
+
+@njit(cache=True, fastmath=FAST)
+def find(R, cloth, u, v):  # type: ignore[no-untyped-def]
+    """Thread under weave coordinates (u, v), float64.
+
+    Returns (set, thread, s, w, angle, length): `length` is the visible run's own length [m], which
+    `height_on` asks for. In a gap the set is GAP and the rest 0. Coordinates that are not finite,
+    or that have no fraction, come back as set WEFT with NaN everywhere, so that nothing hides them.
+    """
+    none = R(0)
+    if not (abs(u) <= FARTHEST and abs(v) <= FARTHEST):
+        nan = R(np.nan)
+        return WEFT, 0, nan, nan, nan, nan
+    end, pick = math.floor(u), math.floor(v)
+    x, y = u - end, v - pick
+    i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
+    top = int(cloth.grid[i, j])
+    if top == WARP:
+        over, along = x, y
+    else:
+        over, along = y, x
+    width = float(cloth.width[top])
+    offset = over - 0.5
+    if abs(offset) <= 0.5 * width and width > 0.0:
+        hit = top
+        w = R(2.0 * offset / width)
+        place, cells = float(cloth.runs[i, j, 0]), float(cloth.runs[i, j, 1])
+        s = (place + along) / cells
+        share = 1.0
+    elif cloth.under == 1 - top and abs(along - 0.5) <= 0.5 * float(cloth.under_width):
+        # Beside the thread on top: its visible stretches put together carry the whole curve.
+        hit = 1 - top
+        w = R(2.0 * (along - 0.5) / float(cloth.under_width))
+        share = 1.0 - width
+        place, cells = float(cloth.under_runs[i, j, 0]), float(cloth.under_runs[i, j, 1])
+        seen = over if offset < 0.0 else over - width
+        s = (place + seen / share) / cells
+    else:
+        return GAP, 0, none, none, none, none
+    if hit == WARP:
+        thread = int(cloth.sequence_warp[wrap(end, cloth.sequence_warp.shape[0])])
+        crossing = cloth.pitch[WEFT]
+        w = -w
+    else:
+        thread = int(cloth.sequence_weft[wrap(pick, cloth.sequence_weft.shape[0])])
+        crossing = cloth.pitch[WARP]
+    t = max(R(0), min(R(s), cloth.last))
+    w = max(R(-1), min(w, R(1)))
+    return hit, thread, t, w, angle_on(R, cloth, thread, t), R(cells * share) * crossing
+
+
+@njit(cache=True, parallel=True)
+def find_all(R, cloth, uv, sets, threads, s, w, angle, length):  # type: ignore[no-untyped-def]
+    """`find` at each of uv (n, 2) float64, into the arrays behind it."""
+    n = uv.shape[0]
+    block = 4096
+    for b in prange((n + block - 1) // block):
+        for k in range(b * block, min(n, (b + 1) * block)):
+            sets[k], threads[k], s[k], w[k], angle[k], length[k] = find(
+                R, cloth, uv[k, 0], uv[k, 1]
+            )
+
+
+@njit(cache=True, parallel=True)
+def heights_all(R, cloth, sets, threads, s, w, length, height, crown):  # type: ignore[no-untyped-def]
+    """`height_on` and `crown_on` at each hit, 0 in gaps, into `height` and `crown`."""
+    for k in prange(sets.shape[0]):
+        if sets[k] == GAP:
+            height[k] = R(0)
+            crown[k] = R(0)
+        else:
+            height[k] = height_on(R, cloth, threads[k], s[k], length[k])
+            crown[k] = crown_on(R, cloth, sets[k], threads[k], w[k])
+
+
+def lookup(cloth: Fabric | CompiledFabric, uv_threads: ArrayLike) -> WeaveHit:
+    """The thread under each of (n, 2) weave coordinates, in threads.
+
+    A `Fabric` is compiled for float64; a `CompiledFabric` answers in its own precision. The grain's
+    rotation comes before: `Binding.weave_coordinates`. Raises `FabricError` for coordinates that
+    are not finite or lie farther than 2^52 threads out, where float64 has no fraction left.
+    """
+    if isinstance(cloth, Fabric):
+        cloth = compile_fabric(cloth, precision=np.float64)
+    uv = np.ascontiguousarray(uv_threads, np.float64)
+    if uv.ndim != 2 or uv.shape[1] != 2:
+        raise FabricError("uv_threads", f"has shape {uv.shape}; it must be (n, 2)")
+    bad = ~(np.abs(uv) <= FARTHEST).all(axis=1)
+    if bad.any():
+        k = int(np.argmax(bad))
+        raise FabricError(
+            "uv_threads",
+            f"has {int(bad.sum())} of {len(uv)} places that are not finite or too far out, the "
+            f"first at {k}: {uv[k].tolist()}; they must be within 2^52 threads",
+        )
+    real = cloth.curve_start.dtype.type
+    n = len(uv)
+    sets, threads = np.empty(n, np.uint8), np.empty(n, np.int32)
+    s, w, angle, length, height, crown = (np.empty(n, real) for _ in range(6))
+    find_all(real, cloth, uv, sets, threads, s, w, angle, length)
+    heights_all(real, cloth, sets, threads, s, w, length, height, crown)
+    return WeaveHit(sets, threads, s, w, angle, height, crown, sets == GAP)
+
+
+def back_of(fabric: Fabric) -> Fabric:
+    """The other side of the cloth, as a fabric that is looked up at (u, -v).
+
+    The fabric's own `back` where it names one. Otherwise the same threads on a grid mirrored in V
+    and complemented, with the picks counted the other way. What the two sets cover is exchanged
+    with the cells that they show, so that the gap is the same from both sides: a hole is a hole.
+    """
+    if fabric.back is not None:
+        return fabric.back
+    share = coverage(fabric)
+    cells = ~fabric.weave.cells[:, ::-1]
+    name = fabric.weave.name
+    front_name = name.removesuffix(" (back)")
+    return Fabric(
+        name=fabric.name,
+        threads=fabric.threads,
+        weave=Weave(cells, front_name if front_name != name else f"{name} (back)"),
+        warp=ThreadSet(
+            sequence=fabric.warp.sequence,
+            density=fabric.warp.density,
+            coverage=float(share.area[WEFT]),
+        ),
+        weft=ThreadSet(
+            sequence=fabric.weft.sequence[::-1],
+            density=fabric.weft.density,
+            coverage=float(share.area[WARP]),
+        ),
+        model=fabric.model,
+        opaque=fabric.opaque,
+        masking_width=fabric.masking_width,
+        documentation=fabric.documentation,
+    )

@@ -1,0 +1,71 @@
+"""`fabricusd cat`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import sys
+
+EPILOG = """FILE is a USD file, FILE:/PRIM, a WIF draft, or a preset
+
+example:
+  fabricusd cat silk_crepe_de_chine
+  fabricusd cat tartan.usda:/Cloth/Tartan --json
+  fabricusd cat damask.usda --wif > damask.wif"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """A fabric, and the form to print it in."""
+    parser.add_argument("file", metavar="FILE", help="USD file, FILE:/PRIM, draft or preset")
+    parser.add_argument("prim", metavar="PRIM", nargs="?", help="path of the Fabric prim")
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument("--json", action="store_true", help="everything as JSON, in SI and degrees")
+    form.add_argument("--flatten", action="store_true", help="the composed stage as USD text")
+    form.add_argument("--wif", action="store_true", help="the draft as a WIF file")
+    parser.add_argument("--no-draft", action="store_true", help="leave the drawing out")
+    parser.add_argument(
+        "--color",
+        choices=("auto", "always", "never"),
+        default="auto",
+        help="colour in the drawing (default: on a terminal)",
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print one fabric."""
+    from fabricusd.schema.anysource import load_any
+
+    source = f"{options.file}:{options.prim}" if options.prim else options.file
+    if options.flatten:
+        from fabricusd.schema.source import open_stage
+
+        stage, _ = open_stage(source)
+        print(stage.Flatten().ExportToString(), end="")
+        return 0
+    fabric, notes = load_any(source)
+    for note in notes:
+        if not options.quiet:
+            print(f"fabricusd: {source}: {note}", file=sys.stderr)
+    if options.wif:
+        from fabricusd.schema.weaves import from_fabric, wif_text
+
+        sys.stdout.write(wif_text(from_fabric(fabric)))
+        return 0
+    from fabricusd.schema.describe import as_dict, in_words
+
+    if options.json:
+        print(json.dumps(as_dict(fabric), indent=2))
+        return 0
+    size = shutil.get_terminal_size((80, 24))
+    color = options.color == "always" or (
+        options.color == "auto" and sys.stdout.isatty() and "NO_COLOR" not in os.environ
+    )
+    print(in_words(fabric, width=size.columns))
+    if not options.no_draft:
+        from fabricusd.schema.weaves import draw
+
+        print()
+        print(draw(fabric, width=size.columns, height=max(size.lines, 48), color=color))
+    return 0

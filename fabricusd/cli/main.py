@@ -1,0 +1,87 @@
+"""`fabricusd`: finds the command, runs it, turns its result into an exit status.
+
+0 done, 1 findings or short of the bound that was asked for, 2 bad input. Data goes to stdout,
+everything else to stderr. To add a command: a module in this folder with `HELP`, `add_arguments`
+and `run`, and its name in COMMANDS. Only the module of the command that is asked for is imported.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import NoReturn
+
+from fabricusd import __version__
+from fabricusd.errors import FabricError
+
+COMMANDS = {
+    "new": "make a fabric from a preset, a weave, an image or a WIF draft",
+    "cat": "say what a fabric is, in a weaver's words, and draw its draft",
+    "check": "find faults in fabrics, threads and bindings",
+    "plugin-path": "print the folder that PXR_PLUGINPATH_NAME needs",
+    "demo": "author, check and print every preset into a folder",
+}
+
+
+class _Parser(argparse.ArgumentParser):
+    """Complains in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message}; see '{self.prog} --help'\n")
+
+
+def build_parser(command: str | None) -> argparse.ArgumentParser:
+    """The parser, with the arguments of `command` alone filled in."""
+    parser = _Parser(
+        prog="fabricusd",
+        description="Woven cloth as USD prims: author, check, render, bake.",
+        epilog="'fabricusd COMMAND --help' tells more, with an example.",
+    )
+    parser.add_argument("--version", action="version", version=f"fabricusd {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, line in COMMANDS.items():
+        if name != command:
+            commands.add_parser(name, help=line, add_help=False)
+            continue
+        module = import_module(f"fabricusd.cli.{name.replace('-', '_')}")
+        one = commands.add_parser(
+            name,
+            help=line,
+            description=line[0].upper() + line[1:] + ".",
+            epilog=module.EPILOG,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(one)
+        volume = one.add_mutually_exclusive_group()
+        volume.add_argument("-q", "--quiet", action="store_true", help="no messages but errors")
+        volume.add_argument("-v", "--verbose", action="store_true", help="more messages")
+        one.set_defaults(run=module.run)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; the console entry point."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    command = next((word for word in given if word in COMMANDS), None)
+    options = build_parser(command).parse_args(given)
+    try:
+        status: int = options.run(options)
+        sys.stdout.flush()
+        return status
+    except FabricError as error:
+        print(f"fabricusd: {error}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        # A reader such as `head` has had enough; keep Python from complaining at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        print("fabricusd: interrupted", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,192 @@
+"""`fabricusd new`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING, Any
+
+from fabricusd.errors import FabricError
+
+if TYPE_CHECKING:
+    from fabricusd.fabric import Fabric, Thread
+    from fabricusd.schema.weaves import Draft
+
+LONGEST_ORDER = 16384
+"""Most threads of one colour in a row; also the largest draft that is read."""
+
+EPILOG = """WEAVE is a name (plain, basket 2/2, twill 2/1 S, satin 8 step 3, herringbone 2/2 8,
+houndstooth, ...) or an expression in end i and pick j (mod(2*i + j, 5) < 4).
+
+example:
+  fabricusd new --preset velvet -o velvet.usda
+  fabricusd new --weave "twill 2/2 Z" --warp-color "#1f2a4d" --weft-color "#e8e0d0" -o denim.usda
+  fabricusd new --weave "twill 2/2" --warp-color "4*#111" "4*#eee" -o houndstooth.usda
+  fabricusd new --wif 8452.wif --thread linen_plain -o draft.usda"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """A source, what threads to weave it of, and where to write."""
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--preset", metavar="NAME", help="a fabric that comes with fabricusd")
+    source.add_argument("--weave", metavar="WEAVE", help="a named weave or an expression")
+    source.add_argument("--wif", metavar="FILE", help="a WIF draft")
+    source.add_argument("--image", metavar="FILE", help="a drawdown, black where warp is on top")
+    source.add_argument("--list-presets", action="store_true", help="print their names and stop")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help=".usda, .usdc, .usd or .wif (default: USD text on stdout)",
+    )
+    parser.add_argument("--name", help="of the prim (default: from the output file)")
+    parser.add_argument(
+        "--thread",
+        metavar="FABRIC[:THREAD]",
+        help="take the threads' scattering from a fabric file or preset",
+    )
+    for which, noun in (("warp", "ends"), ("weft", "picks")):
+        parser.add_argument(
+            f"--{which}-color",
+            nargs="+",
+            metavar="COLOR",
+            help=f"colours of the {noun} in order: #rrggbb, linear r,g,b, or COUNT*COLOR",
+        )
+        parser.add_argument(f"--{noun}-per-cm", type=float, metavar="N", help=f"{which} density")
+    parser.add_argument("--thickness", type=float, metavar="MM", help="of the threads")
+    parser.add_argument("--invert", action="store_true", help="image: white is warp on top")
+    parser.add_argument("-n", "--dry-run", action="store_true", help="write nothing")
+    parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Make the fabric and write it."""
+    if options.list_presets:
+        from fabricusd.schema.source import preset_names
+
+        print("\n".join(preset_names()))
+        return 0
+    fabric, notes = _fabric(options)
+    fabric = _changed(fabric, options)
+    for note in notes:
+        if not options.quiet:
+            print(f"fabricusd: {note}", file=sys.stderr)
+    _write(fabric, options)
+    return 0
+
+
+def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
+    if options.preset:
+        from fabricusd.schema.read import load
+        from fabricusd.schema.source import preset_names
+
+        if options.preset not in preset_names():
+            raise FabricError(
+                f"--preset '{options.preset}'",
+                f"is no preset; it must be one of {', '.join(preset_names())}",
+            )
+        for option in ("thread", "warp_color", "weft_color", "thickness", "invert"):
+            if getattr(options, option):
+                raise FabricError(
+                    f"--{option.replace('_', '-')}", "does not go with --preset; edit the layer"
+                )
+        return load(options.preset), ()
+    from fabricusd.schema.weaves import losses, to_fabric
+
+    draft = _draft(options)
+    fabric = to_fabric(draft, _base_thread(options))
+    return fabric, (*draft.warnings, *losses(draft))
+
+
+def _draft(options: argparse.Namespace) -> Draft:
+    from fabricusd.schema.weaves import parse_weave, read_image, read_wif, with_colors
+
+    if options.invert and not options.image:
+        raise FabricError("--invert", "goes with --image only")
+    if options.wif:
+        draft = read_wif(options.wif)
+    elif options.image:
+        draft = read_image(options.image, invert=options.invert)
+    else:
+        draft = parse_weave(options.weave)
+    if options.warp_color or options.weft_color:
+        warp = _color_order(options.warp_color, "--warp-color")
+        draft = with_colors(draft, warp, _color_order(options.weft_color, "--weft-color"))
+    return draft
+
+
+def _color_order(items: list[str] | None, where: str) -> list[tuple[float, float, float]]:
+    """`4*#111 4*#eee` -> eight linear colours."""
+    from fabricusd.schema.weaves import parse_color
+
+    order: list[tuple[float, float, float]] = []
+    for item in items or ():
+        count, star, color = item.rpartition("*")
+        if star and not (count.isdecimal() and 1 <= int(count) <= LONGEST_ORDER):
+            raise FabricError(
+                where, f"has the count '{count}'; it must be from 1 to {LONGEST_ORDER}"
+            )
+        order += [parse_color(color, where)] * (int(count) if star else 1)
+    return order
+
+
+def _base_thread(options: argparse.Namespace) -> Thread:
+    from dataclasses import replace
+
+    from fabricusd.fabric import Thread
+    from fabricusd.schema.anysource import load_any
+
+    thread = Thread()
+    if options.thread:
+        file, _, wanted = options.thread.partition(":")
+        fabric, _notes = load_any(file)
+        if wanted and wanted not in fabric.threads:
+            raise FabricError(
+                f"--thread '{options.thread}'",
+                f"names no thread of {file}; it must be one of {', '.join(fabric.threads)}",
+            )
+        thread = fabric.threads[wanted or next(iter(fabric.threads))]
+    if options.thickness is not None:
+        thread = replace(thread, thickness=options.thickness * 1e-3)
+    return thread
+
+
+def _changed(fabric: Fabric, options: argparse.Namespace) -> Fabric:
+    from dataclasses import replace
+    from pathlib import Path
+
+    changes: dict[str, Any] = {}
+    for which, value in (("warp", options.ends_per_cm), ("weft", options.picks_per_cm)):
+        if value is not None:
+            changes[which] = replace(getattr(fabric, which), density=value * 100)
+    name = options.name
+    if not name and not options.preset:
+        name = Path(options.output or options.wif or options.image or fabric.name).stem
+    if name:
+        from fabricusd.schema.write import prim_name
+
+        changes["name"] = prim_name(name)
+    return replace(fabric, **changes)
+
+
+def _write(fabric: Fabric, options: argparse.Namespace) -> None:
+    from fabricusd.schema.weaves import from_fabric, wif_text, write_wif
+    from fabricusd.schema.write import EXTENSIONS, save, usd_text
+
+    output = options.output
+    wif = bool(output) and output.lower().endswith(".wif")
+    if output and not wif and not output.endswith(EXTENSIONS):
+        raise FabricError(
+            f"-o '{output}'", f"has another suffix than {', '.join((*EXTENSIONS, '.wif'))}"
+        )
+    if options.dry_run:
+        print(f"fabricusd: would write {fabric.name} to {output or 'stdout'}", file=sys.stderr)
+        (wif_text(from_fabric(fabric)) if wif else usd_text(fabric))
+    elif not output:
+        sys.stdout.write(usd_text(fabric))
+    elif wif:
+        write_wif(from_fabric(fabric), output, clobber=not options.no_clobber)
+    else:
+        save(fabric, output, clobber=not options.no_clobber)
+        if options.verbose:
+            print(f"fabricusd: wrote {output}", file=sys.stderr)

@@ -1,0 +1,62 @@
+"""Files that appear whole: written under a temporary name, renamed when done."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from fabricusd.errors import FabricError
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike[str], *, clobber: bool = True) -> Iterator[Path]:
+    """Yield a temporary path beside `path`; rename it to `path` if the block succeeds.
+
+    The temporary name keeps the suffix, since many writers choose their format by it. An existing
+    file is replaced in one step, or refused before anything is written when `clobber` is False.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise FabricError(str(target), "is a directory; it must be a file's name")
+    if not clobber and target.exists():
+        raise FabricError(str(target), "exists; it must be a new name with --no-clobber")
+    if not target.parent.is_dir():
+        raise FabricError(
+            str(target), f"is in '{target.parent}', which is no directory; make it first"
+        )
+    try:
+        handle, name = tempfile.mkstemp(
+            prefix=f".{target.stem}.", suffix=target.suffix, dir=target.parent
+        )
+    except OSError as error:
+        raise FabricError(str(target), f"cannot be written: {error.strerror}") from error
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        # mkstemp makes files private; what a user writes follows the umask.
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        temporary.replace(target)
+    except OSError as error:
+        raise FabricError(str(target), f"cannot be written: {error.strerror or error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def readable_file(path: str | os.PathLike[str]) -> Path:
+    """`path` if it is a file that can be opened and is not empty; FabricError otherwise."""
+    source = Path(path)
+    if source.is_dir():
+        raise FabricError(str(source), "is a directory; it must be a file")
+    try:
+        with source.open("rb") as stream:
+            if not stream.read(1):
+                raise FabricError(str(source), "is empty; it must hold something")
+    except OSError as error:
+        raise FabricError(str(source), f"cannot be read: {error.strerror}") from error
+    return source

@@ -1,0 +1,24 @@
+"""A fabric from whatever a user has: a USD file, a WIF draft, an image, or a preset's name."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from fabricusd.fabric import Fabric
+
+IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".gif", ".jpg", ".jpeg", ".exr", ".tga", ".webp")
+
+
+def load_any(source: str | os.PathLike[str]) -> tuple[Fabric, tuple[str, ...]]:
+    """(fabric, what was noticed on the way). FabricError as the reader of that kind raises it."""
+    text = os.fspath(source)
+    suffix = Path(text).suffix.lower()
+    if suffix == ".wif" or suffix in IMAGE_SUFFIXES:
+        from fabricusd.schema.weaves import losses, read_image, read_wif, to_fabric
+
+        draft = read_wif(text) if suffix == ".wif" else read_image(text)
+        return to_fabric(draft), (*draft.warnings, *losses(draft))
+    from fabricusd.schema.read import load
+
+    return load(text), ()

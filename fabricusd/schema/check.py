@@ -1,0 +1,60 @@
+"""`check`: every rule over every fabric, thread and binding of a stage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+from pxr import Usd
+
+from fabricusd.schema.rules import RULES, applies, run
+from fabricusd.schema.source import open_stage
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one rule found in one place.
+
+    severity : "error" or "warning"
+    file : the file that was checked
+    prim : path of the prim
+    property : name, "" where the whole prim is meant
+    problem : reads on from the place: "is 0.8; it must be at least 1"
+    """
+
+    rule: str
+    severity: str
+    file: str
+    prim: str
+    property: str
+    problem: str
+
+    def __str__(self) -> str:
+        place = f"{self.prim} {self.property}".strip()
+        return f"{self.file}: {place} {self.problem} [{self.rule}]"
+
+    def as_dict(self) -> dict[str, str]:
+        """For JSON."""
+        return asdict(self)
+
+
+def check_prim(prim: Usd.Prim, file: str = "") -> Iterator[Finding]:
+    """The findings on one prim."""
+    for checked in RULES:
+        if applies(checked, prim):
+            for name, problem in run(checked, prim):
+                yield Finding(
+                    checked.name, checked.severity, file, str(prim.GetPath()), name, problem
+                )
+
+
+def check(source: str) -> list[Finding]:
+    """Every finding in a USD file or a preset, in stage order.
+
+    FabricError where the file cannot be opened as USD, or does not compose.
+    """
+    stage, file = open_stage(source)
+    findings: list[Finding] = []
+    for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
+        findings.extend(check_prim(prim, file))
+    return findings

@@ -1,0 +1,110 @@
+"""Make the plugin folder, which other tools are pointed at, from `schema.usda` and the rules.
+
+`python -m fabricusd.schema.generate` writes them, `--check` only compares. A developer's step: it
+needs jinja2, which usdGenSchema uses.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+PLUGIN = HERE / "plugin"
+
+
+def _source_with_whole_docs(folder: Path) -> Path:
+    """A copy of schema.usda in which every property's user doc is its whole documentation.
+
+    usdGenSchema would keep the first sentence alone, and the unit would be lost to usdview.
+    """
+    from pxr import Sdf
+
+    layer = Sdf.Layer.FindOrOpen(str(HERE / "schema.usda"))
+    copy = Sdf.Layer.CreateAnonymous(".usda")
+    copy.TransferContent(layer)
+
+    def keep_docs(path: Sdf.Path) -> None:
+        spec = copy.GetObjectAtPath(path)
+        if isinstance(spec, (Sdf.PropertySpec, Sdf.PrimSpec)) and spec.documentation:
+            one_line = " ".join(spec.documentation.split())
+            spec.customData = {**dict(spec.customData), "userDocBrief": one_line}
+
+    copy.Traverse(Sdf.Path.absoluteRootPath, keep_docs)
+    target = folder / "schema.usda"
+    copy.Export(str(target))
+    return target
+
+
+def generate() -> dict[str, str]:
+    """File name -> contents, freshly made."""
+    from pxr import Usd
+
+    from fabricusd.schema.rules import RULES
+
+    tool = Path(Usd.__file__).with_name("usdGenSchema.py")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        source = _source_with_whole_docs(folder)
+        out = folder / "out"
+        out.mkdir()
+        done = subprocess.run(
+            [sys.executable, str(tool), "-q", str(source), str(out)],
+            capture_output=True,
+            text=True,
+        )
+        made = out / "generatedSchema.usda"
+        if done.returncode or not made.exists():
+            raise RuntimeError(f"usdGenSchema failed: {done.stdout}{done.stderr}")
+        schema = made.read_text()
+        info_text = re.sub(r"^#.*\n", "", (out / "plugInfo.json").read_text(), flags=re.M)
+    plugin = json.loads(info_text)["Plugins"][0]
+    plugin.update({"LibraryPath": "", "ResourcePath": ".", "Root": "."})
+    validators: dict[str, object] = {"keywords": ["fabricusd"]}
+    for rule in RULES:
+        validators[rule.name] = {"doc": rule.doc, "schemaTypes": list(rule.schema_types)}
+    python_plugin = {
+        "Info": {"Validators": validators},
+        "LibraryPath": "",
+        "Name": "fabricusd.schema.validators",
+        "ResourcePath": ".",
+        "Root": ".",
+        "Type": "python",
+    }
+    # USD tells plugins apart by their folder, so the two cannot share one.
+    return {
+        "plugInfo.json": _json({"Includes": ["*/"]}),
+        "fabricusd/generatedSchema.usda": schema,
+        "fabricusd/plugInfo.json": _json({"Plugins": [plugin]}),
+        "validators/plugInfo.json": _json({"Plugins": [python_plugin]}),
+    }
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, indent=4, sort_keys=True) + "\n"
+
+
+def main() -> int:
+    """Write the files, or with `--check` say which differ."""
+    made = generate()
+    if "--check" in sys.argv[1:]:
+        stale = [
+            name
+            for name, text in made.items()
+            if not (PLUGIN / name).exists() or (PLUGIN / name).read_text() != text
+        ]
+        for name in stale:
+            print(f"{name} differs from schema.usda and the rules; run `make schema`")
+        return 1 if stale else 0
+    for name, text in made.items():
+        (PLUGIN / name).parent.mkdir(parents=True, exist_ok=True)
+        (PLUGIN / name).write_text(text)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

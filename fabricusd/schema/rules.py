@@ -1,0 +1,373 @@
+"""The rules of a well-formed fabric: one small function each, over composed values.
+
+To add a rule: write a function here, decorate it, add a bad sample named after its fault to
+`tests/schema/bad/`, run `make schema`. `fabricusd check`, `schema.read` and USD's own validation
+framework (`fabricusd.schema.validators`) run the same table. A rule sees one prim and yields
+`(property name, problem)`; a problem reads on from the place: "is 0.8; it must be at least 1".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from pxr import Sdf, Tf, Usd, UsdGeom
+
+from fabricusd.fabric import describe_limits, within_limits
+from fabricusd.schema import attributes, weave_rows
+from fabricusd.schema.attributes import Attribute
+
+Fault = tuple[str, str]
+RuleFunction = Callable[[Usd.Prim], Iterable[Fault]]
+
+FABRIC, THREAD, BINDING = "FabricusdFabric", "FabricusdFabricThread", "FabricusdBindingAPI"
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One rule: its name, its severity, the schema types of the prims that it looks at."""
+
+    name: str
+    severity: str
+    schema_types: tuple[str, ...]
+    doc: str
+    function: RuleFunction
+
+
+RULES: list[Rule] = []
+
+
+def rule(*schema_types: str, severity: str = "error") -> Callable[[RuleFunction], RuleFunction]:
+    """Register a function as the rule whose name is the function's in CamelCase."""
+
+    def register(function: RuleFunction) -> RuleFunction:
+        name = "".join(word.capitalize() for word in function.__name__.split("_"))
+        doc = " ".join((function.__doc__ or "").split())
+        RULES.append(Rule(name, severity, schema_types, doc, function))
+        return function
+
+    return register
+
+
+def applies(checked: Rule, prim: Usd.Prim) -> bool:
+    """Whether `prim` is of a type that the rule looks at."""
+    type_name = f"Fabricusd{prim.GetTypeName()}"
+    if type_name in checked.schema_types:
+        return True
+    return BINDING in checked.schema_types and (
+        prim.HasAPI("FabricBindingAPI") or prim.HasRelationship("fabric:binding")
+    )
+
+
+# ---- any of the three ---------------------------------------------------------------------------
+
+
+def _definitions(prim: Usd.Prim) -> Iterator[Usd.PrimDefinition]:
+    registry = Usd.SchemaRegistry()
+    if prim.GetTypeName() in ("Fabric", "FabricThread"):
+        yield registry.FindConcretePrimDefinition(str(prim.GetTypeName()))
+    if prim.HasAPI("FabricBindingAPI") or prim.HasRelationship("fabric:binding"):
+        yield registry.FindAppliedAPIPrimDefinition("FabricBindingAPI")
+
+
+@rule(FABRIC, THREAD, BINDING)
+def property_type_matches(prim: Usd.Prim) -> Iterator[Fault]:
+    """Every property has the type that the schema gives it, in every layer."""
+    for definition in _definitions(prim):
+        for name in definition.GetPropertyNames():
+            wants_attribute = definition.GetSpecType(name) == Sdf.SpecTypeAttribute
+            for spec in prim.GetProperty(name).GetPropertyStack():
+                where = f"in {spec.layer.GetDisplayName()}"
+                if isinstance(spec, Sdf.AttributeSpec) != wants_attribute:
+                    wrong, right = "a relationship", "an attribute"
+                    if not wants_attribute:
+                        wrong, right = right, wrong
+                    yield name, f"is {wrong}, {where}; it must be {right}"
+                elif wants_attribute:
+                    wanted = definition.GetAttributeDefinition(name).GetTypeName()
+                    if spec.typeName != wanted:
+                        yield name, f"is of type {spec.typeName}, {where}; it must be {wanted}"
+
+
+@rule(FABRIC, THREAD, BINDING, severity="warning")
+def property_known(prim: Usd.Prim) -> Iterator[Fault]:
+    """Every property in the fabric: and thread: namespaces is in the schema."""
+    known = {name for definition in _definitions(prim) for name in definition.GetPropertyNames()}
+    for name in prim.GetAuthoredPropertyNames():
+        if name.startswith(("fabric:", "thread:")) and name not in known:
+            yield name, f"is not in the schema of {prim.GetTypeName()}; it is not read"
+
+
+def _numbers(prim: Usd.Prim) -> tuple[Attribute, ...]:
+    if prim.GetTypeName() == "FabricThread":
+        return attributes.THREAD
+    if prim.GetTypeName() == "Fabric":
+        sets = (attributes.thread_set("warp"), attributes.thread_set("weft"))
+        return (*attributes.FABRIC, *sets[0], *sets[1])
+    return attributes.BINDING
+
+
+@rule(FABRIC, THREAD, BINDING)
+def number_in_range(prim: Usd.Prim) -> Iterator[Fault]:
+    """Every number is finite and inside its range."""
+    for entry in _numbers(prim):
+        value = prim.GetAttribute(entry.name).Get()
+        if value is None or (entry.sentinel is not None and value == entry.sentinel):
+            continue
+        for number in tuple(value) if hasattr(value, "__len__") else (value,):
+            # Compared in SI, where the bounds are; told in the file's unit.
+            if not within_limits(number * entry.scale, entry.limits):
+                accepted = describe_limits(entry.limits, 1.0 / entry.scale, entry.unit)
+                if entry.sentinel is not None:
+                    accepted += f", or {entry.sentinel:g} to derive it"
+                yield entry.name, f"is {number:g}; it must be {accepted or 'finite'}"
+                break
+
+
+@rule(FABRIC, THREAD)
+def model_allowed(prim: Usd.Prim) -> Iterator[Fault]:
+    """The scattering model is an allowed token."""
+    name = "fabric:model" if prim.GetTypeName() == "Fabric" else "thread:model"
+    attribute = prim.GetAttribute(name)
+    # USD stores any token; the allowed ones are advice to user interfaces.
+    allowed = attribute.GetMetadata("allowedTokens") or ()
+    if attribute.Get() not in allowed:
+        yield name, f"is '{attribute.Get()}'; it must be one of {', '.join(allowed)}"
+
+
+# ---- Fabric -------------------------------------------------------------------------------------
+
+
+def thread_prims(prim: Usd.Prim) -> list[Usd.Prim]:
+    """The fabric's thread prims in index order; an invalid prim where a target is missing."""
+    relationship = prim.GetRelationship("fabric:threads")
+    if relationship and relationship.HasAuthoredTargets():
+        targets = relationship.GetForwardedTargets()
+        return [prim.GetStage().GetPrimAtPath(path) for path in targets]
+    return [child for child in prim.GetChildren() if child.GetTypeName() == "FabricThread"]
+
+
+def _forwarding_cycle(relationship: Usd.Relationship) -> list[str]:
+    """The chain of relationships that leads back to itself, [] where there is none."""
+    stage = relationship.GetStage()
+
+    def follow(path: Sdf.Path, chain: list[Sdf.Path]) -> list[Sdf.Path]:
+        if path in chain:
+            return [*chain, path]
+        forwarded = stage.GetRelationshipAtPath(path) if path.IsPropertyPath() else None
+        if not forwarded:
+            return []
+        for target in forwarded.GetTargets():
+            found = follow(target, [*chain, path])
+            if found:
+                return found
+        return []
+
+    return [str(path) for path in follow(relationship.GetPath(), [])]
+
+
+@rule(FABRIC)
+def relationship_acyclic(prim: Usd.Prim) -> Iterator[Fault]:
+    """No relationship of a fabric leads back to itself, nor a fabric to itself as its back."""
+    for name in ("fabric:threads", "fabric:back"):
+        relationship = prim.GetRelationship(name)
+        if not relationship:
+            continue
+        cycle = _forwarding_cycle(relationship)
+        if cycle:
+            yield name, f"leads in a circle, {' -> '.join(cycle)}; it must end at a prim"
+        elif prim.GetPath() in relationship.GetForwardedTargets():
+            yield name, f"targets {prim.GetPath()}, its own prim; it must target another"
+
+
+@rule(FABRIC)
+def threads_exist(prim: Usd.Prim) -> Iterator[Fault]:
+    """A fabric has at least one thread, and every target of its thread list is a FabricThread."""
+    relationship = prim.GetRelationship("fabric:threads")
+    targets = relationship.GetForwardedTargets() if relationship else []
+    if not thread_prims(prim):
+        yield "fabric:threads", "names no thread; it must name at least one FabricThread prim"
+    if relationship and relationship.HasAuthoredTargets():
+        for path in targets:
+            target = prim.GetStage().GetPrimAtPath(path)
+            if not target:
+                yield "fabric:threads", f"targets {path}, which is no prim; it must be one"
+            elif target.GetTypeName() != "FabricThread" and target != prim:
+                kind = target.GetTypeName() or "an untyped prim"
+                yield "fabric:threads", f"targets {path}, {kind}; it must be a FabricThread"
+
+
+@rule(FABRIC)
+def thread_indices_in_range(prim: Usd.Prim) -> Iterator[Fault]:
+    """Every index in the warp and weft sequences counts a thread."""
+    count = len(thread_prims(prim))
+    for which in ("warp", "weft"):
+        name = f"fabric:{which}:threads"
+        sequence = np.asarray(prim.GetAttribute(name).Get() or (), dtype=np.int64)
+        if sequence.size == 0:
+            yield name, "is empty; it must name at least one thread"
+            continue
+        wrong = np.flatnonzero((sequence < 0) | (sequence >= count))
+        if wrong.size and count:
+            yield (
+                name,
+                f"[{wrong[0]}] is {sequence[wrong[0]]}; it must be from 0 to {count - 1}, "
+                f"the fabric has {count} thread{'s' if count > 1 else ''}",
+            )
+
+
+@rule(FABRIC)
+def coverage_at_most_one(prim: Usd.Prim) -> Iterator[Fault]:
+    """Authored coverages of warp and weft add up to at most 1."""
+    values = [prim.GetAttribute(f"fabric:{w}:coverage").Get() for w in ("warp", "weft")]
+    total = sum(v for v in values if v is not None and math.isfinite(v) and v > 0)
+    if total > 1.0 + 1e-9:
+        yield "fabric:weft:coverage", f"and the warp's add up to {total:g}; it must be at most 1"
+
+
+@rule(FABRIC)
+def weave_is_a_grid(prim: Usd.Prim) -> Iterator[Fault]:
+    """The weave has at least one row, rows of one length, and no character but 0 and 1."""
+    problem = weave_rows.fault(prim.GetAttribute("fabric:weave:rows").Get() or ())
+    if problem:
+        yield "fabric:weave:rows", problem
+
+
+@rule(FABRIC)
+def back_is_a_fabric(prim: Usd.Prim) -> Iterator[Fault]:
+    """The back, where there is one, is one Fabric prim."""
+    relationship = prim.GetRelationship("fabric:back")
+    targets = relationship.GetForwardedTargets() if relationship else []
+    if len(targets) > 1:
+        yield "fabric:back", f"has {len(targets)} targets; it must have at most 1"
+    for path in targets[:1]:
+        target = prim.GetStage().GetPrimAtPath(path)
+        if not target:
+            yield "fabric:back", f"targets {path}, which is no prim; it must be a Fabric"
+        elif target.GetTypeName() != "Fabric":
+            kind = target.GetTypeName() or "an untyped prim"
+            yield "fabric:back", f"targets {path}, {kind}; it must be a Fabric"
+
+
+@rule(FABRIC, severity="warning")
+def threads_used(prim: Usd.Prim) -> Iterator[Fault]:
+    """Every thread of a fabric is in its warp or its weft."""
+    used: set[int] = set()
+    for which in ("warp", "weft"):
+        used.update(prim.GetAttribute(f"fabric:{which}:threads").Get() or ())
+    for index, thread in enumerate(thread_prims(prim)):
+        if thread and index not in used:
+            yield "fabric:threads", f"[{index}], {thread.GetName()}, is in neither warp nor weft"
+
+
+# ---- FabricThread -------------------------------------------------------------------------------
+
+
+@rule(THREAD)
+def curve_points_match(prim: Usd.Prim) -> Iterator[Fault]:
+    """A curve has as many positions as angles, and at least two."""
+    positions = prim.GetAttribute("thread:curve:positions").Get() or ()
+    angles = prim.GetAttribute("thread:curve:angles").Get() or ()
+    if len(positions) != len(angles):
+        yield (
+            "thread:curve:angles",
+            f"has {len(angles)} numbers and thread:curve:positions {len(positions)}; "
+            "they must be as many",
+        )
+    elif len(positions) < 2:
+        yield "thread:curve:positions", f"has {len(positions)} numbers; it must have at least 2"
+
+
+@rule(THREAD)
+def curve_positions_rise(prim: Usd.Prim) -> Iterator[Fault]:
+    """A curve's positions are finite, never decrease, and span a length above 0."""
+    name = "thread:curve:positions"
+    positions = prim.GetAttribute(name).Get() or ()
+    for k, x in enumerate(positions):
+        if not math.isfinite(x):
+            yield name, f"[{k}] is {x:g}; it must be finite"
+            return
+        if k and x < positions[k - 1]:
+            yield name, f"[{k}] is {x:g}; it must be at least {positions[k - 1]:g}, the one before"
+            return
+    if len(positions) > 1 and positions[0] == positions[-1]:
+        yield name, f"starts and ends at {positions[0]:g}; it must span a length above 0"
+
+
+@rule(THREAD)
+def curve_angles_in_range(prim: Usd.Prim) -> Iterator[Fault]:
+    """A curve's angles are from -90 to 90 degrees."""
+    name = "thread:curve:angles"
+    for k, x in enumerate(prim.GetAttribute(name).Get() or ()):
+        if not (math.isfinite(x) and -90.0 <= x <= 90.0):
+            yield name, f"[{k}] is {x:g}; it must be from -90 to 90 degrees"
+            return
+
+
+# ---- FabricBindingAPI ---------------------------------------------------------------------------
+
+
+@rule(BINDING)
+def binding_names_a_fabric(prim: Usd.Prim) -> Iterator[Fault]:
+    """A binding targets exactly one prim, a Fabric."""
+    name = "fabric:binding"
+    targets = prim.GetRelationship(name).GetForwardedTargets()
+    if len(targets) != 1:
+        yield name, f"has {len(targets)} targets; it must have 1, a Fabric prim"
+        return
+    target = prim.GetStage().GetPrimAtPath(targets[0])
+    if not target:
+        yield name, f"targets {targets[0]}, which is no prim; it must be a Fabric"
+    elif target.GetTypeName() != "Fabric":
+        kind = target.GetTypeName() or "an untyped prim"
+        yield name, f"targets {targets[0]}, {kind}; it must be a Fabric"
+
+
+@rule(BINDING)
+def binding_on_mesh_or_subset(prim: Usd.Prim) -> Iterator[Fault]:
+    """Only meshes and subsets of their faces are bound."""
+    if prim.GetTypeName() not in ("Mesh", "GeomSubset"):
+        kind = prim.GetTypeName() or "an untyped prim"
+        yield "fabric:binding", f"is on {kind}; it must be on a Mesh or a GeomSubset"
+
+
+@rule(BINDING)
+def binding_uv_set_exists(prim: Usd.Prim) -> Iterator[Fault]:
+    """The UV set that a binding names is a primvar of the mesh."""
+    mesh = prim.GetParent() if prim.GetTypeName() == "GeomSubset" else prim
+    wanted = prim.GetAttribute("fabric:binding:uvSet").Get()
+    if mesh and mesh.IsA(UsdGeom.Mesh) and wanted:
+        primvars = UsdGeom.PrimvarsAPI(mesh)
+        if not primvars.FindPrimvarWithInheritance(wanted).HasValue():
+            have = [p.GetPrimvarName() for p in primvars.GetPrimvarsWithValues()]
+            yield (
+                "fabric:binding:uvSet",
+                f"is '{wanted}'; it must be a primvar of {mesh.GetPath()}, "
+                f"which has {', '.join(have) or 'none'}",
+            )
+
+
+@rule(BINDING)
+def threads_per_unit_both(prim: Usd.Prim) -> Iterator[Fault]:
+    """Threads per UV unit are given for both axes or for neither."""
+    name = "fabric:binding:threadsPerUnit"
+    value = prim.GetAttribute(name).Get()
+    if value is not None and (value[0] == 0) != (value[1] == 0):
+        yield name, f"is ({value[0]:g}, {value[1]:g}); both must be 0, or both above 0"
+
+
+@rule(BINDING, severity="warning")
+def binding_api_applied(prim: Usd.Prim) -> Iterator[Fault]:
+    """A prim with a fabric:binding relationship has FabricBindingAPI applied."""
+    if not prim.HasAPI("FabricBindingAPI"):
+        yield "fabric:binding", "is authored, but FabricBindingAPI is not in the prim's apiSchemas"
+
+
+def run(checked: Rule, prim: Usd.Prim) -> list[Fault]:
+    """The faults that one rule finds on one prim, with USD's own errors as faults."""
+    try:
+        return list(checked.function(prim))
+    except Tf.ErrorException as error:
+        return [("", f"cannot be read: {error}")]

@@ -1,0 +1,39 @@
+"""The weave grid as USD holds it: one string of 0 and 1 for each pick."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+_BINARY = frozenset("01")
+
+
+def fault(rows: Sequence[str]) -> str:
+    """What is wrong with the rows, "" where nothing is."""
+    if not rows:
+        return "is empty; it must have at least one row"
+    width = len(rows[0])
+    if width == 0:
+        return "[0] is empty; it must have at least one 0 or 1"
+    for j, row in enumerate(rows):
+        if len(row) != width:
+            return f"[{j}] has {len(row)} characters; it must have {width}, as the first row has"
+        if row.count("0") + row.count("1") != width:
+            i, char = next((i, c) for i, c in enumerate(row) if c not in _BINARY)
+            return f"[{j}] has {char!r} at {i}; it must be 0 (weft on top) or 1 (warp on top)"
+    return ""
+
+
+def to_cells(rows: Sequence[str]) -> NDArray[np.bool_]:
+    """Rows without a fault -> (m, n) bool cells, `cells[i, j]` from character i of row j."""
+    flat = np.frombuffer("".join(rows).encode("ascii"), np.uint8)
+    cells: NDArray[np.bool_] = flat.reshape(len(rows), -1).T == ord("1")
+    return cells
+
+
+def from_cells(cells: NDArray[np.bool_]) -> list[str]:
+    """(m, n) bool cells -> n rows of m characters."""
+    digits = np.ascontiguousarray(cells.T).astype(np.uint8) + ord("0")
+    return [row.tobytes().decode("ascii") for row in digits]

@@ -1,0 +1,124 @@
+"""Fabric -> prim, and Fabric -> file."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+
+from pxr import Sdf, Tf, Usd, Vt
+
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Binding, Fabric, Thread
+from fabricusd.files import whole_file
+from fabricusd.schema import attributes, weave_rows
+from fabricusd.schema.attributes import DEGREE, Attribute, from_si, unscale
+
+EXTENSIONS = (".usda", ".usdc", ".usd")
+
+
+def save(fabric: Fabric, path: str | os.PathLike[str], *, clobber: bool = True) -> None:
+    """Write a fabric as the default prim of a new layer, whole or not at all."""
+    target = os.fspath(path)
+    if not target.endswith(EXTENSIONS):
+        raise FabricError(target, f"has another suffix than {', '.join(EXTENSIONS)}")
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    stage = Usd.Stage.Open(layer)
+    prim = write_fabric(
+        stage, Sdf.Path.absoluteRootPath.AppendChild(prim_name(fabric.name)), fabric
+    )
+    stage.SetDefaultPrim(prim)
+    stage.SetMetadata("upAxis", "Y")
+    stage.SetMetadata("metersPerUnit", 0.01)
+    with whole_file(target, clobber=clobber) as temporary:
+        try:
+            layer.Export(str(temporary))
+        except Tf.ErrorException as error:
+            raise FabricError(target, f"cannot be written: {error}") from error
+
+
+def prim_name(text: str) -> str:
+    """The nearest valid prim name: letters, digits and _, not starting with a digit."""
+    return str(Tf.MakeValidIdentifier(re.sub(r"\W+", "_", text.strip()) or "Fabric"))
+
+
+def write_fabric(stage: Usd.Stage, path: Sdf.Path | str, fabric: Fabric) -> Usd.Prim:
+    """Define a Fabric prim with its threads as children, and its back as a sibling."""
+    path = Sdf.Path(path)
+    prim = stage.DefinePrim(path, "Fabric")
+    _document(prim, fabric.documentation)
+    names = _unique_names(list(fabric.threads))
+    for name, thread in zip(names, fabric.threads.values(), strict=True):
+        write_thread(stage, path.AppendChild(name), thread)
+    prim.CreateRelationship("fabric:threads", custom=False).SetTargets(
+        [path.AppendChild(name) for name in names]
+    )
+    for which, thread_set in (("warp", fabric.warp), ("weft", fabric.weft)):
+        _set(prim, f"fabric:{which}:threads", "int[]", Vt.IntArray(thread_set.sequence))
+        _set_numbers(prim, attributes.thread_set(which), thread_set)
+    rows = weave_rows.from_cells(fabric.weave.cells)
+    _set(prim, "fabric:weave:rows", "string[]", Vt.StringArray(rows))
+    if fabric.weave.name:
+        _set(prim, "fabric:weave:name", "string", fabric.weave.name)
+    _set(prim, "fabric:model", "token", fabric.model, uniform=True)
+    if fabric.opaque:
+        _set(prim, "fabric:opaque", "bool", True)
+    _set_numbers(prim, attributes.FABRIC, fabric)
+    if fabric.back is not None:
+        name = prim_name(fabric.back.name)
+        if name == path.name:
+            raise FabricError("back", f"has the front's name, {name}; it must have its own")
+        back = write_fabric(stage, path.ReplaceName(name), fabric.back)
+        prim.CreateRelationship("fabric:back", custom=False).SetTargets([back.GetPath()])
+    return prim
+
+
+def write_thread(stage: Usd.Stage, path: Sdf.Path | str, thread: Thread) -> Usd.Prim:
+    """Define a FabricThread prim."""
+    prim = stage.DefinePrim(Sdf.Path(path), "FabricThread")
+    _document(prim, thread.documentation)
+    _set_numbers(prim, attributes.THREAD, thread)
+    _set(prim, "thread:model", "token", thread.model or "inherit", uniform=True)
+    angles = [unscale(a, DEGREE) for a in thread.curve.angles]
+    _set(prim, "thread:curve:positions", "double[]", Vt.DoubleArray(thread.curve.positions))
+    _set(prim, "thread:curve:angles", "double[]", Vt.DoubleArray(angles))
+    return prim
+
+
+def write_binding(prim: Usd.Prim, fabric_path: Sdf.Path | str, binding: Binding) -> None:
+    """Apply FabricBindingAPI to a mesh or subset, bound to the Fabric prim at `fabric_path`."""
+    prim.ApplyAPI("FabricBindingAPI")
+    prim.CreateRelationship("fabric:binding", custom=False).SetTargets([Sdf.Path(fabric_path)])
+    _set(prim, "fabric:binding:uvSet", "token", binding.uv_set, uniform=True)
+    _set_numbers(prim, attributes.BINDING, binding)
+
+
+def _unique_names(names: Sequence[str]) -> list[str]:
+    """Valid prim names; two that fall together are told apart by a number."""
+    taken: dict[str, None] = {}
+    for name in names:
+        base = candidate = prim_name(name)
+        count = 1
+        while candidate in taken:
+            count += 1
+            candidate = f"{base}_{count}"
+        taken[candidate] = None
+    return list(taken)
+
+
+def _document(prim: Usd.Prim, text: str) -> None:
+    if text:
+        prim.SetDocumentation(text)
+
+
+def _set_numbers(prim: Usd.Prim, table: tuple[Attribute, ...], owner: object) -> None:
+    for entry in table:
+        _set(prim, entry.name, entry.type_name, from_si(getattr(owner, entry.field), entry))
+
+
+def _set(
+    prim: Usd.Prim, name: str, type_name: str, value: object, *, uniform: bool = False
+) -> None:
+    variability = Sdf.VariabilityUniform if uniform else Sdf.VariabilityVarying
+    kind = Sdf.ValueTypeNames.Find(type_name)
+    prim.CreateAttribute(name, kind, custom=False, variability=variability).Set(value)
