@@ -32,7 +32,7 @@ class Lens(NamedTuple):
 
     eye, across, down, forward : (3,) - position; steps of one pixel at distance 1; towards pixel
         corner (0, 0) at distance 1
-    right, up : (3,) - unit axes of the lens; view : (3,) - unit viewing direction
+    right, up : (3,) - unit axes of the lens; axis : (3,) - unit viewing direction
     aperture_radius, focus : [m]; near, far : [m], along the viewing direction
     spread : angle of a pixel [rad]; pixel : width of a pixel [m], 0 unless orthographic
     """
@@ -43,7 +43,7 @@ class Lens(NamedTuple):
     forward: NDArray[np.float32]
     right: NDArray[np.float32]
     up: NDArray[np.float32]
-    view: NDArray[np.float32]
+    axis: NDArray[np.float32]
     aperture_radius: np.float32
     focus: np.float32
     near: np.float32
@@ -121,7 +121,7 @@ def camera_rays(lens, width, pixels, first, samples, seed, rays, cone):
         ox, oy, oz = lens.eye[0], lens.eye[1], lens.eye[2]
         if lens.orthographic:
             ox, oy, oz = ox + ax, oy + ay, oz + az
-            ax, ay, az = lens.view[0], lens.view[1], lens.view[2]
+            ax, ay, az = lens.axis[0], lens.axis[1], lens.axis[2]
         elif lens.aperture_radius > R(0):
             r, phi = lens.aperture_radius * math.sqrt(u2), R(2 * math.pi) * u3
             a, b = r * cos(R, phi), r * sin(R, phi)
@@ -134,7 +134,7 @@ def camera_rays(lens, width, pixels, first, samples, seed, rays, cone):
         ax, ay, az = ax * inverse, ay * inverse, az * inverse
         rays[p, OX, lane], rays[p, OY, lane], rays[p, OZ, lane] = ox, oy, oz
         rays[p, DX, lane], rays[p, DY, lane], rays[p, DZ, lane] = ax, ay, az
-        cosine = max(ax * lens.view[0] + ay * lens.view[1] + az * lens.view[2], R(1e-3))
+        cosine = max(ax * lens.axis[0] + ay * lens.axis[1] + az * lens.axis[2], R(1e-3))
         rays[p, TNEAR, lane] = lens.near / cosine
         rays[p, TFAR, lane] = lens.far / cosine if lens.far < R(1e29) else FAR
         whole[p, GEOMETRY, lane] = MISS

@@ -38,9 +38,7 @@ def build_dome(image: NDArray[Any], rotation: NDArray[Any]) -> Dome:
     h, w = picture.shape[:2]
     brightness = np.maximum(picture.astype(np.float64) @ LUMINANCE, 0.0)
     wrapped = np.pad(np.pad(brightness, ((1, 1), (0, 0)), "edge"), ((0, 0), (1, 1)), "wrap")
-    brightest = np.max(
-        [wrapped[j : j + h, i : i + w] for j in range(3) for i in range(3)], axis=0
-    )
+    brightest = np.max([wrapped[j : j + h, i : i + w] for j in range(3) for i in range(3)], axis=0)
     edges = np.cos(np.pi * np.arange(h + 1) / h)
     weight = brightest * (edges[:-1] - edges[1:])[:, None]
     total = weight.sum()

@@ -129,9 +129,7 @@ def _sound_triangles(scene: Scene, mesh: Mesh) -> NDArray[np.bool_]:
     area2 = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
     solid = area2 > 1e-10 * longest**2
     if (whole & ~solid).any():
-        scene.note(
-            mesh.path, f"has {int((whole & ~solid).sum())} triangles without area, left out"
-        )
+        scene.note(mesh.path, f"has {int((whole & ~solid).sum())} triangles without area, left out")
     return np.asarray(whole & solid)
 
 
