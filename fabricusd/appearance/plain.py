@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf, i0e
 
-from fabricusd.fabric import PILE_ANGLE, Fabric, TangentCurve, Thread, ThreadSet
+from fabricusd.appearance.coverage import WARP, WEFT, coverage
+from fabricusd.fabric import PILE_ANGLE, Fabric, TangentCurve, Thread
 
 Array = NDArray[np.float64]
 
@@ -183,38 +184,19 @@ class Share:
 
 
 def shares(fabric: Fabric) -> tuple[Share, ...]:
-    """Who covers how much: `a_j c_jk / c_j` for type k in set j. Section 3."""
-    cells = fabric.weave.cells
-    found = []
-    for is_warp, thread_set in ((True, fabric.warp), (False, fabric.weft)):
-        on_top, counts = _cells_by_type(cells if is_warp else ~cells.T, thread_set)
-        threads = fabric.thread_list
-        area = thread_set.coverage
-        if area is None:
-            thickness = sum(s * threads[k].thickness for k, s in counts.items())
-            area = on_top * min(thickness / thread_set.pitch, 1.0)
-        for k, share in counts.items():
-            model = fabric.model_of(threads[k])
-            found.append(Share(thread=threads[k], model=model, is_warp=is_warp, area=area * share))
-    return tuple(found)
-
-
-def _cells_by_type(
-    on_top: NDArray[np.bool_], thread_set: ThreadSet
-) -> tuple[float, dict[int, float]]:
-    """Share of cells with the set on top, and of those the share of each type of thread.
-
-    on_top : (threads, crossings) bool. A set that is nowhere on top is shared by its sequence.
-    """
-    sequence = thread_set.sequence
-    length = math.lcm(len(on_top), len(sequence))
-    visible = on_top.mean(axis=1)
-    total = dict.fromkeys(sequence, 0.0)
-    for x in range(length):
-        weight = visible[x % len(on_top)] if on_top.any() else 1.0
-        total[sequence[x % len(sequence)]] += float(weight)
-    all_types = sum(total.values())
-    return float(on_top.mean()), {k: x / all_types for k, x in total.items()}
+    """Who covers how much of the cloth, for everyone that covers anything. Section 3."""
+    area = coverage(fabric).type_area
+    return tuple(
+        Share(
+            thread=thread,
+            model=fabric.model_of(thread),
+            is_warp=j == WARP,
+            area=float(area[j, k]),
+        )
+        for j in (WEFT, WARP)
+        for k, thread in enumerate(fabric.thread_list)
+        if area[j, k] > 0
+    )
 
 
 def _nodes(fabric: Fabric, per_segment: int) -> Iterator[tuple[Share, float, float]]:

@@ -1,0 +1,72 @@
+"""Display colours of drafts and images, and the linear Rec. 709 colours of threads.
+
+WIF colour tables, palette images and `#rrggbb` are display codes; threads are linear. The two
+transfer functions here are all that importing needs, so that no colour library has to load.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fabricusd.errors import FabricError
+
+RGB = tuple[float, float, float]
+
+
+def linear_from_srgb(display: ArrayLike) -> NDArray[np.float64]:
+    """(...) display values, 0 to 1 -> (...) float64 linear. [IEC61966] section 5.2."""
+    v = np.asarray(display, np.float64)
+    return np.where(v <= 0.04045, v / 12.92, ((np.maximum(v, 0.04045) + 0.055) / 1.055) ** 2.4)
+
+
+def srgb_from_linear(linear: ArrayLike) -> NDArray[np.float64]:
+    """(...) linear values, 0 to 1 -> (...) float64 display. [IEC61966] section 5.3.
+
+    `linear_from_srgb(srgb_from_linear(x)) == x` within 1e-7: the standard rounds the constants
+    of its two pieces, so the pieces do not quite meet.
+    """
+    v = np.asarray(linear, np.float64)
+    return np.where(
+        v <= 0.0031308, v * 12.92, 1.055 * np.maximum(v, 0.0031308) ** (1 / 2.4) - 0.055
+    )
+
+
+def palette_from_codes(codes: ArrayLike, low: float = 0, high: float = 255) -> tuple[RGB, ...]:
+    """(n, 3) display codes between `low` and `high` -> n linear colours."""
+    display = (np.asarray(codes, np.float64).reshape(-1, 3) - low) / (high - low)
+    return tuple((float(r), float(g), float(b)) for r, g, b in linear_from_srgb(display))
+
+
+def codes_from_palette(palette: Sequence[RGB], low: int = 0, high: int = 255) -> NDArray[np.int64]:
+    """n linear colours -> (n, 3) int64 nearest display codes; colours above 1 are clipped."""
+    linear = np.clip(np.asarray(palette, np.float64).reshape(-1, 3), 0.0, 1.0)
+    return np.rint(srgb_from_linear(linear) * (high - low) + low).astype(np.int64)
+
+
+def parse_color(text: str, where: str = "colour") -> RGB:
+    """A linear colour from `#rgb` or `#rrggbb` (display codes) or `r,g,b` (linear, at least 0).
+
+    Raises FabricError, naming `where`, for anything else.
+    """
+    accepted = "it must be #rrggbb (display) or three linear numbers, as in 0.2,0.8,1"
+    word = text.strip()
+    if re.fullmatch(r"#([0-9a-fA-F]{3}){1,2}", word):
+        digits = word[1:] if len(word) == 7 else "".join(2 * c for c in word[1:])
+        return palette_from_codes([[int(digits[k : k + 2], 16) for k in (0, 2, 4)]])[0]
+    try:
+        r, g, b = (float(part) for part in word.split(","))
+    except ValueError:
+        raise FabricError(where, f"is '{text[:40]}'; {accepted}") from None
+    if not all(math.isfinite(x) and x >= 0 for x in (r, g, b)):
+        raise FabricError(where, f"is '{text[:40]}'; {accepted}")
+    return (r, g, b)
+
+
+def describe_code(code: Sequence[int] | NDArray[np.uint8]) -> str:
+    """`#rrggbb` for three 8-bit display codes."""
+    return "#" + "".join(f"{int(c):02x}" for c in code)
