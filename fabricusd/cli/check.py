@@ -47,8 +47,8 @@ def run(options: argparse.Namespace) -> int:
     else:
         for finding in findings:
             print(f"{finding.severity}: {finding}")
-    for error in unreadable:
-        print(f"fabricusd: {error}", file=sys.stderr)
+    for refusal in unreadable:
+        print(f"fabricusd: {refusal}", file=sys.stderr)
     errors = sum(finding.severity == "error" for finding in findings)
     warnings = len(findings) - errors
     if not options.quiet and not options.json:

@@ -10,14 +10,18 @@ from fabricusd.fabric import Fabric
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".gif", ".jpg", ".jpeg", ".exr", ".tga", ".webp")
 
 
+def is_draft(source: str | os.PathLike[str]) -> bool:
+    """Whether `source` is a draft or an image by its suffix, and not USD."""
+    return Path(source).suffix.lower() in (".wif", *IMAGE_SUFFIXES)
+
+
 def load_any(source: str | os.PathLike[str]) -> tuple[Fabric, tuple[str, ...]]:
     """(fabric, what was noticed on the way). FabricError as the reader of that kind raises it."""
     text = os.fspath(source)
-    suffix = Path(text).suffix.lower()
-    if suffix == ".wif" or suffix in IMAGE_SUFFIXES:
+    if is_draft(text):
         from fabricusd.schema.weaves import losses, read_image, read_wif, to_fabric
 
-        draft = read_wif(text) if suffix == ".wif" else read_image(text)
+        draft = read_wif(text) if text.lower().endswith(".wif") else read_image(text)
         return to_fabric(draft), (*draft.warnings, *losses(draft))
     from fabricusd.schema.read import load
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 
 from pxr import Usd
 
+from fabricusd.schema.anysource import is_draft, load_any
 from fabricusd.schema.rules import RULES, applies, run
 from fabricusd.schema.source import open_stage
 
@@ -30,8 +32,8 @@ class Finding:
     problem: str
 
     def __str__(self) -> str:
-        place = f"{self.prim} {self.property}".strip()
-        return f"{self.file}: {place} {self.problem} [{self.rule}]"
+        words = " ".join(filter(None, (self.prim, self.property, self.problem)))
+        return f"{self.file}: {words} [{self.rule}]"
 
     def as_dict(self) -> dict[str, str]:
         """For JSON."""
@@ -48,11 +50,14 @@ def check_prim(prim: Usd.Prim, file: str = "") -> Iterator[Finding]:
                 )
 
 
-def check(source: str) -> list[Finding]:
-    """Every finding in a USD file or a preset, in stage order.
+def check(source: str | os.PathLike[str]) -> list[Finding]:
+    """Every finding in a USD file or a preset, in stage order; of a draft, what its import assumed.
 
-    FabricError where the file cannot be opened as USD, or does not compose.
+    FabricError where the file cannot be opened as USD, or does not compose, or is no draft.
     """
+    if is_draft(source):
+        _, notes = load_any(source)
+        return [Finding("DraftIsComplete", "warning", str(source), "", "", note) for note in notes]
     stage, file = open_stage(source)
     findings: list[Finding] = []
     for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):

@@ -81,12 +81,15 @@ def longest_float(cells: np.ndarray[Any, np.dtype[np.bool_]], axis: int) -> int 
     broken = on_top[~on_top.all(axis=1)]
     if len(broken) < len(on_top):
         return None
-    padded = np.zeros((broken.shape[0], 2 * broken.shape[1] + 2), np.int8)
-    padded[:, 1:-1] = np.tile(broken, (1, 2))
-    change = np.diff(padded, axis=1)
-    starts, ends = np.nonzero(change == 1), np.nonzero(change == -1)
-    lengths = ends[1] - starts[1]
-    return int(lengths.max()) if lengths.size else 0
+    longest = 0
+    # A stripe of rows at a time: the run starts and ends of a whole jacquard would take a gigabyte.
+    for first in range(0, len(broken), 128):
+        stripe = broken[first : first + 128]
+        twice = np.zeros((stripe.shape[0], 2 * stripe.shape[1] + 1), np.bool_)
+        twice[:, 1:] = np.tile(stripe, (1, 2))
+        breaks = np.flatnonzero(~twice)
+        longest = max(longest, int(np.diff(np.append(breaks, twice.size)).max()) - 1)
+    return longest
 
 
 def _floats(cells: np.ndarray[Any, np.dtype[np.bool_]]) -> str:

@@ -66,7 +66,8 @@ def generate() -> dict[str, str]:
     plugin.update({"LibraryPath": "", "ResourcePath": ".", "Root": "."})
     validators: dict[str, object] = {"keywords": ["fabricusd"]}
     for rule in RULES:
-        validators[rule.name] = {"doc": rule.doc, "schemaTypes": list(rule.schema_types)}
+        types = {"schemaTypes": list(rule.schema_types)} if rule.schema_types else {}
+        validators[rule.name] = {"doc": rule.doc, **types}
     python_plugin = {
         "Info": {"Validators": validators},
         "LibraryPath": "",

@@ -27,7 +27,7 @@ FABRIC, THREAD, BINDING = "FabricusdFabric", "FabricusdFabricThread", "Fabricusd
 
 @dataclass(frozen=True)
 class Rule:
-    """One rule: its name, its severity, the schema types of the prims that it looks at."""
+    """One rule: its name, its severity, the schema types of the prims it looks at; () for all."""
 
     name: str
     severity: str
@@ -54,7 +54,7 @@ def rule(*schema_types: str, severity: str = "error") -> Callable[[RuleFunction]
 def applies(checked: Rule, prim: Usd.Prim) -> bool:
     """Whether `prim` is of a type that the rule looks at."""
     type_name = f"Fabricusd{prim.GetTypeName()}"
-    if type_name in checked.schema_types:
+    if not checked.schema_types or type_name in checked.schema_types:
         return True
     return BINDING in checked.schema_types and (
         prim.HasAPI("FabricBindingAPI") or prim.HasRelationship("fabric:binding")
@@ -353,15 +353,16 @@ def binding_uv_set_exists(prim: Usd.Prim) -> Iterator[Fault]:
 def threads_per_unit_both(prim: Usd.Prim) -> Iterator[Fault]:
     """Threads per UV unit are given for both axes or for neither."""
     name = "fabric:binding:threadsPerUnit"
-    value = prim.GetAttribute(name).Get()
-    if value is not None and (value[0] == 0) != (value[1] == 0):
-        yield name, f"is ({value[0]:g}, {value[1]:g}); both must be 0, or both above 0"
+    pair = prim.GetAttribute(name).Get()
+    u, v = (float(x) for x in pair) if pair is not None else (0.0, 0.0)
+    if (u == 0) != (v == 0):
+        yield name, f"is ({u:g}, {v:g}); both must be 0, or both above 0"
 
 
-@rule(BINDING, severity="warning")
+@rule(severity="warning")
 def binding_api_applied(prim: Usd.Prim) -> Iterator[Fault]:
     """A prim with a fabric:binding relationship has FabricBindingAPI applied."""
-    if not prim.HasAPI("FabricBindingAPI"):
+    if prim.HasRelationship("fabric:binding") and not prim.HasAPI("FabricBindingAPI"):
         yield "fabric:binding", "is authored, but FabricBindingAPI is not in the prim's apiSchemas"
 
 

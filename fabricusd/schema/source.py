@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from pxr import Sdf, Tf, Usd
+from pxr import Sdf, Tf, Usd, UsdUtils
 
 from fabricusd.errors import FabricError
 from fabricusd.files import readable_file
@@ -47,13 +47,22 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
     if Sdf.FileFormat.FindByExtension(str(path)) is None:
         raise FabricError(str(path), "is not USD; it must be .usda, .usdc, .usd or .usdz")
     require_schema()
+    # USD also prints composition errors as warnings; they are raised below, once.
+    silence = UsdUtils.CoalescingDiagnosticDelegate()
     try:
         layer = Sdf.Layer.FindOrOpen(str(path))
         if layer is None:
             raise FabricError(str(path), "is not USD; it cannot be parsed")
         stage = Usd.Stage.Open(layer)
+        for used in stage.GetUsedLayers():
+            # The process may hold an older reading of the file; edits nobody saved are kept.
+            if not used.dirty and not used.anonymous:
+                used.Reload()
     except Tf.ErrorException as error:
         raise FabricError(str(path), f"cannot be parsed as USD: {_first_line(error)}") from error
+    finally:
+        silence.TakeUncoalescedDiagnostics()
+        del silence
     errors = stage.GetCompositionErrors()
     if errors:
         raise FabricError(str(path), f"does not compose: {_one_line(str(errors[0]))}")

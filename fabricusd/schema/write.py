@@ -22,19 +22,28 @@ def save(fabric: Fabric, path: str | os.PathLike[str], *, clobber: bool = True) 
     target = os.fspath(path)
     if not target.endswith(EXTENSIONS):
         raise FabricError(target, f"has another suffix than {', '.join(EXTENSIONS)}")
-    layer = Sdf.Layer.CreateAnonymous(".usda")
-    stage = Usd.Stage.Open(layer)
-    prim = write_fabric(
-        stage, Sdf.Path.absoluteRootPath.AppendChild(prim_name(fabric.name)), fabric
-    )
-    stage.SetDefaultPrim(prim)
-    stage.SetMetadata("upAxis", "Y")
-    stage.SetMetadata("metersPerUnit", 0.01)
+    layer = _layer(fabric)
     with whole_file(target, clobber=clobber) as temporary:
         try:
             layer.Export(str(temporary))
         except Tf.ErrorException as error:
             raise FabricError(target, f"cannot be written: {error}") from error
+
+
+def usd_text(fabric: Fabric) -> str:
+    """What `save` writes into a .usda file."""
+    return str(_layer(fabric).ExportToString())
+
+
+def _layer(fabric: Fabric) -> Sdf.Layer:
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    stage = Usd.Stage.Open(layer)
+    path = Sdf.Path.absoluteRootPath.AppendChild(prim_name(fabric.name))
+    stage.SetDefaultPrim(write_fabric(stage, path, fabric))
+    # No geometry here, but USD's own validators ask every layer for both.
+    stage.SetMetadata("upAxis", "Y")
+    stage.SetMetadata("metersPerUnit", 0.01)
+    return layer
 
 
 def prim_name(text: str) -> str:

@@ -1,1 +1,28 @@
 """Weaves from a name, an expression, an image or a WIF draft."""
+
+from __future__ import annotations
+
+from fabricusd.schema.weaves.color import parse_color
+from fabricusd.schema.weaves.convert import from_fabric, losses, to_fabric
+from fabricusd.schema.weaves.draft import Draft, with_colors
+from fabricusd.schema.weaves.drawdown import draw
+from fabricusd.schema.weaves.image import read_image
+from fabricusd.schema.weaves.parse import parse_weave
+from fabricusd.schema.weaves.wif import parse_wif, read_wif
+from fabricusd.schema.weaves.wif_write import wif_text, write_wif
+
+__all__ = [
+    "Draft",
+    "draw",
+    "from_fabric",
+    "losses",
+    "parse_color",
+    "parse_weave",
+    "parse_wif",
+    "read_image",
+    "read_wif",
+    "to_fabric",
+    "wif_text",
+    "with_colors",
+    "write_wif",
+]

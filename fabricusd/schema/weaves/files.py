@@ -1,4 +1,4 @@
-"""Opening a file that somebody names: one line of error for each way it can go wrong."""
+"""Opening a draft that somebody names: one line of error for each way it can go wrong."""
 
 from __future__ import annotations
 
@@ -7,46 +7,32 @@ import stat
 from pathlib import Path
 
 from fabricusd.errors import FabricError
+from fabricusd.files import readable_file
 
 LARGEST = 256 * 1024 * 1024
 """Most bytes of a text file: six times a lift plan of 4096 x 4096."""
 
 
-def require_file(path: str | os.PathLike[str], kind: str) -> Path:
-    """`path`, which can be opened, is an ordinary file and not empty; `kind` says what is wanted.
+def ordinary_file(path: str | os.PathLike[str]) -> Path:
+    """`path`, if it is a file that can be opened, has an end, and is not empty.
 
     Raises FabricError otherwise.
     """
-    where, problem = str(path), f"it must be {kind}"
     try:
-        found = os.stat(path)
-        if stat.S_ISDIR(found.st_mode):
-            raise FabricError(where, f"is a directory; {problem}")
-        if not stat.S_ISREG(found.st_mode):
-            raise FabricError(where, f"is not an ordinary file; {problem}")
-        if found.st_size == 0:
-            raise FabricError(where, f"is empty; {problem}")
-        with open(path, "rb"):
-            pass
-    except FabricError:
-        raise
-    except FileNotFoundError:
-        raise FabricError(where, f"does not exist; {problem}") from None
-    except PermissionError:
-        raise FabricError(where, f"may not be read by you; {problem} that you can read") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise FabricError(where, f"cannot be opened ({reason}); {problem}") from None
-    return Path(path)
+        mode = os.stat(path).st_mode
+    except OSError:
+        return readable_file(path)  # which says why not
+    except ValueError as error:
+        raise FabricError(repr(str(path)), f"is no file name: {error}") from None
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise FabricError(str(path), "is a pipe or a device; it must be a file")
+    return readable_file(path)
 
 
-def read_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
+def read_bytes(path: str | os.PathLike[str]) -> bytes:
     """The whole of a file of at most `LARGEST` bytes; FabricError where that is not possible."""
-    file = require_file(path, kind)
-    with file.open("rb") as stream:
+    with ordinary_file(path).open("rb") as stream:
         data = stream.read(LARGEST + 1)
     if len(data) > LARGEST:
-        raise FabricError(
-            str(path), f"is {file.stat().st_size} bytes; it must be at most {LARGEST}"
-        )
+        raise FabricError(str(path), f"is longer than the {LARGEST} bytes of the largest draft")
     return data

@@ -20,7 +20,7 @@ from fabricusd.fabric import Weave
 from fabricusd.schema.weaves.color import palette_from_codes
 from fabricusd.schema.weaves.draft import LIMIT, Draft, quoted
 from fabricusd.schema.weaves.files import read_bytes
-from fabricusd.schema.weaves.wif_text import UNIT_ALIASES, UNITS, Section, decode, read_sections
+from fabricusd.schema.weaves.wif_syntax import UNIT_ALIASES, UNITS, Section, decode, read_sections
 
 LARGEST_CODE = 65535
 """Largest display code of a colour: 16 bits."""
@@ -37,7 +37,7 @@ def read_wif(path: str | os.PathLike[str]) -> Draft:
     A draft without a title is called by its file's stem. `warnings` says what was missing and
     assumed. Raises FabricError, one line naming file, section and key, for what is wrong.
     """
-    return parse_wif(decode(read_bytes(path, "a WIF file")), str(path))
+    return parse_wif(decode(read_bytes(path)), str(path))
 
 
 def parse_wif(text: str, file: str = "draft.wif") -> Draft:

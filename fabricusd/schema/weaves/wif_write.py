@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from decimal import Decimal
 
@@ -9,6 +10,7 @@ import numpy as np
 
 import fabricusd
 from fabricusd.errors import FabricError
+from fabricusd.files import whole_file
 from fabricusd.schema.weaves.color import codes_from_palette, palette_from_codes
 from fabricusd.schema.weaves.draft import LIMIT, Draft, Side
 from fabricusd.schema.weaves.loom import thread_loom
@@ -24,7 +26,17 @@ SECTIONS = (
 """What may be written, in WIF's order."""
 
 
-def write_wif(draft: Draft) -> str:
+def write_wif(draft: Draft, path: str | os.PathLike[str], *, clobber: bool = True) -> None:
+    """Write `draft` to the file `path`, which appears whole; `clobber` allows replacing it.
+
+    Raises FabricError where it cannot be written.
+    """
+    text = wif_text(draft)
+    with whole_file(path, clobber=clobber) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def wif_text(draft: Draft) -> str:
     """The text of a WIF file, to be encoded as UTF-8, from which `parse_wif` reads `draft` again.
 
     Colours are written in the draft's own range where that holds them exactly, else in 16 bits;

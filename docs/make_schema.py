@@ -1,0 +1,56 @@
+"""Write docs/schema.md from the registered schema and the rules."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pxr import Sdf, Usd
+
+from fabricusd.schema.rules import RULES
+
+HERE = Path(__file__).resolve().parent
+TYPES = (
+    ("Fabric", "A prim type."),
+    ("FabricThread", "A prim type; a child of its Fabric, or anywhere by relationship."),
+    ("FabricBindingAPI", "A single-apply API schema, on a Mesh or a GeomSubset."),
+)
+
+
+def table(name: str) -> list[str]:
+    """One row for each property of one schema type."""
+    registry = Usd.SchemaRegistry()
+    definition = registry.FindConcretePrimDefinition(name)
+    definition = definition or registry.FindAppliedAPIPrimDefinition(name)
+    rows = ["| property | type | fallback | meaning |", "|---|---|---|---|"]
+    for prop in definition.GetPropertyNames():
+        if definition.GetSpecType(prop) != Sdf.SpecTypeAttribute:
+            kind, fallback = "rel", ""
+        else:
+            attribute = definition.GetAttributeDefinition(prop)
+            kind, fallback = str(attribute.GetTypeName()), str(attribute.GetFallbackValue())
+            if allowed := attribute.GetMetadata("allowedTokens"):
+                kind = " \\| ".join(allowed)
+        rows.append(
+            f"| `{prop}` | {kind} | {fallback} | {definition.GetPropertyDocumentation(prop)} |"
+        )
+    return rows
+
+
+def main() -> None:
+    """Write the page."""
+    lines = [
+        "# The schema",
+        "",
+        "Made by `make docs` from the schema itself; edit `schema.usda`.",
+        "",
+    ]
+    for name, what in TYPES:
+        lines += [f"## {name}", "", what, "", *table(name), ""]
+    lines += ["## Rules", "", "What `fabricusd check` and USD's own validation report.", ""]
+    lines += ["| rule | severity | holds where |", "|---|---|---|"]
+    lines += [f"| {rule.name} | {rule.severity} | {rule.doc} |" for rule in RULES]
+    (HERE / "schema.md").write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,156 @@
+"""The schema as other tools meet it: plain usd-core, with the plugin path and without."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+
+import pytest
+from pxr import Sdf, Usd
+
+from fabricusd.fabric import MODELS, Binding, Fabric, Thread, ThreadSet
+from fabricusd.schema import PLUGIN_PATH, attributes, load, save
+from fabricusd.schema.generate import generate
+
+TYPES = ("Fabric", "FabricThread")
+DEFINITIONS = [*TYPES, "FabricBindingAPI"]
+
+
+def definition(name: str) -> Usd.PrimDefinition:
+    registry = Usd.SchemaRegistry()
+    if name in TYPES:
+        return registry.FindConcretePrimDefinition(name)
+    return registry.FindAppliedAPIPrimDefinition(name)
+
+
+def own_properties() -> list[tuple[str, str]]:
+    return [
+        (name, prop)
+        for name in DEFINITIONS
+        for prop in definition(name).GetPropertyNames()
+        if prop.startswith(("fabric:", "thread:"))
+    ]
+
+
+def plain_usd(script: str, *arguments: str, plugin: bool) -> dict:
+    """Run a script in a process that has usd-core and knows nothing of fabricusd."""
+    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH",)}
+    environment.pop("PXR_PLUGINPATH_NAME", None)
+    if plugin:
+        environment["PXR_PLUGINPATH_NAME"] = str(PLUGIN_PATH)
+    done = subprocess.run(
+        [sys.executable, "-c", script, *arguments],
+        capture_output=True, text=True, env=environment, cwd="/", check=True,
+    )  # fmt: skip
+    return json.loads(done.stdout)
+
+
+LOOK = """
+import json, sys
+from pxr import Usd
+stage = Usd.Stage.Open(sys.argv[1])
+prim = stage.GetDefaultPrim()
+thread = prim.GetChildren()[0]
+fallback = Usd.Stage.CreateInMemory()
+fallback = fallback.DefinePrim("/A", "Fabric").GetAttribute("fabric:warp:density").Get()
+print(json.dumps({
+    "defined": Usd.SchemaRegistry().FindConcretePrimDefinition("Fabric") is not None,
+    "names": [str(p.GetTypeName()) for p in (prim, thread)],
+    "typed": [p.IsA(Usd.Typed) for p in (prim, thread)],
+    "fallback": fallback,
+    "authored": stage.GetRootLayer().ExportToString(),
+}))
+"""
+
+
+def test_a_stage_authored_here_opens_in_plain_usd_with_typed_prims(tmp_path):
+    save(load("velvet"), tmp_path / "velvet.usda")
+    seen = plain_usd(LOOK, str(tmp_path / "velvet.usda"), plugin=True)
+    assert seen["defined"]
+    assert seen["names"] == ["Fabric", "FabricThread"]
+    assert seen["typed"] == [True, True]
+    assert seen["fallback"] == 20.0
+
+
+def test_without_the_plugin_it_still_opens_and_nothing_is_lost(tmp_path):
+    save(load("velvet"), tmp_path / "velvet.usda")
+    seen = plain_usd(LOOK, str(tmp_path / "velvet.usda"), plugin=False)
+    assert not seen["defined"]
+    assert seen["names"] == ["Fabric", "FabricThread"]
+    assert seen["typed"] == [False, False]
+    again = tmp_path / "again.usda"
+    again.write_text(seen["authored"])
+    assert load(again) == load("velvet")
+
+
+def test_a_schema_registered_too_late_is_reported():
+    script = f"""
+import sys, json
+sys.path.insert(0, {str(PLUGIN_PATH.parents[2])!r})
+from pxr import Usd
+Usd.SchemaRegistry().FindConcretePrimDefinition("Mesh")
+import fabricusd
+try:
+    fabricusd.load("velvet")
+except fabricusd.FabricError as error:
+    print(json.dumps(str(error)))
+"""
+    assert "PXR_PLUGINPATH_NAME" in plain_usd(script, plugin=False)
+
+
+def test_the_plugin_folder_is_what_usd_gen_schema_makes_of_the_source():
+    pytest.importorskip("jinja2")
+    for name, text in generate().items():
+        assert (PLUGIN_PATH / name).read_text() == text, f"{name} is stale; run `make schema`"
+
+
+@pytest.mark.parametrize(("owner", "prop"), own_properties())
+def test_every_attribute_has_a_doc_and_says_its_unit(owner, prop):
+    doc = definition(owner).GetPropertyDocumentation(prop)
+    assert len(doc) > 8
+    if definition(owner).GetSpecType(prop) == Sdf.SpecTypeAttribute:
+        assert "Unit: " in doc
+
+
+@pytest.mark.parametrize(("owner", "prop"), own_properties())
+def test_every_attribute_has_a_fallback_and_every_token_its_allowed_values(owner, prop):
+    if definition(owner).GetSpecType(prop) != Sdf.SpecTypeAttribute:
+        return
+    attribute = definition(owner).GetAttributeDefinition(prop)
+    assert attribute.GetFallbackValue() is not None
+    if attribute.GetTypeName() == "token" and prop != "fabric:binding:uvSet":
+        assert set(MODELS) <= set(attribute.GetMetadata("allowedTokens"))
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [*attributes.THREAD, *attributes.FABRIC, *attributes.BINDING,
+     *attributes.thread_set("warp"), *attributes.thread_set("weft")],
+    ids=lambda entry: entry.name,
+)  # fmt: skip
+def test_fallbacks_and_types_agree_with_the_dataclasses(entry):
+    owner = (
+        "FabricBindingAPI"
+        if entry.owner is Binding
+        else ("FabricThread" if entry.owner is Thread else "Fabric")
+    )
+    attribute = definition(owner).GetAttributeDefinition(entry.name)
+    assert attribute.GetTypeName() == entry.type_name
+    fallback = attributes.to_si(attribute.GetFallbackValue(), entry)
+    made = {
+        Thread: Thread(),
+        ThreadSet: ThreadSet(),
+        Fabric: Fabric(),
+        Binding: Binding(fabric=Fabric()),
+    }[entry.owner]
+    if fallback is None:
+        assert getattr(made, entry.field) is None
+    else:
+        assert fallback == pytest.approx(getattr(made, entry.field), rel=1e-15)
+
+
+def test_documented_degrees_are_read_as_radians():
+    assert load("linen_plain").threads["Linen"].gamma_surface == pytest.approx(math.radians(12))

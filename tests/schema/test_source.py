@@ -1,0 +1,125 @@
+"""Sources that cannot be read: one line, with the place, and nothing else."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from fabricusd import FabricError
+from fabricusd.schema import check, load, save
+
+TWO = """#usda 1.0
+def Fabric "A"
+{
+    def FabricThread "T"
+    {
+    }
+}
+def Fabric "B" (references = </A>)
+{
+}
+def Xform "C"
+{
+}
+"""
+
+
+def write(tmp_path, name, content):
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return str(path)
+
+
+CASES = {
+    "a preset that does not exist": (None, "linnen", "is no file; presets are .*linen_plain"),
+    "a missing file": (None, "nowhere.usda", "nowhere.usda is no file"),
+    "an empty file": (("e.usda", b""), "{}", "is empty"),
+    "a text that is no USD": (("t.usda", "hello"), "{}", "cannot be parsed as USD"),
+    "a truncated USD text": (("t.usda", '#usda 1.0\ndef Fabric "A" {'), "{}", r"t.usda:2"),
+    "a truncated binary": (("t.usdc", b"PXR-USDC\0\0"), "{}", "cannot be parsed as USD"),
+    "another kind of file": (("t.txt", "hello"), "{}", "is not USD; it must be .usda"),
+    "a stage without a fabric": (("x.usda", '#usda 1.0\ndef Xform "X"\n{\n}\n'), "{}",
+                                 "holds no Fabric prim"),
+    "two fabrics and none named": (("two.usda", TWO), "{}", "holds 2 fabrics; name one of .*:/A"),
+    "a prim path of nothing": (("two.usda", TWO), "{}:/Nowhere", ":/Nowhere is no prim"),
+    "a prim of another type": (("two.usda", TWO), "{}:/C", ":/C is Xform; it must be a Fabric"),
+    "no prim path at all": (("two.usda", TWO), "{}:/a b", "is no prim path"),
+    "a reference to nowhere": (
+        ("r.usda", '#usda 1.0\ndef Fabric "A" (references = @gone.usda@)\n{\n}\n'), "{}",
+        "does not compose: .*gone.usda"),
+    "a layer that includes itself": (
+        ("s.usda", '#usda 1.0\n(\nsubLayers = [@s.usda@]\n)\ndef Fabric "A"\n{\n}\n'), "{}",
+        "does not compose"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_broken_source_is_one_clear_line(case, tmp_path, capfd):
+    file, source, message = CASES[case]
+    if file:
+        source = source.format(write(tmp_path, *file))
+    with pytest.raises(FabricError, match=message) as caught:
+        load(source)
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("reader", [load, check])
+def test_a_directory_is_refused(reader, tmp_path):
+    with pytest.raises(FabricError, match="is a directory"):
+        reader(tmp_path)
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root may read everything")
+def test_a_file_without_permission_is_refused(tmp_path):
+    path = write(tmp_path, "a.usda", TWO)
+    os.chmod(path, 0)
+    with pytest.raises(FabricError, match="cannot be read: Permission denied"):
+        load(path)
+
+
+def test_a_prim_path_chooses_the_fabric(tmp_path):
+    assert load(write(tmp_path, "two.usda", TWO) + ":/B").name == "B"
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("cloth.txt", "has another suffix"),
+        ("nowhere/cloth.usda", "is no directory"),
+        ("taken.usda", "is a directory"),
+    ],
+)
+def test_an_output_that_cannot_be_written_is_refused_and_leaves_nothing(name, message, tmp_path):
+    (tmp_path / "taken.usda").mkdir()
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(FabricError, match=message):
+        save(load("velvet"), tmp_path / name)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_no_clobber_keeps_what_is_there(tmp_path):
+    target = tmp_path / "cloth.usda"
+    save(load("velvet"), target)
+    kept = target.read_bytes()
+    with pytest.raises(FabricError, match="exists"):
+        save(load("linen_plain"), target, clobber=False)
+    assert target.read_bytes() == kept
+
+
+def test_a_write_that_fails_half_way_leaves_the_old_file_whole(tmp_path, monkeypatch):
+    from pathlib import Path
+
+    target = tmp_path / "cloth.usda"
+    save(load("velvet"), target)
+    kept = target.read_bytes()
+
+    def full(self, _target):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(FabricError, match="No space left on device"):
+        save(load("linen_plain"), target)
+    assert target.read_bytes() == kept
+    assert [p.name for p in tmp_path.iterdir()] == ["cloth.usda"]
