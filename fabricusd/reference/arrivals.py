@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
+from fabricusd.appearance.real import LEAN
 from fabricusd.reference.counter import four_uniform
 from fabricusd.reference.embree import (
     DX,
@@ -71,7 +72,6 @@ from fabricusd.reference.wave import (
 from fabricusd.reference.wave import PRIMITIVE as TRIANGLE
 
 R = np.float32
-FAST = {"contract", "reassoc", "arcp", "nsz"}
 FAR = R(1e30)
 
 MIS, LIGHT_ONLY, SURFACE_ONLY, UNIFORM = range(4)
@@ -82,7 +82,7 @@ NUMBERS_PER_STEP = 4
 """Counters that a step of a path may use, see `counter.four_uniform`."""
 
 
-@njit(cache=True, nogil=True)
+@njit(**LEAN)
 def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, dome, film, keys,
            triangle_material, material_levels, records, level, repeats, pixels, samples, first,
            seed, counts):  # fmt: skip
@@ -128,7 +128,7 @@ def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, do
         counts[keys[k]] += 1
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _level_of(footprint, repeat, u):
     """Level for a footprint in threads, blended at random between neighbours [MODEL section 8]."""
     # Half a repeat to one repeat: weave to far. A quarter to an eighth of a thread: to thread.
@@ -139,7 +139,7 @@ def _level_of(footprint, repeat, u):
     return THREAD_LEVEL if u < share else WEAVE_LEVEL
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _meet_lights(k, depth, estimator, lights, dome, reach, lanes, lane_tags, film,
                  ox, oy, oz, dx, dy, dz):  # fmt: skip
     """Add what the ray of lane `k` sees of every light before `reach`."""
@@ -165,7 +165,7 @@ def _meet_lights(k, depth, estimator, lights, dome, reach, lanes, lane_tags, fil
         film[row + 2, path] += blue * lanes[LANE_BETA + 2, k]
 
 
-@njit(cache=True, nogil=True, fastmath=FAST)
+@njit(**LEAN)
 def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, records, lights, dome,
             surfaces, epsilon, pixels, samples, first, seed, film, hits, tags):  # fmt: skip
     """Turn each lane with a key into a hit at the next place of its queue.
@@ -211,7 +211,7 @@ def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, recor
             film[row + 2, path] += blue * hits[BETA + 2, h]
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(**LEAN)
 def _frame(record, u, v, dx, dy, dz, epsilon, hits, h):
     """Write place, frame and the origins of new rays; returns the cosine to the true normal."""
     w = R(1) - u - v
@@ -280,7 +280,7 @@ def _frame(record, u, v, dx, dy, dz, epsilon, hits, h):
     return cosine
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(**LEAN)
 def _choose_direction(estimator, lights, dome, c0, c1, c2, c3, hits, h):
     """Write the direction to a light, what arrives from there, and its pdf."""
     hits[LIGHT_PDF, h] = R(0)

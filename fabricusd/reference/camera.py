@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.real import cos, sin
+from fabricusd.appearance.real import INLINE, LEAN, cos, sin
 from fabricusd.errors import FabricError
 from fabricusd.reference.counter import four_uniform
 from fabricusd.reference.embree import DX, DY, DZ, GEOMETRY, MISS, OX, OY, OZ, TFAR, TNEAR
@@ -85,7 +85,7 @@ def build_lens(
     )  # fmt: skip
 
 
-@njit(inline="always")
+@njit(**INLINE)
 def _filter_offset(kind, u, v):
     """Place in a pixel's filter, its centre at 0."""
     if kind == 0:
@@ -96,7 +96,7 @@ def _filter_offset(kind, u, v):
     return tent + v - R(0.5)
 
 
-@njit(cache=True, nogil=True)
+@njit(**LEAN)
 def camera_rays(lens, width, pixels, first, samples, seed, rays, cone):
     """Write the rays of `samples` samples of each of `pixels`, from sample `first` on.
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fabricusd.appearance.real import INLINE, LEAN
+
 R = np.float32
 _U = np.uint32
 
 
-@njit(inline="always")
+@njit(**INLINE)
 def _mix(x, y, z, w):
     x = _U(x + y * w)
     y = _U(y + z * x)
@@ -22,7 +24,7 @@ def _mix(x, y, z, w):
     return x, y, z, w
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def pcg4d(a, b, c, d):
     """Hash four uint32 into four uint32."""
     x = _U(_U(a) * _U(1664525) + _U(1013904223))
@@ -37,13 +39,13 @@ def pcg4d(a, b, c, d):
     return _mix(x, y, z, w)
 
 
-@njit(inline="always")
+@njit(**INLINE)
 def unit_float(x):
     """A uint32 as a float32 in [0, 1), by its upper 24 bits."""
     return R(np.int32(x >> _U(8))) * R(5.9604645e-08)
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def four_uniform(pixel, sample, dimension, seed):
     """Four independent float32 in [0, 1)."""
     x, y, z, w = pcg4d(pixel, sample, dimension, seed)

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.real import acos, atan2, cos, sin
+from fabricusd.appearance.real import KERNEL, LEAN, acos, atan2, cos, sin
 
 R = np.float32
 _PI = R(math.pi)
@@ -65,7 +65,7 @@ def alias_table(share: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[
     return other, kept.astype(np.float32)
 
 
-@njit(cache=True)
+@njit(**KERNEL)
 def _fill_alias(level, kept, other):
     n = len(level)
     small, large = np.empty(n, np.int64), np.empty(n, np.int64)
@@ -89,7 +89,7 @@ def _fill_alias(level, kept, other):
             few += 1
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def place_of(dome, x, y, z):
     """World direction to picture coordinates (column, row) in texels, sin of the polar angle."""
     m = dome.rotation
@@ -104,7 +104,7 @@ def place_of(dome, x, y, z):
     return u * R(w), v * R(h), math.sqrt(max(a * a + c * c, R(1e-12)))
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def radiance_at(dome, column, row):
     """Bilinear lookup: (r, g, b)."""
     image = dome.image
@@ -126,14 +126,14 @@ def radiance_at(dome, column, row):
     return red, green, blue
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def density_at(dome, column, row, sine):
     """Probability [1/sr] with which `sample_dome` gives this place."""
     h, w = dome.density.shape
     return dome.density[min(int(row), h - 1), min(int(column), w - 1)] / sine
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def sample_dome(dome, u0, u1, u2):
     """A world direction and its (column, row, pdf [1/sr]) from three uniform numbers."""
     h, w = dome.density.shape

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabricusd.appearance.real import LEAN
 from fabricusd.errors import FabricError
 from fabricusd.reference.wave import (
     ALBEDO,
@@ -137,7 +138,7 @@ class Film:
         return {name: self.layer(name) for name in names}
 
 
-@njit(cache=True, nogil=True)
+@njit(**LEAN)
 def _add(pixels, samples, rows, sums, beauty, squares, counts):  # type: ignore[no-untyped-def]
     for i in range(pixels.shape[0]):
         pixel = pixels[i]

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.real import cos, sin
+from fabricusd.appearance.real import LEAN, cos, sin
 from fabricusd.reference.dome import (
     LUMINANCE,
     Dome,
@@ -123,7 +123,7 @@ def _merge_domes(domes: list[Light]) -> Dome:
     return build_dome(total, np.eye(3))
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _add_dome(total, dome):
     h, w = total.shape[0], total.shape[1]
     for j in range(h):
@@ -148,7 +148,7 @@ def _rotation(frame: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([x, y, z * np.sign(z @ frame[:3, 2] or 1.0)])
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def choose_light(table, u):
     """Index of the light that a uniform number chooses."""
     last = table.shape[0] - 1
@@ -159,7 +159,7 @@ def choose_light(table, u):
     return last
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _to_surface(light, px, py, pz, qx, qy, qz, cosine_of):
     """Direction, distance and pdf towards a point q of the light whose normal is `cosine_of`."""
     dx, dy, dz = qx - px, qy - py, qz - pz
@@ -174,7 +174,7 @@ def _to_surface(light, px, py, pz, qx, qy, qz, cosine_of):
     return dx, dy, dz, distance, light[CHANCE] * square / (cosine * light[AREA])
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _cone(light, ax, ay, az, one_minus_cos, u0, u1):
     """A direction in the cone around the unit axis a, uniform by solid angle, and its pdf."""
     down = u0 * one_minus_cos
@@ -190,7 +190,7 @@ def _cone(light, ax, ay, az, one_minus_cos, u0, u1):
     return x, y, z, light[CHANCE] / (R(2) * _PI * one_minus_cos)
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def sample_light(light, dome, px, py, pz, u0, u1, u2):
     """Towards one light from p, by three uniform numbers: (dx, dy, dz, distance, r, g, b, pdf).
 
@@ -244,7 +244,7 @@ def sample_light(light, dome, px, py, pz, u0, u1, u2):
     return dx, dy, dz, distance, red, green, blue, pdf
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def hit_light(light, dome, px, py, pz, dx, dy, dz, reach):
     """What a ray sees of one light nearer than `reach`: (r, g, b, pdf); pdf 0 where nothing."""
     kind = int(light[KIND])
@@ -288,7 +288,7 @@ def hit_light(light, dome, px, py, pz, dx, dy, dz, reach):
     return red, green, blue, light[CHANCE] * t * t / (cosine * light[AREA])
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _hit_plane(light, kind, ax, ay, az, dx, dy, dz):
     """Distance to a rect or disk and the cosine there; distance 0 for a miss."""
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
@@ -305,7 +305,7 @@ def _hit_plane(light, kind, ax, ay, az, dx, dy, dz):
     return (t if inside else R(0)), cosine
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def _hit_tube(light, ax, ay, az, dx, dy, dz):
     """Distance to the outside of a cylinder and the cosine there; distance 0 for a miss."""
     xx, xy, xz = light[X], light[X + 1], light[X + 2]

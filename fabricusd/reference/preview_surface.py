@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.real import cos, sin
+from fabricusd.appearance.real import INLINE, LEAN, cos, sin
 from fabricusd.reference.scene import PreviewSurface, Scene, Texture
 from fabricusd.reference.wave import (
     CHANCE,
@@ -33,7 +33,6 @@ from fabricusd.reference.wave import (
 
 R = np.float32
 _PI = R(math.pi)
-FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 # Columns of the table of surfaces; each *_MAP is an index into the textures, or -1.
 DIFFUSE, METALLIC, ROUGHNESS, IOR, OPACITY, THRESHOLD, EMISSIVE = 0, 3, 4, 5, 6, 7, 8
@@ -89,7 +88,7 @@ def _map_row(texture: Texture, start: int) -> list[int]:
     return [start, h, w, c, _WRAPS.index(texture.wrap[0]), _WRAPS.index(texture.wrap[1])]
 
 
-@njit(inline="always")
+@njit(**INLINE)
 def _wrapped(i, n, mode):
     """Texel index `i` brought into [0, n), or -1 for black."""
     if mode == 0:
@@ -102,7 +101,7 @@ def _wrapped(i, n, mode):
     return i if 0 <= i < n else -1
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def texture_at(surfaces, index, u, v):
     """Bilinear lookup: (r, g, b); v grows upwards from the bottom row."""
     m = surfaces.maps[index]
@@ -126,7 +125,7 @@ def texture_at(surfaces, index, u, v):
     return red, green, blue
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def opacity_at(surfaces, material, u, v):
     """Share of the light that does not go straight through."""
     row = surfaces.table[material]
@@ -138,7 +137,7 @@ def opacity_at(surfaces, material, u, v):
     return min(max(opacity, R(0)), R(1))
 
 
-@njit(cache=True)
+@njit(**LEAN)
 def emission_at(surfaces, material, u, v):
     """Radiance that the surface itself sends out: (r, g, b)."""
     row = surfaces.table[material]
@@ -147,14 +146,14 @@ def emission_at(surfaces, material, u, v):
     return row[EMISSIVE], row[EMISSIVE + 1], row[EMISSIVE + 2]
 
 
-@njit(inline="always")
+@njit(**INLINE)
 def _fresnel(f0, f90, c):
     d = R(1) - c
     d2 = d * d
     return f0 + (f90 - f0) * d2 * d2 * d
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(**LEAN)
 def _evaluate(red, green, blue, metallic, alpha, f0, share, ox, oy, oz, ix, iy, iz):
     """f times cosine (r, g, b) and pdf of `wi`, both directions above the surface."""
     if iz <= R(0) or oz <= R(0):
@@ -185,7 +184,7 @@ def _evaluate(red, green, blue, metallic, alpha, f0, share, ox, oy, oz, ix, iy, 
     )
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(**LEAN)
 def _sample(alpha, share, ox, oy, oz, u0, u1, u2):
     """A direction for `wi`: GGX by visible normals with the chance `share`, else by cosine."""
     phi = R(2) * _PI * u1
@@ -205,7 +204,7 @@ def _sample(alpha, share, ox, oy, oz, u0, u1, u2):
     return d * hx - ox, d * hy - oy, d * hz - oz
 
 
-@njit(cache=True, nogil=True, fastmath=FAST)
+@njit(**LEAN)
 def shade_preview(surfaces, hits, tags, first, last):
     """Evaluate and sample the surface of hits first..last: rows F, F_PDF, GO, WEIGHT, GO_PDF."""
     for k in range(first, last):
