@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
+from fabricusd.appearance.footprint import level_weights, pick_level
 from fabricusd.appearance.real import LEAN
 from fabricusd.reference.counter import four_uniform
 from fabricusd.reference.embree import (
@@ -22,6 +23,9 @@ from fabricusd.reference.embree import (
     HIT_U,
     HIT_V,
     MISS,
+    NGX,
+    NGY,
+    NGZ,
     OX,
     OY,
     OZ,
@@ -59,9 +63,7 @@ from fabricusd.reference.wave import (
     PLACE,
     SIDE,
     SPREAD,
-    THREAD_LEVEL,
     TO_LIGHT,
-    WEAVE_LEVEL,
     WI,
     WIDTH,
     WO,
@@ -81,16 +83,19 @@ AUTO_LEVEL = 3
 NUMBERS_PER_STEP = 4
 """Counters that a step of a path may use, see `counter.four_uniform`."""
 
+QUEUES = 6
+"""Queues of a material: three levels, two sides."""
+
 
 @njit(**LEAN)
 def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, dome, film, keys,
-           triangle_material, material_levels, records, level, repeats, pixels, samples, first,
+           triangle_material, repeats, records, level, pixels, samples, first,
            seed, counts):  # fmt: skip
     """Add the light that rays met, and give each lane that goes on the key of its queue, else -1.
 
-    material_levels : (materials,) int32 - 1 where the surface has levels of detail; repeats :
-    (materials,) float32 - threads of a repeat. counts : (3 materials,) int64, filled with the
-    length of each queue, keyed by `3 material + level`.
+    repeats : (materials, 2) float32 - ends and picks of a fabric's repeat, 0 where the surface has
+    no levels. counts : (QUEUES materials,) int64, filled with the length of each queue, which is
+    keyed by `(3 material + level) 2 + back`.
     """
     counts[:] = 0
     whole = rays.view(np.uint32)
@@ -111,8 +116,11 @@ def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, do
             continue
         triangle = whole[p, PRIMITIVE, lane]
         material = triangle_material[triangle]
+        nx, ny, nz = rays[p, NGX, lane], rays[p, NGY, lane], rays[p, NGZ, lane]
+        cosine = dx * nx + dy * ny + dz * nz
+        back = 1 if cosine > R(0) else 0
         queue = FAR_LEVEL
-        if material_levels[material]:
+        if repeats[material, 0] > R(0):
             queue = level
             if level == AUTO_LEVEL:
                 width = lanes[LANE_WIDTH, k] + reach * lanes[LANE_SPREAD, k]
@@ -123,20 +131,24 @@ def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, do
                     np.uint32(2 + NUMBERS_PER_STEP * step + 2),
                     seed,
                 )
-                queue = _level_of(width * records[triangle, RATE], repeats[material], u)
-        keys[k] = 3 * material + queue
+                inverse = (nx * nx + ny * ny + nz * nz) / max(cosine * cosine, R(1e-30))
+                record = records[triangle]
+                queue = _level_of(record, width, inverse, repeats[material], dx, dy, dz, u)
+        keys[k] = (3 * material + queue) * 2 + back
         counts[keys[k]] += 1
 
 
 @njit(**LEAN)
-def _level_of(footprint, repeat, u):
-    """Level for a footprint in threads, blended at random between neighbours [MODEL section 8]."""
-    # Half a repeat to one repeat: weave to far. A quarter to an eighth of a thread: to thread.
-    if footprint >= R(0.5) * repeat:
-        share = min(max(footprint / (R(0.5) * repeat) - R(1), R(0)), R(1))
-        return FAR_LEVEL if u < share else WEAVE_LEVEL
-    share = min(max(R(2) - R(8) * footprint, R(0)), R(1))
-    return THREAD_LEVEL if u < share else WEAVE_LEVEL
+def _level_of(record, width, inverse, repeat, dx, dy, dz, u):
+    """Level for a ray's cone of `width` where `inverse` is one over the squared cosine."""
+    # A cone's cut with the surface is longer along the ray than across it.
+    a = dx * record[TANGENTS] + dy * record[TANGENTS + 1] + dz * record[TANGENTS + 2]
+    along, flat = a * a * inverse, inverse - R(1)
+    extent_u = width * record[RATE] * math.sqrt(R(1) + along)
+    extent_v = width * record[RATE + 1] * math.sqrt(R(1) + max(flat - along, R(0)))
+    far, weave, _ = level_weights(R, repeat[0], repeat[1], extent_u, extent_v)
+    level, _ = pick_level(R, far, weave, u)
+    return level
 
 
 @njit(**LEAN)
@@ -184,7 +196,7 @@ def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, recor
         record = records[triangle]
         path = lane_tags[0, k]
         tags[PATH, h], tags[DEPTH, h] = path, lane_tags[1, k]
-        tags[TRIANGLE, h], tags[MATERIAL, h], tags[LEVEL, h] = triangle, key // 3, key % 3
+        tags[TRIANGLE, h], tags[MATERIAL, h], tags[LEVEL, h] = triangle, key // 6, (key // 2) % 3
         dx, dy, dz = rays[p, DX, lane], rays[p, DY, lane], rays[p, DZ, lane]
         u, v = rays[p, HIT_U, lane], rays[p, HIT_V, lane]
         cosine = _frame(record, u, v, dx, dy, dz, epsilon, hits, h)
@@ -203,7 +215,7 @@ def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, recor
         hits[CHANCE + 2, h], hits[CHANCE + 3, h] = c2, c3
         c0, c1, c2, c3 = four_uniform(pixel, sample, dimension + np.uint32(1), seed)
         _choose_direction(estimator, lights, dome, c0, c1, c2, c3, hits, h)
-        red, green, blue = emission_at(surfaces, key // 3, hits[PLACE, h], hits[PLACE + 1, h])
+        red, green, blue = emission_at(surfaces, key // 6, hits[PLACE, h], hits[PLACE + 1, h])
         if red + green + blue > R(0) and cosine > R(0):
             row = DIRECT if lane_tags[1, k] <= 1 else INDIRECT
             film[row, path] += red * hits[BETA, h]

@@ -11,16 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.compiled import true_repeat
 from fabricusd.errors import FabricError
 from fabricusd.reference import arrivals
-from fabricusd.reference.arrivals import AUTO_LEVEL, arrive, prepare
+from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, arrive, prepare
 from fabricusd.reference.camera import Lens, camera_rays
 from fabricusd.reference.departures import depart, record_first, settle, thin_out
 from fabricusd.reference.embree import Accelerator
+from fabricusd.reference.fabric_surface import FabricShader
 from fabricusd.reference.lights import build_lights
 from fabricusd.reference.preview_surface import OPACITY, OPACITY_MAP, build_surfaces, shade_preview
 from fabricusd.reference.scene import FabricSurface, Scene
-from fabricusd.reference.triangles import build_tables, repeat
+from fabricusd.reference.triangles import build_tables
 from fabricusd.reference.wave import (
     BEAUTY_ROWS,
     FAR_LEVEL,
@@ -77,15 +79,16 @@ class Tracer:
         self.epsilon = np.float32(1e-7 * self.tables.radius + 1e-12)
         count = max(len(scene.materials), 1)
         self.shaders: list[Any] = [None] * count
-        self._levels = np.zeros(count, np.int32)
-        self._repeats = np.ones(count, np.float32)
+        self._repeats = np.zeros((count, 2), np.float32)
         self.opacity = np.where(
             self.surfaces.table[:, OPACITY_MAP] >= 0, -1.0, self.surfaces.table[:, OPACITY]
         ).astype(np.float32)
         for k, surface in enumerate(scene.materials):
             if isinstance(surface, FabricSurface):
-                self._repeats[k] = max(repeat(surface.binding.fabric))
-                self._levels[k] = 1
+                fabric = surface.binding.fabric
+                self._repeats[k] = true_repeat(fabric)
+                self.shaders[k] = FabricShader(fabric, shadow)
+                self.opacity[k] = 1.0 - self.shaders[k].gap
         self.see_through = bool((self.opacity < 1).any())
 
     def trace(
@@ -113,7 +116,7 @@ class Tracer:
         wave.lanes[LANE_PDF, :count] = -1.0
         wave.lane_tags[0, :count] = np.arange(count)
         wave.lane_tags[1, :count] = 0
-        counts = np.zeros(3 * len(self.shaders), np.int64)
+        counts = np.zeros(QUEUES * len(self.shaders), np.int64)
         result = np.zeros(3, np.int64)
         for step in range(self.max_bounces + 2 + MOST_LAYERS):
             self.accelerator.intersect(wave.rays, (count + 15) // 16)
@@ -121,8 +124,8 @@ class Tracer:
             arrive(
                 step, self.max_bounces, self.estimator, count, wave.rays, wave.lanes,
                 wave.lane_tags, self.lights, self.dome, wave.film, wave.keys,
-                self.tables.material, self._levels, self.tables.records, self.level,
-                self._repeats, pixels, samples, first, self.seed, counts,
+                self.tables.material, self._repeats, self.tables.records, self.level,
+                pixels, samples, first, self.seed, counts,
             )  # fmt: skip
             ends = np.cumsum(counts)
             hits = int(ends[-1])
@@ -156,11 +159,11 @@ class Tracer:
 
     def _shade(self, wave: Wave, queue: int, start: int, end: int) -> None:
         """Fill the surface's rows of hits `start` to `end`."""
-        shader = self.shaders[queue // 3]
+        shader = self.shaders[queue // QUEUES]
         if shader is None:
             shade_preview(self.surfaces, wave.hits, wave.tags, start, end)
         else:
-            shader(queue % 3, wave, start, end)
+            shader(queue // 2 % 3, queue % 2, wave, start, end)
 
     def _settle(self, wave: Wave, count: int, aovs: bool) -> None:
         """Trace the shadow rays and add what they bring."""

@@ -20,7 +20,7 @@ def read_mesh_file(path: Path, binding: Binding | None) -> Scene:
     import trimesh
 
     try:
-        loaded: Any = trimesh.load_scene(path, process=False, maintain_order=True)
+        loaded: Any = trimesh.load_scene(path, process=False)
         nodes = [(name, *loaded.graph[name]) for name in loaded.graph.nodes_geometry]
     except Exception as error:
         words = " ".join(str(error).split())[:200]

@@ -7,19 +7,18 @@ place inside a thread however large the UVs are.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.fabric import Fabric
+from fabricusd.appearance.compiled import true_repeat
 from fabricusd.reference.scene import FabricSurface, Mesh, Scene
 
 # Columns of a record. P0 is a corner, E1 and E2 go from it to the others, N and T are the normals
 # and the directions of growing u at the three corners, ST the coordinates at the first corner and
-# D1, D2 their differences along E1 and E2. RATE is coordinates per metre along the surface.
+# D1, D2 their differences along E1 and E2. RATE is both coordinates' steepness [1/m].
 P0, E1, E2, N, T, ST, D1, D2, HAND, RATE = 0, 3, 6, 9, 18, 27, 29, 31, 33, 34
 RECORD = 36
 
@@ -103,11 +102,12 @@ def _mesh_tables(scene: Scene, mesh: Mesh, centre: NDArray[np.float64]) -> tuple
     records[:, ST : ST + 2] = _inside_repeat(scene, st[:, 0], material)
     records[:, D1 : D1 + 2], records[:, D2 : D2 + 2] = d1, d2
     records[:, HAND] = hand
-    flat = np.abs(d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0])
-    solid = np.linalg.norm(area2, axis=1)
-    # The geometric mean of both directions: coordinates per metre of cloth.
-    records[:, RATE] = np.sqrt(flat / np.maximum(solid, 1e-300))
-    records[:, RATE + 1] = 0.0
+    # Gradients of both coordinates over the surface: coordinates per metre.
+    square = np.maximum(np.einsum("ij,ij->i", area2, area2), 1e-300)[:, None]
+    along, up = np.cross(e2, area2) / square, np.cross(area2, e1) / square
+    for axis in range(2):
+        gradient = d1[:, axis, None] * along + d2[:, axis, None] * up
+        records[:, RATE + axis] = np.linalg.norm(gradient, axis=1)
     return points, tri, records, uv.reshape(-1, 6), material
 
 
@@ -211,16 +211,8 @@ def _inside_repeat(
         surface = scene.materials[index]
         if isinstance(surface, FabricSurface):
             mine = material == index
-            base[mine] = np.mod(st[mine], np.array(repeat(surface.binding.fabric), np.float64))
+            base[mine] = np.mod(st[mine], np.array(true_repeat(surface.binding.fabric), np.float64))
     return base
-
-
-def repeat(fabric: Fabric) -> tuple[int, int]:
-    """Threads after which the fabric, colours included, repeats: (ends, picks)."""
-    return (
-        math.lcm(fabric.weave.ends, len(fabric.warp.sequence)),
-        math.lcm(fabric.weave.picks, len(fabric.weft.sequence)),
-    )
 
 
 def _grain(

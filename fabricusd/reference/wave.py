@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fabricusd.reference.embree import aligned_empty, new_packets
 
@@ -71,7 +70,7 @@ class Wave:
         self.shadow = aligned_empty((4, capacity))
         self.shadow_path = aligned_empty((capacity,), np.int32)
         self.film = aligned_empty((FILM_ROWS if aovs else BEAUTY_ROWS, capacity))
-        self.counts: NDArray[Any] = np.zeros(1, np.int64)
+        self.scratch: Any = None
 
     def swap(self) -> None:
         """Make what the last step spawned the rays of the next one."""
