@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.footprint import level_weights, pick_level
-from fabricusd.appearance.real import LEAN
+from fabricusd.appearance.real import INLINE, LEAN
 from fabricusd.reference.counter import four_uniform
 from fabricusd.reference.embree import (
     DX,
@@ -138,7 +138,7 @@ def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, do
         counts[keys[k]] += 1
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _level_of(record, width, inverse, repeat, dx, dy, dz, u):
     """Level for a ray's cone of `width` where `inverse` is one over the squared cosine."""
     # A cone's cut with the surface is longer along the ray than across it.
@@ -151,7 +151,7 @@ def _level_of(record, width, inverse, repeat, dx, dy, dz, u):
     return level
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _meet_lights(k, depth, estimator, lights, dome, reach, lanes, lane_tags, film,
                  ox, oy, oz, dx, dy, dz):  # fmt: skip
     """Add what the ray of lane `k` sees of every light before `reach`."""
@@ -161,7 +161,7 @@ def _meet_lights(k, depth, estimator, lights, dome, reach, lanes, lane_tags, fil
         light = lights[j]
         if depth == 0 and light[VISIBLE] == R(0):
             continue
-        r, g, b, pdf = hit_light(light, dome, ox, oy, oz, dx, dy, dz, reach)
+        r, g, b, pdf = hit_light(light, dome, depth == 0, ox, oy, oz, dx, dy, dz, reach)
         if pdf <= R(0):
             continue
         weight = R(1)
@@ -223,7 +223,7 @@ def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, recor
             film[row + 2, path] += blue * hits[BETA + 2, h]
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _frame(record, u, v, dx, dy, dz, epsilon, hits, h):
     """Write place, frame and the origins of new rays; returns the cosine to the true normal."""
     w = R(1) - u - v
@@ -292,7 +292,7 @@ def _frame(record, u, v, dx, dy, dz, epsilon, hits, h):
     return cosine
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _choose_direction(estimator, lights, dome, c0, c1, c2, c3, hits, h):
     """Write the direction to a light, what arrives from there, and its pdf."""
     hits[LIGHT_PDF, h] = R(0)

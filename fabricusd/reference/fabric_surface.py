@@ -17,7 +17,7 @@ from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.coverage import GAP
 from fabricusd.appearance.far import far_values
 from fabricusd.appearance.levels import point_values
-from fabricusd.appearance.real import LEAN
+from fabricusd.appearance.real import INLINE, LEAN
 from fabricusd.appearance.shadow import NONE, Shadow, compile_shadow, lit
 from fabricusd.appearance.surface_sampling import (
     SamplingTables,
@@ -167,7 +167,7 @@ def _finish_far(R, hits, first, gap, towards, onwards):
         _finish(hits, h, keep, k, onwards)
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _finish(hits, h, keep, k, onwards):
     pdf = hits[GO_PDF, h]
     chance = hits[CHANCE + 3, h]
