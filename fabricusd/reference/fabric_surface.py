@@ -35,6 +35,7 @@ from fabricusd.reference.wave import (
     CHANCE,
     F_PDF,
     FAR_LEVEL,
+    GO,
     GO_PDF,
     KEEP,
     PLACE,
@@ -112,7 +113,7 @@ class FabricShader:
             _sample_far(R, side.tables, side.sampling, wave.hits, first, wo, wi, go)
             far_values(R, side.tables, wi, wo, towards)
             far_values(R, side.tables, go, wo, onwards)
-            _finish_far(R, wave.hits, first, R(self.gap), towards, onwards)
+            _finish_far(R, wave.hits, first, R(self.gap), go, towards, onwards)
             return
         cloth, shadow = side.near(level)
         found = (
@@ -156,7 +157,7 @@ def _sample_far(R, tables, sampling, hits, first, wo, wi, go):
 
 
 @njit(**LEAN)
-def _finish_far(R, hits, first, gap, towards, onwards):
+def _finish_far(R, hits, first, gap, go, towards, onwards):
     """Values and weights; the gap lets its share of the paths go straight on."""
     keep = R(1) - gap
     for k in range(towards.shape[1]):
@@ -164,11 +165,11 @@ def _finish_far(R, hits, first, gap, towards, onwards):
         for row in range(3):
             hits[F + row, h] = towards[row, k]
         hits[KEEP, h], hits[THREAD, h] = keep, R(-1)
-        _finish(hits, h, keep, k, onwards)
+        _finish(hits, h, keep, k, go, onwards)
 
 
 @njit(**INLINE)
-def _finish(hits, h, keep, k, onwards):
+def _finish(hits, h, keep, k, go, onwards):
     pdf = hits[GO_PDF, h]
     chance = hits[CHANCE + 3, h]
     hits[F_PDF, h] *= keep
@@ -176,6 +177,7 @@ def _finish(hits, h, keep, k, onwards):
         hits[GO_PDF, h] = _STRAIGHT
         return
     hits[CHANCE + 3, h] = chance / keep
+    hits[GO, h], hits[GO + 1, h], hits[GO + 2, h] = go[0, k], go[1, k], go[2, k]
     inverse = R(1) / (pdf * keep) if pdf > R(0) else R(0)
     hits[WEIGHT, h], hits[WEIGHT + 1, h] = onwards[0, k] * inverse, onwards[1, k] * inverse
     hits[WEIGHT + 2, h] = onwards[2, k] * inverse
@@ -239,4 +241,4 @@ def _finish_point(
             hits[F + row, h] = light * towards[row, k]
             onwards[row, k] = bounce * onwards[row, k]
         hits[KEEP, h], hits[THREAD, h] = R(1), R(threads[k])
-        _finish(hits, h, R(1), k, onwards)
+        _finish(hits, h, R(1), k, go, onwards)

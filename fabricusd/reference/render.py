@@ -245,8 +245,9 @@ def _sample(
     """Passes over the picture until every pixel has `most` samples or is quiet enough."""
     order = pixels_along_z_curve(film.width, film.height)
     size = BATCH
-    # A small picture still makes work for every worker.
-    while size > 2048 and len(order) * min(PASS, most) < 4 * workers * size:
+    # A small picture still makes work for many workers. Their number must not matter here: rounding
+    # depends on which lane of a vector a ray falls into, and that on the batch.
+    while size > 2048 and len(order) * min(PASS, most) < 16 * size:
         size //= 2
     waves = [Wave(size, aovs=film.extra) for _ in range(workers)]
     done = 0
