@@ -91,28 +91,52 @@ def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
                     f"--{option.replace('_', '-')}", "does not go with --preset; edit the layer"
                 )
         return load(options.preset), ()
+    from dataclasses import replace
+
     from fabricusd.schema.weaves import losses, to_fabric
 
     draft = _draft(options)
+    for which, density in (("warp", options.ends_per_cm), ("weft", options.picks_per_cm)):
+        if density and density > 0:
+            told = {f"{which}_spacing": 0.01 / density, f"{which}_spacings": ()}
+            draft = replace(draft, **told)
     fabric = to_fabric(draft, _base_thread(options))
     return fabric, (*draft.warnings, *losses(draft))
 
 
 def _draft(options: argparse.Namespace) -> Draft:
-    from fabricusd.schema.weaves import parse_weave, read_image, read_wif, with_colors
+    from fabricusd.schema.weaves import parse_weave, read_wif, with_colors
 
     if options.invert and not options.image:
         raise FabricError("--invert", "goes with --image only")
     if options.wif:
         draft = read_wif(options.wif)
     elif options.image:
-        draft = read_image(options.image, invert=options.invert)
+        return _image_draft(options)
     else:
         draft = parse_weave(options.weave)
     if options.warp_color or options.weft_color:
         warp = _color_order(options.warp_color, "--warp-color")
         draft = with_colors(draft, warp, _color_order(options.weft_color, "--weft-color"))
     return draft
+
+
+def _image_draft(options: argparse.Namespace) -> Draft:
+    """Colours given with an image of colours say which of them are whose; else they recolour it."""
+    from fabricusd.schema.weaves import read_image, with_colors
+
+    warp = _color_order(options.warp_color, "--warp-color")
+    weft = _color_order(options.weft_color, "--weft-color")
+    told = bool(warp or weft)
+    try:
+        draft = read_image(options.image, invert=options.invert)
+    except FabricError:
+        if not told:
+            raise
+        return read_image(options.image, warp_colors=warp, weft_colors=weft)
+    if draft.colored and told:
+        return read_image(options.image, warp_colors=warp, weft_colors=weft)
+    return with_colors(draft, warp, weft)
 
 
 def _color_order(items: list[str] | None, where: str) -> list[tuple[float, float, float]]:
@@ -133,10 +157,10 @@ def _color_order(items: list[str] | None, where: str) -> list[tuple[float, float
 def _base_thread(options: argparse.Namespace) -> Thread:
     from dataclasses import replace
 
-    from fabricusd.fabric import Thread
     from fabricusd.schema.anysource import load_any
+    from fabricusd.schema.weaves import DEFAULT_THREAD
 
-    thread = Thread()
+    thread = DEFAULT_THREAD
     if options.thread:
         file, _, wanted = options.thread.partition(":")
         fabric, _notes = load_any(file)

@@ -284,7 +284,7 @@ def curve_points_match(prim: Usd.Prim) -> Iterator[Fault]:
 def curve_positions_rise(prim: Usd.Prim) -> Iterator[Fault]:
     """A curve's positions are finite, never decrease, and span a length above 0."""
     name = "thread:curve:positions"
-    positions = prim.GetAttribute(name).Get() or ()
+    positions = list(prim.GetAttribute(name).Get() or [])
     for k, x in enumerate(positions):
         if not math.isfinite(x):
             yield name, f"[{k}] is {x:g}; it must be finite"

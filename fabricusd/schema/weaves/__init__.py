@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fabricusd.schema.weaves.color import parse_color
-from fabricusd.schema.weaves.convert import from_fabric, losses, to_fabric
+from fabricusd.schema.weaves.convert import DEFAULT_THREAD, from_fabric, losses, to_fabric
 from fabricusd.schema.weaves.draft import Draft, with_colors
 from fabricusd.schema.weaves.drawdown import draw
 from fabricusd.schema.weaves.image import read_image
@@ -12,6 +12,7 @@ from fabricusd.schema.weaves.wif import parse_wif, read_wif
 from fabricusd.schema.weaves.wif_write import wif_text, write_wif
 
 __all__ = [
+    "DEFAULT_THREAD",
     "Draft",
     "draw",
     "from_fabric",

@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from fabricusd.errors import FabricError
-from fabricusd.fabric import Fabric, Thread, ThreadSet, Weave
+from fabricusd.fabric import DEGREE, Fabric, TangentCurve, Thread, ThreadSet, Weave
 from fabricusd.schema.weaves.color import RGB
 from fabricusd.schema.weaves.draft import LIMIT, Draft, Side, known_length
 
-DEFAULT_THREAD = Thread()
+DEFAULT_THREAD = Thread(curve=TangentCurve(angles=(-20 * DEGREE, 20 * DEGREE)))
+"""A spun thread that rises and falls over what it crosses, where no other is asked for."""
 
 
 def albedo_scale(base: Thread) -> float:
@@ -46,9 +47,9 @@ def to_fabric(
     for side in (warp, weft):
         sequence = [kinds.setdefault(kind, len(kinds)) for kind in _kinds(side, base_thread)]
         sequences.append(tuple(sequence))
-    documentation = " ".join(
-        [f"Draft: {draft.source or draft.title or draft.weave.name}.", *losses(draft)]
-    )
+    lines = [f"Draft: {draft.source or draft.title or draft.weave.name}."]
+    lines += [f"Author: {draft.author}."] if draft.author else []
+    documentation = " ".join([*lines, *losses(draft), draft.notes]).strip()
     return Fabric(
         name=name or "Fabric",
         threads=_threads(draft, base_thread, list(kinds)),

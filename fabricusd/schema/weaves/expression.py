@@ -193,10 +193,11 @@ def _join(terms: list[_Term], combine: Callable[[Iterator[Values]], Values]) -> 
 
 
 def _comparison(node: ast.Compare) -> _Term:
-    terms = [_number(value) for value in (node.left, *node.comparators)]
     tests = [COMPARE[type(op)] for op in node.ops if type(op) in COMPARE]
     if len(tests) < len(node.ops):
         raise FabricError(quoted(ast.unparse(node), 40), "must compare by ==, !=, <, <=, > or >=")
+
+    terms = [_number(value) for value in (node.left, *node.comparators)]
 
     def combine(values: Iterator[Values]) -> Values:
         left, result = next(values), np.asarray(True)

@@ -213,14 +213,14 @@ def _take_runs(words: list[str], form: str) -> tuple[list[int], list[str]]:
         raise FabricError("", f"is not complete; write it as in {form}")
     runs = [_number(part, form) for part in words[0].split("/")]
     if sum(runs) > LARGEST:
-        raise FabricError(f"'{words[0][:20]}'", f"is {sum(runs)} threads; at most {LARGEST}")
+        raise FabricError(quoted(words[0], 20), f"is {sum(runs)} threads; at most {LARGEST}")
     return runs, words[1:]
 
 
 def _number(text: str, form: str) -> int:
     if not re.fullmatch(r"[0-9]{1,6}", text) or int(text) == 0:
         raise FabricError(
-            f"'{text[:20]}'", f"is not a whole number of at least 1; write it as in {form}"
+            quoted(text, 20), f"is not a whole number of at least 1; write it as in {form}"
         )
     return int(text)
 
@@ -231,7 +231,7 @@ def _take_word(words: list[str], choices: tuple[str, ...], default: str) -> str:
 
 def _expect_none(words: list[str], form: str) -> None:
     if words:
-        raise FabricError(f"'{words[0][:20]}'", f"is not expected there; write it as in {form}")
+        raise FabricError(quoted(words[0], 20), f"is not expected there; write it as in {form}")
 
 
 def _slashes(runs: list[int]) -> str:

@@ -20,13 +20,15 @@ from fabricusd.fabric import Weave
 from fabricusd.schema.weaves.color import palette_from_codes
 from fabricusd.schema.weaves.draft import LIMIT, Draft, quoted
 from fabricusd.schema.weaves.files import read_bytes
-from fabricusd.schema.weaves.wif_syntax import UNIT_ALIASES, UNITS, Section, decode, read_sections
-
-LARGEST_CODE = 65535
-"""Largest display code of a colour: 16 bits."""
-
-USUAL_RANGES = (255, 999, LARGEST_CODE)
-"""Largest display codes that programs write, tried in turn where the file does not say."""
+from fabricusd.schema.weaves.wif_syntax import (
+    LARGEST_CODE,
+    UNIT_ALIASES,
+    UNITS,
+    USUAL_RANGES,
+    Section,
+    decode,
+    read_sections,
+)
 
 ColorTable = tuple[dict[int, int], NDArray[np.int64], tuple[int, int]]
 
@@ -299,7 +301,7 @@ def _lengths(
     if unit is None:
         warnings.append(f"{threads.where('Units')} is missing; the {name} is not used.")
         return {}
-    default = threads.length(name, unit)
+    default = threads.length(name.capitalize(), unit)
     given = {number: each.length(key, unit) for number, key in each.keys(1, count)}
     known = [value for value in given.values() if value is not None]
     if not known:

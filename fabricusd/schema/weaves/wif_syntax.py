@@ -40,6 +40,12 @@ UNIT_ALIASES = {
 }
 
 
+LARGEST_CODE = 65535
+"""Largest display code of a colour: 16 bits."""
+
+USUAL_RANGES = (255, 999, LARGEST_CODE)
+"""Largest display codes that programs write, tried in turn where the file does not say."""
+
 _DIGITS = str.maketrans("", "", "0123456789,")
 
 

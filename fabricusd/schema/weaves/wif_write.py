@@ -14,6 +14,7 @@ from fabricusd.files import whole_file
 from fabricusd.schema.weaves.color import codes_from_palette, palette_from_codes
 from fabricusd.schema.weaves.draft import LIMIT, Draft, Side
 from fabricusd.schema.weaves.loom import thread_loom
+from fabricusd.schema.weaves.wif_syntax import USUAL_RANGES
 
 MOST_SHAFTS = 40
 """Most shafts of a draft written as tie-up and treadling; jacquards become a lift plan."""
@@ -39,9 +40,10 @@ def write_wif(draft: Draft, path: str | os.PathLike[str], *, clobber: bool = Tru
 def wif_text(draft: Draft) -> str:
     """The text of a WIF file, to be encoded as UTF-8, from which `parse_wif` reads `draft` again.
 
-    Colours are written in the draft's own range where that holds them exactly, else in 16 bits;
-    lengths in centimetres, exactly. Colours that repeat with another length than the weave are
-    written out in full. Raises FabricError where that is more than `LIMIT` threads.
+    Colours are written in the draft's own range where that holds them, else in a usual one or
+    the nearest of 16 bits; lengths in centimetres, exactly. Colours that repeat with another
+    length than the weave are written out in full. Raises FabricError where that makes more than
+    `LIMIT` threads.
     """
     ends, picks = _full(draft.warp), _full(draft.weft)
     cells = draft.weave.cells
@@ -122,11 +124,11 @@ def _set(side: Side, count: int) -> dict[str, list[str]]:
 
 
 def _colors(draft: Draft) -> dict[str, list[str]]:
-    low, high = draft.color_range
-    codes = codes_from_palette(draft.palette, low, high)
-    if palette_from_codes(codes, low, high) != draft.palette:
-        low, high = 0, 65535
+    """The palette in the first range that holds it; colours that went through USD are float32."""
+    for low, high in (draft.color_range, *((0, high) for high in USUAL_RANGES)):
         codes = codes_from_palette(draft.palette, low, high)
+        if np.allclose(palette_from_codes(codes, low, high), draft.palette, rtol=1e-6, atol=1e-9):
+            break
     return {
         "COLOR PALETTE": [f"Entries={len(codes)}", "Form=RGB", f"Range={low},{high}"],
         "COLOR TABLE": _numbered(",".join(map(str, code)) for code in codes.tolist()),
