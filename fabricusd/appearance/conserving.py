@@ -90,7 +90,7 @@ def single_tables(
     precision: type[np.floating[Any]] = np.float64,
     rule: Rule | None = None,
 ) -> ConservingTables:
-    """Tables of `fabric` without multiple scattering; `multiple.with_multiple` adds it.
+    """Tables of `fabric` without multiple scattering; `multiple.conserving_tables` adds it.
 
     rule : quadrature over the curves; None takes points one surface lobe's width apart
     """
@@ -146,9 +146,9 @@ def projected(R, tables, x, y, z):
 
 @njit(**LEAN)
 def visible(R, tables, x, y, z):
-    """G1(w)/|N.w|: what of each facet that faces w is seen; 0 at the horizon."""
+    """G1(w)/|N.w|: what of each facet that faces w is seen; 0 at the horizon or without facets."""
     up = abs(z)
-    if up == R(0):
+    if up == R(0) or tables.covered == R(0):
         return R(0)
     # min(1, (1 - gap) up/S)/up without a division by a vanishing S.
     return R(1) / max(up, projected(R, tables, x, y, z) / tables.covered)

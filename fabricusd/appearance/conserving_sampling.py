@@ -2,7 +2,7 @@
 
 The lobes and stretches are `surface_sampling`'s. Below the cloth a lobe's directions are those
 above it, negated, around the mirror inclination of that side; two cosine lobes, up and down, stand
-for light scattered more than once, and a fifth is uniform over the sphere, or over the viewer's
+for light scattered more than once, and a tenth is uniform over the sphere, or over the viewer's
 side where the cloth is opaque. A viewer below is one above with both directions negated, which the
 law does not change under. Source: `docs/model.md` section 6.
 """
@@ -40,7 +40,6 @@ from fabricusd.appearance.surface_sampling import (
     AZIMUTHS,
     COS,
     ELEVATIONS,
-    LEAST_SHARE,
     PSI0,
     SET,
     SIN,
@@ -48,7 +47,6 @@ from fabricusd.appearance.surface_sampling import (
     SURFACE_WIDTH,
     TAN,
     THREAD,
-    UNIFORM,
     VOLUME_WIDTH,
     nearest_stretch,
     owners,
@@ -66,6 +64,11 @@ from fabricusd.appearance.thread_terms import ISOTROPIC as KD
 from fabricusd.fabric import Fabric
 
 Reals = NDArray[Any]
+
+UNIFORM = 0.1
+LEAST_SHARE = 0.05
+"""As in `surface_sampling`, and half as much: without `1/Q` there are no narrow bright places that
+the lobes miss."""
 
 
 class ConservingSamplingTables(NamedTuple):

@@ -54,7 +54,7 @@ from fabricusd.fabric import Fabric, Thread
 
 Reals = NDArray[Any]
 
-WOVEN_TABLE = (25, 24, 16384)
+WOVEN_TABLE = (25, 24, 8192)
 PILE_TABLE = (25, 72, 4096)
 """Polar angles from N to the horizon, azimuths all round, and points of the low-discrepancy
 sequence that measure an entry. Pile has a ridge some degrees wide in azimuth, which 36 azimuths
@@ -107,8 +107,8 @@ def mean_albedo(fabric: Fabric) -> NDArray[np.float64]:
     for share, thread in zip(area, fabric.thread_list, strict=True):
         if fabric.model_of(thread) == "conserving":
             surface = _mean_surface_albedo(thread)
-            total += share * (surface + np.minimum(thread.albedo, 1.0) * (1.0 - surface))
-    return total / area.sum()
+            total += float(share) * (surface + (1.0 - surface) * np.clip(thread.albedo, 0.0, 1.0))
+    return np.asarray(total / max(float(area.sum()), 1e-300))
 
 
 def _mean_surface_albedo(thread: Thread) -> float:
@@ -116,7 +116,8 @@ def _mean_surface_albedo(thread: Thread) -> float:
     albedo = surface_albedo(thread.gamma_surface, thread.ior, thread.surface_gain)
     cos_theta = np.linspace(0.0, 1.0, len(albedo)) ** 2
     theta = np.arccos(cos_theta)
-    return float(abs(np.trapezoid(albedo * cos_theta**2, theta)) * 4.0 / math.pi)
+    # theta falls along the table.
+    return -4.0 / math.pi * float(np.trapezoid(albedo * cos_theta**2, theta))
 
 
 def scattered_shares(
@@ -147,13 +148,13 @@ def scattered_shares(
 
 
 @njit(**INLINE)
-def _polar_angle(t):  # type: ignore[no-untyped-def]
+def _polar_angle(t):
     """Of the row t in [0, 1] [rad]."""
     return 0.5 * math.pi * math.sin(0.5 * math.pi * t)
 
 
 @njit(**KERNEL, parallel=True)
-def _measure(R, tables, draws, out):  # type: ignore[no-untyped-def]
+def _measure(R, tables, draws, out):
     rows, columns = out.shape[1], out.shape[2]
     for entry in prange(rows * columns):
         row, column = entry // columns, entry % columns
@@ -167,7 +168,7 @@ def _measure(R, tables, draws, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**LEAN)
-def _shares(R, tables, draws, x, y, z):  # type: ignore[no-untyped-def]
+def _shares(R, tables, draws, x, y, z):
     """(rho_R, rho_T) from above, z > 0: facets drawn by what they see, then a thread's sampler."""
     reflected, transmitted = 0.0, 0.0
     total = 0.0
@@ -205,7 +206,7 @@ def _shares(R, tables, draws, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def _seen(R, tables, k, x, y, z):  # type: ignore[no-untyped-def]
+def _seen(R, tables, k, x, y, z):
     """a q mu(w) of node k, w above the cloth; 0 where its thread does not scatter."""
     along = y if k >= tables.warp_start else x
     mu = facing(R, R(1), tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN], along, z)
@@ -227,7 +228,7 @@ def mean_lost(tables: ConservingTables) -> float:
 
 
 @njit(**LEAN)
-def _integrate_table(R, lost, x, w):  # type: ignore[no-untyped-def]
+def _integrate_table(R, lost, x, w):
     rows, columns = lost.shape
     turn = 2.0 * math.pi / columns
     total = 0.0
@@ -247,7 +248,7 @@ def _integrate_table(R, lost, x, w):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def _cubic(R, a, b, c, d, t):  # type: ignore[no-untyped-def]
+def _cubic(R, a, b, c, d, t):
     """Catmull-Rom between b and c."""
     return b + R(0.5) * t * (
         c - a + t * (R(2) * a - R(5) * b + R(4) * c - d + t * (R(3) * (b - c) + d - a))
@@ -255,7 +256,7 @@ def _cubic(R, a, b, c, d, t):  # type: ignore[no-untyped-def]
 
 
 @njit(**LEAN)
-def _across_columns(R, lost, row, column, t):  # type: ignore[no-untyped-def]
+def _across_columns(R, lost, row, column, t):
     """The table along azimuth in a row that may lie beyond the pole or the horizon."""
     rows, columns = lost.shape
     half = columns // 2
@@ -274,7 +275,7 @@ def _across_columns(R, lost, row, column, t):  # type: ignore[no-untyped-def]
 
 
 @njit(**LEAN)
-def lost_share(R, lost, x, y, z):  # type: ignore[no-untyped-def]
+def lost_share(R, lost, x, y, z):
     """m(w) >= 0, by cubic interpolation between rows and azimuths; m(-w) = m(w)."""
     if z < R(0):
         x, y, z = -x, -y, -z

@@ -75,6 +75,7 @@ def evaluate(
     shadow: str = "none",
     *,
     max_error: float | None = None,
+    multiple: bool = True,
 ) -> Floats:
     """(n, 3) radiance per unit `L_i dwi` towards wo, cosine included.
 
@@ -86,6 +87,7 @@ def evaluate(
         none of them
     max_error : bound on the mean relative error of the quadrature over the curves, see
         `accuracy.choose_rule`; None takes `quadrature.default_rule`
+    multiple : whether `conserving` cloth scatters light more than once
 
     Raises FabricError for directions that are not finite unit vectors, an unknown level or
     shadowing, a place that is missing or not finite, a bound that cannot be met.
@@ -93,7 +95,7 @@ def evaluate(
     i, o = _pairs(wi, wo)
     hit, places = _places(fabric, uv, level, i.shape[1])
     _check_shadow(shadow)
-    out = _evaluate(_law(fabric, max_error), level, hit, i, o)
+    out = _evaluate(_law(fabric, max_error, multiple), level, hit, i, o)
     if level != "far" and shadow != "none":
         out *= _lit(fabric, shadow, level, places, i)
     return np.ascontiguousarray(out.T)
@@ -114,7 +116,7 @@ def pdf(
     i, o = _pairs(wi, wo)
     hit, _ = _places(fabric, uv, level, i.shape[1])
     _check_shadow(shadow)
-    return _density(_law(fabric, None), level, hit, i, o)
+    return _density(_law(fabric), level, hit, i, o)
 
 
 def sample(
@@ -141,7 +143,7 @@ def sample(
     o = _repeated(_directions("wo", wo), len(numbers), "wo")
     hit, places = _places(fabric, uv, level, len(numbers))
     _check_shadow(shadow)
-    law = _law(fabric, None)
+    law = _law(fabric)
     i = np.empty_like(o)
     real: Any = np.float64
     turned = np.ascontiguousarray(numbers.T)
@@ -161,9 +163,9 @@ def _density(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats)
 
 
 @lru_cache(maxsize=32)
-def _law(fabric: Fabric, max_error: float | None) -> SurfaceLaw:
+def _law(fabric: Fabric, max_error: float | None = None, multiple: bool = True) -> SurfaceLaw:
     rule = None if max_error is None else choose_rule(fabric, max_error)
-    return surface_law(fabric, precision=np.float64, rule=rule)
+    return surface_law(fabric, precision=np.float64, rule=rule, multiple=multiple)
 
 
 @lru_cache(maxsize=32)

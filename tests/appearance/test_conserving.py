@@ -16,7 +16,7 @@ from fabricusd.appearance.conserving_sampling import (
 from fabricusd.appearance.quadrature import POINTS, Rule
 from fabricusd.appearance.real import KERNEL
 from fabricusd.errors import FabricError
-from fabricusd.fabric import TangentCurve, Thread
+from fabricusd.fabric import TangentCurve
 from tests.appearance.presets import PRESETS, with_model
 
 CLOTHS = {name: with_model(fabric, "conserving") for name, fabric in PRESETS.items()}
@@ -38,7 +38,7 @@ def _directions(seed, n, precision=np.float64):
     return w / np.sqrt((w * w).sum(axis=1))[:, None]
 
 
-@njit(**{**KERNEL, "cache": False}, parallel=True)
+@njit(**KERNEL, parallel=True)
 def _values(R, tables, wi, wo, out):
     for k in prange(len(wi)):
         a, b, c = multiple.conserving_value(
@@ -53,7 +53,7 @@ def _value(tables, wi, wo):
     return out
 
 
-@njit(**{**KERNEL, "cache": False}, parallel=True)
+@njit(**KERNEL, parallel=True)
 def _draw(R, tables, sampling, wo, n, wi, pdf):
     """The R2 sequence, the first number in order: lobes are strata of it."""
     for k in prange(n):
@@ -256,6 +256,15 @@ def test_alpha_is_one_for_white_threads_and_the_surface_alone_for_black_ones():
     assert np.all((black > 0.05) & (black < 0.3))
 
 
+def test_cloth_without_threads_scatters_nothing():
+    fabric = CLOTHS["linen_plain"]
+    bare = replace(fabric, warp=replace(fabric.warp, coverage=0.0),
+                   weft=replace(fabric.weft, coverage=0.0))  # fmt: skip
+    tables = multiple.conserving_tables(bare)
+    assert np.all(_value(tables, _directions(15, 100), _directions(16, 100)) == 0)
+    assert np.all(multiple.mean_albedo(bare) == 0)
+
+
 def test_another_precision_is_refused():
     with pytest.raises(FabricError, match="precision"):
         conserving.single_tables(CLOTHS["linen_plain"], precision=np.float16)
@@ -271,4 +280,3 @@ def test_a_mixed_cloth_scatters_by_its_conserving_threads_only():
     part, full = _value(mixed, wi, wo), _value(whole, wi, wo)
     assert np.all(part <= full * (1 + 1e-12))
     assert 0.2 < part.sum() / full.sum() < 0.8
-    assert Thread().model == ""
