@@ -164,7 +164,7 @@ def _run_table(cells: NDArray[np.bool_], under: int) -> NDArray[Any]:
 
 
 @njit(cache=True)
-def _share_out(cells, by_end, by_pick, out):  # type: ignore[no-untyped-def]
+def _share_out(cells, by_end, by_pick, out):
     """Runs along the warp (m, n, 2) and along the weft (n, m, 2) -> out (m, n, slots, 2)."""
     block = 64
     for i0 in range(0, cells.shape[0], block):
@@ -183,7 +183,7 @@ def _share_out(cells, by_end, by_pick, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fill_runs(lines, out):  # type: ignore[no-untyped-def]
+def _fill_runs(lines, out):
     """(r, n) cells along r threads -> out (r, n, 2): place in its run, length of the run.
 
     Runs wrap round the repeat; a run without end is one repeat, counted from its border.

@@ -98,7 +98,7 @@ def _diamond_directions(azimuths: int) -> NDArray[np.float64]:
 
 
 @njit(parallel=True, **KERNEL)
-def _fill(cloth, rounded, highest, directions, table):  # type: ignore[no-untyped-def]
+def _fill(cloth, rounded, highest, directions, table):
     """The horizon at the centre of every texel, in every direction."""
     ends, picks, slots, rows, columns, azimuths = table.shape
     for cell in prange(ends * picks):
@@ -126,7 +126,7 @@ def _fill(cloth, rounded, highest, directions, table):  # type: ignore[no-untype
 
 
 @njit(**LEAN)
-def _texel_centre(cloth, i, j, slot, along, across):  # type: ignore[no-untyped-def]
+def _texel_centre(cloth, i, j, slot, along, across):
     """Weave coordinates of a place on a slot's thread, and whether that thread is seen at all."""
     top = int(cloth.grid[i % cloth.grid.shape[0], j % cloth.grid.shape[1]])
     width = float(cloth.width[top])
@@ -144,7 +144,7 @@ def _texel_centre(cloth, i, j, slot, along, across):  # type: ignore[no-untyped-
 
 
 @njit(parallel=True, **KERNEL)
-def _compare(cloth, rounded, highest, table, uv, angle, out):  # type: ignore[no-untyped-def]
+def _compare(cloth, rounded, highest, table, uv, angle, out):
     """Elevation of the table minus that of the march [rad]; NaN where nothing casts shadows."""
     for k in prange(uv.shape[0]):
         which, thread, s, w, _, length = find(np.float64, cloth, uv[k, 0], uv[k, 1])

@@ -19,14 +19,14 @@ from fabricusd.appearance.weave import FARTHEST, split, wrap
 
 
 @njit(**INLINE)
-def diamond(R, x, y):  # type: ignore[no-untyped-def]
+def diamond(R, x, y):
     """Azimuth of (x, y) from 0 to 4: one per quadrant, linear in y/(|x| + |y|) inside it."""
     part = x / max(abs(x) + abs(y), R(1e-30))
     return R(1) - part if y >= R(0) else R(3) + part
 
 
 @njit(**INLINE)
-def _cell_of_texels(R, place, count):  # type: ignore[no-untyped-def]
+def _cell_of_texels(R, place, count):
     """Lower of the two texels around `place` in [0, 1], and the share of the upper one."""
     x = max(R(0), min(place * R(count) - R(0.5), R(count - 1)))
     k = min(int(x), count - 2)
@@ -34,14 +34,14 @@ def _cell_of_texels(R, place, count):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def _between(R, table, i, j, slot, row, column, first, second, c):  # type: ignore[no-untyped-def]
+def _between(R, table, i, j, slot, row, column, first, second, c):
     """A texel's horizon between two azimuths, c of the way from the first."""
     low = R(table[i, j, slot, row, column, first])
     return low + (R(table[i, j, slot, row, column, second]) - low) * c
 
 
 @njit(**INLINE)
-def split_table(table, u, v):  # type: ignore[no-untyped-def]
+def split_table(table, u, v):
     """Cell of the table at weave coordinates, float64; where they are not sound, the first one."""
     sound = abs(u) <= FARTHEST and abs(v) <= FARTHEST
     return (
@@ -51,7 +51,7 @@ def split_table(table, u, v):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def horizon_at(R, cloth, table, u, v, which, x, y):  # type: ignore[no-untyped-def]
+def horizon_at(R, cloth, table, u, v, which, x, y):
     """Sine of the horizon's elevation at (u, v) on the thread of set `which` towards (x, y)."""
     i, j, _, _, p, q = split(R, cloth, u, v)
     in_u, in_v = split_table(table, u, v)
@@ -81,20 +81,20 @@ def horizon_at(R, cloth, table, u, v, which, x, y):  # type: ignore[no-untyped-d
 
 
 @njit(**INLINE)
-def soft_edge(R, above, softness):  # type: ignore[no-untyped-def]
+def soft_edge(R, above, softness):
     """A smooth step from 0 to 1 over `softness`, in how far the light stands above the horizon."""
     t = max(R(0), min(R(1), above / softness + R(0.5)))
     return t * t * (R(3) - R(2) * t)
 
 
 @njit(**INLINE)
-def above_horizon(R, sine, flat, z):  # type: ignore[no-untyped-def]
+def above_horizon(R, sine, flat, z):
     """Sine of the angle from the horizon up to light of elevation (flat, z)."""
     return z * math.sqrt(max(R(0), R(1) - sine * sine)) - flat * sine
 
 
 @njit(**LEAN)
-def choose_texels(R, cloth, table, cells, p, q, tops, sets, wi, begin, base, notes):  # type: ignore[no-untyped-def]
+def choose_texels(R, cloth, table, cells, p, q, tops, sets, wi, begin, base, notes):
     """Where in the flat table each of a block of places reads, and the three shares it mixes.
 
     cells : (6, b) of `split` and `split_table`; tops, sets : (b,) set on top of the cell and set of
@@ -130,7 +130,7 @@ def choose_texels(R, cloth, table, cells, p, q, tops, sets, wi, begin, base, not
 
 
 @njit(**LEAN)
-def mix_texels(R, texels, columns, azimuths, base, notes, sine):  # type: ignore[no-untyped-def]
+def mix_texels(R, texels, columns, azimuths, base, notes, sine):
     """The horizon's sine at a block of places, from the flat table, into sine (b,)."""
     step = np.uintp(columns * azimuths)
     beside = np.uintp(azimuths)

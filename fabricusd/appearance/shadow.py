@@ -125,7 +125,7 @@ def compile_shadow(
 
 
 @njit(**INLINE)
-def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: ignore[no-untyped-def]
+def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
     """Share of light from direction (x, y, z) in the surface frame that reaches a point: `g`.
 
     u, v : weave coordinates, float64; the next five are what `weave.find` gave there
@@ -166,7 +166,7 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: 
 
 
 @njit(**LEAN)
-def _to_crest(cloth, shadow, u, v, most):  # type: ignore[no-untyped-def]
+def _to_crest(cloth, shadow, u, v, most):
     """Distance on the cloth [m] to the nearest of the highest points, at most `most`."""
     end, pick = np.floor(u), np.floor(v)
     pitch_u, pitch_v = float(cloth.pitch[WARP]), float(cloth.pitch[WEFT])
@@ -182,7 +182,7 @@ def _to_crest(cloth, shadow, u, v, most):  # type: ignore[no-untyped-def]
 
 
 @njit(**LEAN)
-def _crest_in_cell(cloth, shadow, u, v, end, pick, best):  # type: ignore[no-untyped-def]
+def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
     """The smaller of `best` and the distance [m] to the highest points in one cell."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
     top = int(cloth.grid[i, j])
@@ -226,7 +226,7 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):  # type: ignore[no-unt
 
 
 @njit(**LEAN)
-def horizon_block(R, cloth, shadow, cells, p, q, tops, sets, free, wi, begin, base, notes, out):  # type: ignore[no-untyped-def]
+def horizon_block(R, cloth, shadow, cells, p, q, tops, sets, free, wi, begin, base, notes, out):
     """`lit` by the horizon table at a block of places that `split` and `split_table` have found.
 
     sets, tops, free : (b,) set of the thread, set on top of the cell, 1 where no light is kept off
@@ -247,7 +247,7 @@ def horizon_block(R, cloth, shadow, cells, p, q, tops, sets, free, wi, begin, ba
 
 
 @njit(**LEAN)
-def look_up_block(R, cloth, shadow, uv, begin, cells, p, q, threads, tops, sets, free, angle):  # type: ignore[no-untyped-def]
+def look_up_block(R, cloth, shadow, uv, begin, cells, p, q, threads, tops, sets, free, angle):
     """What `horizon_block` asks about as many places from `begin` on as `p` holds, all (b,) but
     cells (6, b); and with it the thread and its tangent angle there."""
     split_block(R, cloth, uv, begin, cells, p, q)
@@ -263,7 +263,7 @@ def look_up_block(R, cloth, shadow, uv, begin, cells, p, q, threads, tops, sets,
 
 
 @njit(**LEAN)
-def _lit_one_by_one(R, cloth, shadow, uv, begin, wi, out):  # type: ignore[no-untyped-def]
+def _lit_one_by_one(R, cloth, shadow, uv, begin, wi, out):
     """`lit` at as many places from `begin` on as `out` holds."""
     for k in range(out.size):
         u, v = uv[begin + k, 0], uv[begin + k, 1]
@@ -273,7 +273,7 @@ def _lit_one_by_one(R, cloth, shadow, uv, begin, wi, out):  # type: ignore[no-un
 
 
 @njit(parallel=True, **KERNEL)
-def lit_all(R, cloth, shadow, uv, wi, out):  # type: ignore[no-untyped-def]
+def lit_all(R, cloth, shadow, uv, wi, out):
     """`lit` at weave coordinates uv (n, 2) float64 for light wi (3, n), into out (n,)."""
     n = uv.shape[0]
     for b in prange((n + BLOCK - 1) // BLOCK):
