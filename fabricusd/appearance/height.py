@@ -73,7 +73,7 @@ def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first):
     return k
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h, k):
     """`steepest` over the threads seen in one cell, distances t0 to t1 [m]."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
@@ -134,7 +134,7 @@ def _within(x, x_t, low, high, t0, t1):
     return max(t0, min(a, b)), min(t1, max(a, b))
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w_t):
     """`steepest` over a stretch of thread: distances a to b [m], position s + s_t t, w + w_t t."""
     if not b > a:
@@ -175,7 +175,7 @@ def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w
     return k
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t):
     """Slope from the point to the thread at distance `t` [m]."""
     at = max(0.0, min(1.0, s + s_t * t))

@@ -29,8 +29,8 @@ AZIMUTHS = 16
 TEXELS = (8, 4)
 """Texels along and across a thread in one cell. See docs/shadowing.md for what finer ones bring."""
 
-MOST_BYTES = 2**29
-"""Largest horizon table. A jacquard of a million cells still fits; beyond, `traced` needs none."""
+MOST_BYTES = 2**25
+"""Largest horizon table, 256 x 256 cells at the usual size: half a minute's work to fill."""
 
 LOWEST = math.tan(math.radians(0.25))
 """Slope below which a horizon counts as level: half the sun's disc."""
@@ -43,8 +43,10 @@ def horizon_table(
     highest: float,
     azimuths: int,
     texels: tuple[int, int],
-) -> NDArray[np.uint8]:
+) -> NDArray[np.uint8] | None:
     """(I, J, slots, along, across, azimuths) sine of the horizon's elevation, 255 for 1.
+
+    None for a repeat whose table would be larger than MOST_BYTES.
 
     cloth : `fabric` in float64. The table repeats as the threads' *shapes* do: types that differ in
     colour alone do not lengthen it.
@@ -55,13 +57,8 @@ def horizon_table(
         raise FabricError("texels", f"is {texels}; it must be at least 2 by 2")
     repeat = shape_repeat(fabric)
     slots = 1 if cloth.under == GAP else 2
-    size = math.prod((*repeat, slots, *texels, azimuths))
-    if size > MOST_BYTES:
-        raise FabricError(
-            "shadow",
-            f"horizon would take a table of {size / 1e9:.3g} GB for a repeat of "
-            f"{repeat[0]} x {repeat[1]} cells; use 'traced' or 'peak', which need none",
-        )
+    if math.prod((*repeat, slots, *texels, azimuths)) > MOST_BYTES:
+        return None
     table = np.zeros((*repeat, slots, *texels, azimuths), np.uint8)
     if highest > 0:
         _fill(cloth, rounded, highest, _diamond_directions(azimuths), table)

@@ -5,7 +5,8 @@ each is 1 on pile, which has none, and 0 for light at or below the cloth:
 
 none    : 1, the neighbouring threads are left to the masking term
 peak    : the nearest of the highest points is the horizon in every direction, [Bisker2011] 5.2.3
-horizon : a table of the horizon by place on the thread and azimuth, [Max1988]
+horizon : a table of the horizon by place on the thread and azimuth, [Max1988]; marched instead
+          where the repeat is too large for a table
 traced  : the height field is marched along the ray, the answer that the others are measured by
 """
 
@@ -92,7 +93,8 @@ def compile_shadow(
         the table's own error for `horizon` and PEAK_SOFTNESS for `peak`
     azimuths, texels : size of the horizon table, directions and (along, across) a thread in a cell
 
-    Raises `FabricError` for a repeat whose horizon table would not fit in memory.
+    A repeat too large for a horizon table, a figured cloth of hundreds of ends and picks, is traced
+    instead: the answer's `method` is then TRACED, which is slower and nearer to the truth.
     """
     if method not in METHODS:
         raise FabricError("shadow", f"is '{method}'; it must be one of {', '.join(METHODS)}")
@@ -103,9 +105,12 @@ def compile_shadow(
     highest = highest_point(fabric, cloth)
     table = np.zeros((1, 1, 1, 1, 1, 1), np.uint8)
     if method == "horizon":
-        table = horizon_table(fabric, cloth, rounded, highest, azimuths, texels)
-        if softness is None:
-            softness = horizon_error(cloth, rounded, highest, table)
+        found_table = horizon_table(fabric, cloth, rounded, highest, azimuths, texels)
+        if found_table is None:
+            method = "traced"
+        else:
+            table = found_table
+            softness = softness or horizon_error(cloth, rounded, highest, table)
     found = [crest(t.curve) for t in fabric.thread_list]
     first = np.ones((len(found), max(len(c) for c in found)))
     last = np.zeros_like(first)

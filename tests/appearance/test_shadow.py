@@ -259,11 +259,12 @@ def test_colours_alone_do_not_lengthen_the_table() -> None:
     assert shape_repeat(fabric) == (2, 6)
 
 
-def test_a_repeat_too_large_for_a_table_is_named_with_what_works() -> None:
+def test_a_repeat_too_large_for_a_table_is_marched() -> None:
     vast = replace(PRESETS["linen_plain"], weave=Weave(np.eye(4096, dtype=bool)))
-    with pytest.raises(FabricError, match=r"4096 x 4096 cells; use 'traced' or 'peak'"):
-        compile_shadow(vast, "horizon")
-    g = shadowing(vast, lights(50, 15), places(vast, 50, 16), "traced")
+    shadow = compile_shadow(vast, "horizon")
+    assert METHODS[shadow.method] == "traced"
+    assert shadow.table.size == 1
+    g = shadowing(vast, lights(50, 15), places(vast, 50, 16), "horizon")
     assert ((g == 0) | (g == 1)).all()
 
 
