@@ -111,8 +111,8 @@ class FabricShader:
         _gather(wave.hits, first, wo, wi)
         if level == FAR_LEVEL:
             _sample_far(R, side.tables, side.sampling, wave.hits, first, wo, wi, go)
-            far_values(R, side.tables, wi, wo, towards)
-            far_values(R, side.tables, go, wo, onwards)
+            far_values(R, side.tables, wi, wo, towards, 0, count)
+            far_values(R, side.tables, go, wo, onwards, 0, count)
             _finish_far(R, wave.hits, first, R(self.gap), go, towards, onwards)
             return
         cloth, shadow = side.near(level)
@@ -126,8 +126,12 @@ class FabricShader:
             R, cloth, side.tables, side.sampling, v_sign, wave.hits, first, wo, wi, go, *found
         )
         across_too = level == THREAD_LEVEL
-        point_values(R, side.tables, across_too, sets, threads, psi0, across, wi, wo, towards)
-        point_values(R, side.tables, across_too, sets, threads, psi0, across, go, wo, onwards)
+        point_values(
+            R, side.tables, across_too, sets, threads, psi0, across, wi, wo, towards, 0, count
+        )
+        point_values(
+            R, side.tables, across_too, sets, threads, psi0, across, go, wo, onwards, 0, count
+        )
         _finish_point(
             R, cloth, shadow, v_sign, R(0 if self.gap == 0 else 1), wave.hits, first, wi, go,
             towards, onwards, *found,

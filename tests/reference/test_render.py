@@ -87,9 +87,7 @@ def test_a_png_alone_and_frames_with_numbers(tmp_path):
     camera = UsdGeom.Camera.Define(stage, "/c")
     camera.AddTranslateOp().Set((0, 0.5, 6))
     stage.GetRootLayer().Save()
-    r = render(
-        tmp_path / "s.usda", tmp_path / "x.png", frames=(1, 2), width=32, height=16, spp=2
-    )
+    r = render(tmp_path / "s.usda", tmp_path / "x.png", frames=(1, 2), width=32, height=16, spp=2)
     assert [p.rsplit("/", 1)[1] for p in r.paths] == ["x.0001.png", "x.0002.png"]
     first, second = (read_image(p) for p in r.paths)
     assert not np.array_equal(first, second)
