@@ -25,6 +25,11 @@ Reals = NDArray[Any]
 """float32 or float64, by the precision that the fabric was compiled for."""
 
 
+CLOSEST_NODES = math.radians(0.1)
+"""Nodes are no closer than this [rad]: a lobe may be as narrow as a mirror's, and nodes as close as
+it is wide would fill the memory."""
+
+
 class CompiledFabric(NamedTuple):
     """Arrays and scalars of one fabric; `real` below is the precision asked for.
 
@@ -243,7 +248,7 @@ def _nodes(fabric: Fabric, share: Coverage, error: float | None) -> tuple[Any, .
             area = share.type_area[j, k]
             if not area > 0:
                 continue
-            q = nodes(thread.curve, thread.gamma_surface, error=error)
+            q = nodes(thread.curve, max(thread.gamma_surface, CLOSEST_NODES), error=error)
             one = np.ones(len(q.angle), np.int32)
             for column, values in zip(
                 columns, (q.angle, q.weight * area, q.position, one * k, one * j), strict=True
