@@ -51,14 +51,14 @@ MOST_NODES = 96
 
 CANDIDATES = (
     *(Rule(CELLS, math.radians(x)) for x in (20.0, 10.0, 5.0, 2.5, 1.25, 0.6, 0.3)),
-    *(Rule(POINTS, x) for x in (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18)),
+    *(Rule(POINTS, x) for x in (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.1, 0.05)),
 )
 """Rules that a bound on the error chooses from, see `accuracy`."""
 
 MOST_NODES_EVER = 1024
 """Narrow lobes ask for points without end; no rule with more nodes than this is tried."""
 
-REFERENCES = (Rule(POINTS, 0.1), Rule(CELLS, math.radians(0.1)))
+REFERENCES = (Rule(POINTS, 0.03), Rule(CELLS, math.radians(0.1)))
 """Rules that the others are measured against: the points, unless they are too many."""
 
 
