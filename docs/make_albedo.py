@@ -1,6 +1,6 @@
 """Write docs/albedo.md: how much of a white sky each preset sends back, and the safe albedos.
 
-    python docs/make_albedo.py
+python docs/make_albedo.py
 """
 
 from __future__ import annotations

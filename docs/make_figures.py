@@ -1,6 +1,6 @@
 """Write the figures of docs/appearance.md: threads and cylinders in polar plots, radius in decades.
 
-    python docs/make_figures.py
+python docs/make_figures.py
 """
 
 from __future__ import annotations
