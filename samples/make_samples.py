@@ -66,7 +66,7 @@ def _quads(i: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def finer(points: Points, factor: int, *, around: bool = False) -> Points:
     """A grid with each cell cut into `factor` by `factor`, by cubic splines."""
-    m, n = points.shape[:2]
+    m = points.shape[0]
     if around:
         # Periodic: pad by whole columns, refine, and cut the padding off again.
         pad = 6
