@@ -14,8 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.coverage import GAP, WARP, WEFT, Coverage, coverage, sets
+from fabricusd.appearance.coverage import GAP, Coverage, coverage, sets
 from fabricusd.appearance.curve import is_pile, nodes, pieces
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.thread import pack_threads
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric

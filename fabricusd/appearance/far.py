@@ -11,8 +11,26 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fabricusd.appearance.blocks import (
+    ACROSS_I,
+    ACROSS_O,
+    AXIS_I,
+    AXIS_O,
+    BLOCK,
+    BLUE,
+    GREEN,
+    NORMALIZATION,
+    RED,
+    ROWS,
+    UP_I,
+    UP_O,
+    add_masking,
+    masking_at,
+    node_range,
+    prepare,
+)
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.real import INLINE, KERNEL
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN
 from fabricusd.appearance.segment import along_set, cell_lobes, seen_along, segment
 from fabricusd.appearance.surface_tables import NODE_COS, NODE_HALF, NODE_SIN, NODE_WEIGHT
 from fabricusd.appearance.thread_terms import (
@@ -25,15 +43,6 @@ from fabricusd.appearance.thread_terms import (
 
 NOTHING = 1e-12
 """`Q` at or below which the value is 0, a stated loss: a tenth of random pairs on velvet."""
-
-BLOCK = 512
-"""Directions that the vectorised loops carry through the nodes together: their partial sums stay
-in the first-level cache."""
-
-_AI, _BI, _ZI, _SI, _AO, _BO, _ZO, _SO, _U, _Q, _RED, _GREEN, _BLUE = (
-    row * BLOCK for row in range(13)
-)
-_ROWS = 13
 
 
 @njit(**INLINE)
@@ -55,14 +64,6 @@ def normalization(R, tables, ix, iy, iz, ox, oy, oz):
 
 
 @njit(**INLINE)
-def node_range(tables, thread_set):
-    """(first, last + 1) of the set's nodes."""
-    if thread_set == WARP:
-        return tables.warp_start, tables.nodes.shape[0]
-    return 0, tables.warp_start
-
-
-@njit(**INLINE)
 def node_terms(R, tables, k, a_i, b_i, iz, a_o, b_o, oz):
     """`f_s M cos theta_i` at node k: (surface, volume without `A`)."""
     thread = tables.node_thread[k]
@@ -70,19 +71,19 @@ def node_terms(R, tables, k, a_i, b_i, iz, a_o, b_o, oz):
     row = tables.threads[thread]
     thesis = row[MODEL] == R(THESIS)
     if half > R(0):
-        surface, volume, _, _, _ = segment(
+        surface, volume = segment(
             R, thesis, tables.smooth[thread], tables.overlap_precision,
             c, s, a_i, b_i, iz, a_o, b_o, oz,
         )  # fmt: skip
         surface_lobe, volume_lobe = cell_lobes(R, row, half, c, s, a_i, b_i, iz, a_o, b_o, oz)
         return surface * surface_lobe, volume * volume_lobe
-    surface, volume, _, _, _ = segment(
+    surface, volume = segment(
         R, thesis, row, tables.overlap_precision, c, s, a_i, b_i, iz, a_o, b_o, oz
     )
     return surface, volume
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def far_value(R, tables, ix, iy, iz, ox, oy, oz):
     """(r, g, b) of level `far` for one pair of directions, published models."""
     none = R(0)
@@ -117,48 +118,33 @@ def far_value(R, tables, ix, iy, iz, ox, oy, oz):
 
 
 @njit(**KERNEL)
-def far_values(R, tables, wi, wo, out):
-    """`far_value` of every pair: wi, wo, out (3, n) real.
+def far_values(R, tables, wi, wo, out, begin, end):
+    """`far_value` of the pairs from `begin` to before `end`: wi, wo, out (3, n) real.
 
     The same functions as in the scalar kernel, with the loop over directions innermost so that LLVM
     vectorises it. All partial sums lie in one array: pointers of its own would have to be checked
     for overlap, and there would be too many.
     """
-    n = wi.shape[1]
-    block = np.empty(_ROWS * BLOCK, wi.dtype)
-    for start in range(0, n, BLOCK):
-        size = min(BLOCK, n - start)
+    block = np.empty(ROWS * BLOCK, wi.dtype)
+    for start in range(begin, end, BLOCK):
+        size = min(BLOCK, end - start)
         for x in range(size):
-            block[_Q + x] = tables.gap * wo[2, start + x]
-            block[_RED + x] = block[_GREEN + x] = block[_BLUE + x] = R(0)
+            block[NORMALIZATION + x] = tables.gap * wo[2, start + x]
+            block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
         for thread_set in (WEFT, WARP):
             first, last = node_range(tables, thread_set)
             if first == last:
                 continue
-            _prepare(R, thread_set, tables.overlap_precision, wi, wo, start, size, block)
+            prepare(R, thread_set, tables.overlap_precision, wi, wo, start, size, block)
             for k in range(first, last):
                 _add_node(R, tables, k, size, block)
         for x in range(size):
-            q = block[_Q + x]
+            q = block[NORMALIZATION + x]
             dark = wi[2, start + x] <= R(0) or wo[2, start + x] <= R(0) or q <= R(NOTHING)
             inverse = R(0) if dark else R(1) / q
-            out[0, start + x] = R(0) if dark else block[_RED + x] * inverse
-            out[1, start + x] = R(0) if dark else block[_GREEN + x] * inverse
-            out[2, start + x] = R(0) if dark else block[_BLUE + x] * inverse
-
-
-@njit(**INLINE)
-def _prepare(R, thread_set, precision, wi, wo, start, size, block):
-    """What the set's threads share, for a block."""
-    for x in range(size):
-        iz, oz = wi[2, start + x], wo[2, start + x]
-        a_i, b_i, scale_i, a_o, b_o, scale_o, u = along_set(
-            R, thread_set, precision,
-            wi[0, start + x], wi[1, start + x], iz, wo[0, start + x], wo[1, start + x], oz,
-        )  # fmt: skip
-        block[_AI + x], block[_BI + x], block[_ZI + x], block[_SI + x] = a_i, b_i, iz, scale_i
-        block[_AO + x], block[_BO + x], block[_ZO + x], block[_SO + x] = a_o, b_o, oz, scale_o
-        block[_U + x] = u
+            out[0, start + x] = R(0) if dark else block[RED + x] * inverse
+            out[1, start + x] = R(0) if dark else block[GREEN + x] * inverse
+            out[2, start + x] = R(0) if dark else block[BLUE + x] * inverse
 
 
 @njit(**INLINE)
@@ -167,7 +153,7 @@ def _add_node(R, tables, k, size, block):
     thread = tables.node_thread[k]
     row = tables.threads[thread]
     if tables.published[k] == 0:
-        _add_masking(R, tables, k, size, block)
+        add_masking(R, tables, k, size, block)
     elif tables.nodes[k, NODE_HALF] > R(0):
         if row[MODEL] == R(THESIS):
             _add_cell(R, True, tables, k, row, tables.smooth[thread], size, block)
@@ -180,25 +166,6 @@ def _add_node(R, tables, k, size, block):
 
 
 @njit(**INLINE)
-def _masking_at(R, c, s, block, x):
-    return seen_along(
-        R, c, s, block[_AI + x], block[_ZI + x], block[_SI + x],
-        block[_AO + x], block[_ZO + x], block[_SO + x], block[_U + x],
-    )  # fmt: skip
-
-
-@njit(**INLINE)
-def _add_masking(R, tables, k, size, block):
-    c, s, weight = (
-        tables.nodes[k, NODE_COS],
-        tables.nodes[k, NODE_SIN],
-        tables.nodes[k, NODE_WEIGHT],
-    )
-    for x in range(size):
-        block[_Q + x] += weight * _masking_at(R, c, s, block, x)
-
-
-@njit(**INLINE)
 def _add_point(R, thesis, tables, k, row, size, block):
     c, s, weight = (
         tables.nodes[k, NODE_COS],
@@ -207,16 +174,16 @@ def _add_point(R, thesis, tables, k, row, size, block):
     )
     red, green, blue = row[ALBEDO_R], row[ALBEDO_G], row[ALBEDO_B]
     for x in range(size):
-        p = weight * _masking_at(R, c, s, block, x)
-        surface, volume, _, _, _ = segment(
+        p = weight * masking_at(R, c, s, block, x)
+        surface, volume = segment(
             R, thesis, row, tables.overlap_precision, c, s,
-            block[_AI + x], block[_BI + x], block[_ZI + x],
-            block[_AO + x], block[_BO + x], block[_ZO + x],
+            block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x],
+            block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x],
         )  # fmt: skip
-        block[_Q + x] += p
-        block[_RED + x] += p * (surface + volume * red)
-        block[_GREEN + x] += p * (surface + volume * green)
-        block[_BLUE + x] += p * (surface + volume * blue)
+        block[NORMALIZATION + x] += p
+        block[RED + x] += p * (surface + volume * red)
+        block[GREEN + x] += p * (surface + volume * green)
+        block[BLUE + x] += p * (surface + volume * blue)
 
 
 @njit(**INLINE)
@@ -229,18 +196,18 @@ def _add_cell(R, thesis, tables, k, row, smooth, size, block):
     half = tables.nodes[k, NODE_HALF]
     red, green, blue = row[ALBEDO_R], row[ALBEDO_G], row[ALBEDO_B]
     for x in range(size):
-        p = weight * _masking_at(R, c, s, block, x)
-        surface, volume, _, _, _ = segment(
+        p = weight * masking_at(R, c, s, block, x)
+        surface, volume = segment(
             R, thesis, smooth, tables.overlap_precision, c, s,
-            block[_AI + x], block[_BI + x], block[_ZI + x],
-            block[_AO + x], block[_BO + x], block[_ZO + x],
+            block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x],
+            block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x],
         )  # fmt: skip
         surface_lobe, volume_lobe = cell_lobes(
-            R, row, half, c, s, block[_AI + x], block[_BI + x], block[_ZI + x],
-            block[_AO + x], block[_BO + x], block[_ZO + x],
+            R, row, half, c, s, block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x],
+            block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x],
         )  # fmt: skip
         surface, volume = surface * surface_lobe, volume * volume_lobe
-        block[_Q + x] += p
-        block[_RED + x] += p * (surface + volume * red)
-        block[_GREEN + x] += p * (surface + volume * green)
-        block[_BLUE + x] += p * (surface + volume * blue)
+        block[NORMALIZATION + x] += p
+        block[RED + x] += p * (surface + volume * red)
+        block[GREEN + x] += p * (surface + volume * green)
+        block[BLUE + x] += p * (surface + volume * blue)

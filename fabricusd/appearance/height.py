@@ -15,8 +15,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.coverage import WARP, WEFT
 from fabricusd.appearance.curve import peak
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.real import INLINE, LEAN
 from fabricusd.appearance.weave import crown_on, lookup, rise_on, wrap
 from fabricusd.errors import FabricError
@@ -54,7 +54,7 @@ def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first): 
     """
     du, dv = dx / float(cloth.pitch[WARP]), dy / float(cloth.pitch[WEFT])
     nearest = NEAREST * min(float(cloth.pitch[WARP]), float(cloth.pitch[WEFT]))
-    end, pick = math.floor(u), math.floor(v)
+    end, pick = np.floor(u), np.floor(v)
     begin, asked = 0.0, k
     for _ in range(CELLS):
         to_end = ((end + 1.0 if du > 0.0 else end) - u) / du if du != 0.0 else np.inf
@@ -80,7 +80,7 @@ def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h
     warp = int(cloth.sequence[WARP, wrap(end, cloth.sequence_length[WARP])])
     weft = int(cloth.sequence[WEFT, wrap(pick, cloth.sequence_length[WEFT])])
     top = int(cloth.grid[i, j])
-    own = end == math.floor(u) if which == WARP else pick == math.floor(v)
+    own = end == np.floor(u) if which == WARP else pick == np.floor(v)
     if top == WARP:
         over, over_t, along, along_t = u - end, du, v - pick, dv
         above, below, crossing, below_crossing = warp, weft, cloth.pitch[WEFT], cloth.pitch[WARP]

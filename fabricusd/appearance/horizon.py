@@ -16,10 +16,11 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric
-from fabricusd.appearance.coverage import GAP, WARP
+from fabricusd.appearance.coverage import GAP
+from fabricusd.appearance.frame import WARP
 from fabricusd.appearance.height import crown_of, steepest
 from fabricusd.appearance.real import INLINE, KERNEL, LEAN
-from fabricusd.appearance.weave import find, height_on, wrap
+from fabricusd.appearance.weave import FARTHEST, find, height_on, split, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -144,10 +145,8 @@ def _texel_centre(cloth, i, j, slot, along, across):  # type: ignore[no-untyped-
 @njit(**INLINE)
 def diamond(R, x, y):  # type: ignore[no-untyped-def]
     """Azimuth of (x, y) from 0 to 4: one per quadrant, linear in y/(|x| + |y|) inside it."""
-    whole = abs(x) + abs(y)
-    if y >= R(0):
-        return y / whole if x >= R(0) else R(1) - x / whole
-    return R(2) - y / whole if x < R(0) else R(3) + x / whole
+    part = x / (abs(x) + abs(y))
+    return R(1) - part if y >= R(0) else R(3) + part
 
 
 @njit(**INLINE)
@@ -166,24 +165,31 @@ def _between(R, table, i, j, slot, row, column, first, second, c):  # type: igno
 
 
 @njit(**INLINE)
-def horizon_sine(R, cloth, table, u, v, which, x, y):  # type: ignore[no-untyped-def]
-    """Sine of the horizon's elevation at (u, v) on the thread of set `which` towards (x, y)."""
-    end, pick = math.floor(u), math.floor(v)
-    i, j = wrap(end, table.shape[0]), wrap(pick, table.shape[1])
-    p, q = R(u - end), R(v - pick)
-    top = which
-    if table.shape[2] > 1:
-        top = int(cloth.grid[wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])])
-    if top == WARP:
-        p, q = q, p
+def split_table(table, u, v):  # type: ignore[no-untyped-def]
+    """Cell of the table at weave coordinates, float64; where they are not sound, the first one."""
+    sound = abs(u) <= FARTHEST and abs(v) <= FARTHEST
+    return (
+        wrap(np.floor(u) if sound else 0.0, table.shape[0]),
+        wrap(np.floor(v) if sound else 0.0, table.shape[1]),
+    )
+
+
+@njit(**INLINE)
+def horizon_at(R, cloth, table, i, j, in_u, in_v, p, q, which, x, y):  # type: ignore[no-untyped-def]
+    """Sine of the horizon's elevation on the thread of set `which` towards (x, y).
+
+    (i, j), (in_u, in_v) : the cell, modulo the grid and modulo the table, see `split_table`;
+    (p, q) : place in the cell
+    """
+    top = int(cloth.grid[i, j])
+    along, over = (q, p) if top == WARP else (p, q)
     width = cloth.width[top]
-    slot = 0
-    if which == top:
-        along, across = p, (q - R(0.5)) / width + R(0.5)
-    else:
-        slot = 1
-        seen = q if q < R(0.5) else q - width
-        along, across = seen / (R(1) - width), (p - R(0.5)) / cloth.under_width + R(0.5)
+    on_top = which == top
+    # Selections, not branches: neither thread nor azimuth can be predicted.
+    seen = (over if over < R(0.5) else over - width) / max(R(1) - width, cloth.tiny)
+    across = ((over if on_top else along) - R(0.5)) / (width if on_top else cloth.under_width)
+    slot = 0 if on_top else table.shape[2] - 1
+    along, across = along if on_top else seen, across + R(0.5)
     row, a = _cell_of_texels(R, along, table.shape[3])
     column, b = _cell_of_texels(R, across, table.shape[4])
     azimuths = table.shape[5]
@@ -191,10 +197,10 @@ def horizon_sine(R, cloth, table, u, v, which, x, y):  # type: ignore[no-untyped
     first = min(int(turn), azimuths - 1)
     c = turn - R(first)
     second = first + 1 if first + 1 < azimuths else 0
-    here = _between(R, table, i, j, slot, row, column, first, second, c)
-    beside = _between(R, table, i, j, slot, row, column + 1, first, second, c)
-    ahead = _between(R, table, i, j, slot, row + 1, column, first, second, c)
-    both = _between(R, table, i, j, slot, row + 1, column + 1, first, second, c)
+    here = _between(R, table, in_u, in_v, slot, row, column, first, second, c)
+    beside = _between(R, table, in_u, in_v, slot, row, column + 1, first, second, c)
+    ahead = _between(R, table, in_u, in_v, slot, row + 1, column, first, second, c)
+    both = _between(R, table, in_u, in_v, slot, row + 1, column + 1, first, second, c)
     near = here + (beside - here) * b
     far = ahead + (both - ahead) * b
     return (near + (far - near) * a) * R(1.0 / 255.0)
@@ -213,7 +219,9 @@ def _compare(cloth, rounded, highest, table, uv, angle, out):  # type: ignore[no
             slope = steepest(
                 cloth, rounded, highest, uv[k, 0], uv[k, 1], which, crown, h, x, y, LOWEST, False
             )  # fmt: skip
-            sine = horizon_sine(np.float64, cloth, table, uv[k, 0], uv[k, 1], which, x, y)
+            i, j, _, _, p, q = split(np.float64, cloth, uv[k, 0], uv[k, 1])
+            row, column = split_table(table, uv[k, 0], uv[k, 1])
+            sine = horizon_at(np.float64, cloth, table, i, j, row, column, p, q, which, x, y)
             out[k] = math.asin(min(1.0, sine)) - math.atan(slope)
 
 

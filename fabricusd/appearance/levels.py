@@ -12,29 +12,28 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.far import (
-    _AI,
-    _AO,
-    _BI,
-    _BO,
-    _BLUE,
-    _GREEN,
-    _Q,
-    _RED,
-    _SI,
-    _SO,
-    _U,
-    _ZI,
-    _ZO,
+from fabricusd.appearance.blocks import (
+    ACROSS_I,
+    ACROSS_O,
+    AXIS_I,
+    AXIS_O,
     BLOCK,
-    NOTHING,
-    _add_masking,
-    _prepare,
+    BLUE,
+    GREEN,
+    NORMALIZATION,
+    OVERLAP,
+    RED,
+    SCALE_I,
+    SCALE_O,
+    UP_I,
+    UP_O,
+    add_masking,
     node_range,
-    normalization,
+    prepare,
 )
-from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.real import INLINE, KERNEL, cos, sin
+from fabricusd.appearance.far import NOTHING, normalization
+from fabricusd.appearance.frame import WARP, WEFT, cos_inclination, unit_azimuth
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, cos, sin
 from fabricusd.appearance.segment import across, along_set, seen_along, segment
 from fabricusd.appearance.thread_terms import (
     ALBEDO_B,
@@ -51,7 +50,7 @@ _FOUND = 13 * BLOCK
 _ANGLE, _ACROSS = _FOUND + 9 * BLOCK, _FOUND + 10 * BLOCK
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def point_value(R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz):
     """(r, g, b) on `thread` of `thread_set` at tangent angle psi0 [rad], published models.
 
@@ -86,35 +85,43 @@ def point_value(R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, 
 @njit(**INLINE)
 def _bit_of_thread(R, thesis, across_too, row, precision, c, s, w, a_i, b_i, iz, a_o, b_o, oz):
     """`segment`, with the factors across the width where they are asked for."""
-    surface, volume, sin_phi_i, sin_phi_o, cos_half = segment(
-        R, thesis, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz
-    )
+    surface, volume = segment(R, thesis, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz)
     if across_too:
-        on_surface, on_volume = across(R, row, w, sin_phi_i, sin_phi_o, cos_half)
+        n_i, n_o = s * a_i + c * iz, s * a_o + c * oz
+        on_surface, on_volume = across_at(R, row, w, b_i, n_i, b_o, n_o)
         return surface * on_surface, volume * on_volume
     return surface, volume
 
 
+@njit(**INLINE)
+def across_at(R, row, w, b_i, n_i, b_o, n_o):
+    """`across` of two directions' components b and n in the thread frame."""
+    sin_i, cos_i = unit_azimuth(R, b_i, n_i, cos_inclination(R, b_i, n_i))
+    sin_o, cos_o = unit_azimuth(R, b_o, n_o, cos_inclination(R, b_o, n_o))
+    return across(R, row, w, sin_i, cos_i, sin_o, cos_o)
+
+
 @njit(**KERNEL)
-def point_values(R, tables, across_too, sets, threads, psi0, w, wi, wo, out):
-    """`point_value` at every place: sets, threads (n,) ints, psi0, w (n,) real, the rest (3, n).
+def point_values(R, tables, across_too, sets, threads, psi0, w, wi, wo, out, begin, end):
+    """`point_value` at the places from `begin` to before `end`.
+
+    sets, threads : (n,) ints; psi0, w : (n,) real; wi, wo, out : (3, n) real
 
     Points of one thread are brought together in each block, so that the thread's numbers are
     constants of a loop that LLVM vectorises. A set that is neither weft nor warp is a gap.
     """
-    n = wi.shape[1]
     block = np.empty(_ROWS * BLOCK, wi.dtype)
     where = np.empty(BLOCK, np.int32)
-    for start in range(0, n, BLOCK):
-        size = min(BLOCK, n - start)
+    for start in range(begin, end, BLOCK):
+        size = min(BLOCK, end - start)
         for x in range(size):
-            block[_Q + x] = tables.gap * wo[2, start + x]
-            block[_RED + x] = block[_GREEN + x] = block[_BLUE + x] = R(0)
+            block[NORMALIZATION + x] = tables.gap * wo[2, start + x]
+            block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
         for thread_set in (WEFT, WARP):
-            _prepare(R, thread_set, tables.overlap_precision, wi, wo, start, size, block)
+            prepare(R, thread_set, tables.overlap_precision, wi, wo, start, size, block)
             first, last = node_range(tables, thread_set)
             for k in range(first, last):
-                _add_masking(R, tables, k, size, block)
+                add_masking(R, tables, k, size, block)
             for thread in range(tables.threads.shape[0]):
                 model = tables.threads[thread, MODEL]
                 if model == R(CONSERVING):
@@ -127,12 +134,12 @@ def point_values(R, tables, across_too, sets, threads, psi0, w, wi, wo, out):
                 else:
                     _of_one_thread(R, False, across_too, tables, thread, found, block, where)
         for x in range(size):
-            q = block[_Q + x]
+            q = block[NORMALIZATION + x]
             dark = wi[2, start + x] <= R(0) or wo[2, start + x] <= R(0) or q <= R(NOTHING)
             inverse = R(0) if dark else R(1) / q
-            out[0, start + x] = R(0) if dark else block[_RED + x] * inverse
-            out[1, start + x] = R(0) if dark else block[_GREEN + x] * inverse
-            out[2, start + x] = R(0) if dark else block[_BLUE + x] * inverse
+            out[0, start + x] = R(0) if dark else block[RED + x] * inverse
+            out[1, start + x] = R(0) if dark else block[GREEN + x] * inverse
+            out[2, start + x] = R(0) if dark else block[BLUE + x] * inverse
 
 
 @njit(**INLINE)
@@ -143,7 +150,7 @@ def _bring_together(thread_set, thread, sets, threads, psi0, w, start, size, blo
         if sets[start + x] == thread_set and threads[start + x] == thread:
             where[found] = x
             found += 1
-    for row in range(_AI, _Q, BLOCK):
+    for row in range(AXIS_I, NORMALIZATION, BLOCK):
         for y in range(found):
             block[_FOUND + row + y] = block[row + where[y]]
     for y in range(found):
@@ -159,16 +166,18 @@ def _of_one_thread(R, thesis, across_too, tables, thread, found, block, where):
     for y in range(found):
         x = _FOUND + y
         c, s = cos(R, block[_ANGLE + y]), sin(R, block[_ANGLE + y])
-        a_i, b_i, iz = block[_AI + x], block[_BI + x], block[_ZI + x]
-        a_o, b_o, oz = block[_AO + x], block[_BO + x], block[_ZO + x]
-        p = seen_along(R, c, s, a_i, iz, block[_SI + x], a_o, oz, block[_SO + x], block[_U + x])
+        a_i, b_i, iz = block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x]
+        a_o, b_o, oz = block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x]
+        p = seen_along(
+            R, c, s, a_i, iz, block[SCALE_I + x], a_o, oz, block[SCALE_O + x], block[OVERLAP + x]
+        )
         surface, volume = _bit_of_thread(
             R, thesis, across_too, row, precision, c, s, block[_ACROSS + y],
             a_i, b_i, iz, a_o, b_o, oz,
         )  # fmt: skip
-        block[_AI + x], block[_BI + x] = surface * p, volume * p
+        block[AXIS_I + x], block[ACROSS_I + x] = surface * p, volume * p
     for y in range(found):
-        surface, volume = block[_FOUND + _AI + y], block[_FOUND + _BI + y]
-        block[_RED + where[y]] = surface + volume * row[ALBEDO_R]
-        block[_GREEN + where[y]] = surface + volume * row[ALBEDO_G]
-        block[_BLUE + where[y]] = surface + volume * row[ALBEDO_B]
+        surface, volume = block[_FOUND + AXIS_I + y], block[_FOUND + ACROSS_I + y]
+        block[RED + where[y]] = surface + volume * row[ALBEDO_R]
+        block[GREEN + where[y]] = surface + volume * row[ALBEDO_G]
+        block[BLUE + where[y]] = surface + volume * row[ALBEDO_B]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.coverage import WARP, WEFT, coverage
-from fabricusd.appearance.curve import pieces
+from fabricusd.appearance.curve import Pieces, pieces
 from fabricusd.fabric import Fabric, TangentCurve
 
 Floats = NDArray[np.float64]
@@ -27,12 +27,14 @@ POINTS, CELLS = "points", "cells"
 ERF_COST = 1.8
 """Time of a node with error functions over that of one without, measured on both precisions."""
 
-WIDEST_CELL = math.radians(10.0)
-"""A cell's factors other than the lobe are taken at its middle, so it has to stay this small."""
-
 
 class Rule(NamedTuple):
-    """A quadrature rule: `POINTS` or `CELLS`, and how far apart in surface lobe widths."""
+    """A quadrature rule.
+
+    form : POINTS or CELLS
+    spacing : how far apart nodes are in tangent angle, at most: in widths of the thread's surface
+        lobe for POINTS, in radians for CELLS, whose lobes are exact and whose other factors are not
+    """
 
     form: str
     spacing: float
@@ -41,13 +43,23 @@ class Rule(NamedTuple):
 DEFAULT = Rule(POINTS, 1.0)
 """Mean error 0.5 % on the widest lobes (linen), below 0.12 % on the other published fabrics."""
 
+NARROW = Rule(CELLS, math.radians(5.0))
+"""What a fabric takes whose lobes are so narrow that it would take more than MOST_NODES points:
+mean error below 0.3 %."""
+
 MOST_NODES = 96
-"""A fabric that would take more points than this takes `CELLS`: its lobes are narrow."""
 
 CANDIDATES = (
-    *(Rule(CELLS, x) for x in (10.0, 5.0, 3.0, 2.0)),
-    *(Rule(POINTS, x) for x in (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.35, 0.25, 0.12)),
+    *(Rule(CELLS, math.radians(x)) for x in (20.0, 10.0, 5.0, 2.5, 1.25, 0.6, 0.3)),
+    *(Rule(POINTS, x) for x in (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18)),
 )
+"""Rules that a bound on the error chooses from, see `accuracy`."""
+
+MOST_NODES_EVER = 1024
+"""Narrow lobes ask for points without end; no rule with more nodes than this is tried."""
+
+REFERENCES = (Rule(POINTS, 0.1), Rule(CELLS, math.radians(0.1)))
+"""Rules that the others are measured against: the points, unless they are too many."""
 
 
 class CurveNodes(NamedTuple):
@@ -75,20 +87,21 @@ class CurveNodes(NamedTuple):
 def curve_nodes(fabric: Fabric, rule: Rule = DEFAULT) -> CurveNodes:
     """The nodes of `rule` over the fabric's curves. Pieces of one angle take one node."""
     area = coverage(fabric).type_area
-    found: list[tuple[Floats, Floats, Floats, int]] = []
+    found: list[tuple[Floats, Floats, Floats]] = []
+    owner: list[NDArray[np.int32]] = []
     counts = {WEFT: 0, WARP: 0}
     for j in (WEFT, WARP):
         for k, thread in enumerate(fabric.thread_list):
             if area[j, k] > 0:
                 psi0, weight, half = _of_curve(thread.curve, thread.gamma_surface, rule)
-                found.append((psi0, weight * area[j, k], half, k))
+                found.append((psi0, weight * area[j, k], half))
+                owner.append(np.full(len(psi0), k, np.int32))
                 counts[j] += len(psi0)
     if not found:
         nothing = np.zeros(0)
         return CurveNodes(nothing, nothing, nothing, np.zeros(0, np.int32), 0)
     psi0, weight, half = (np.concatenate([f[i] for f in found]) for i in range(3))
-    thread = np.concatenate([np.full(len(f[0]), f[3], np.int32) for f in found])
-    return CurveNodes(psi0, weight, half, thread, counts[WEFT])
+    return CurveNodes(psi0, weight, half, np.concatenate(owner), counts[WEFT])
 
 
 def count_nodes(fabric: Fabric, rule: Rule) -> int:
@@ -103,20 +116,15 @@ def count_nodes(fabric: Fabric, rule: Rule) -> int:
 
 
 def default_rule(fabric: Fabric) -> Rule:
-    """`DEFAULT`, or cells where the lobes are so narrow that points would be too many."""
-    for rule in (DEFAULT, Rule(CELLS, 3.0)):
-        if count_nodes(fabric, rule) <= MOST_NODES:
-            return rule
-    return Rule(CELLS, math.inf)
+    """`DEFAULT`, or `NARROW` where points would be too many."""
+    return DEFAULT if count_nodes(fabric, DEFAULT) <= MOST_NODES else NARROW
 
 
-def _counts(p: NamedTuple, width: float, rule: Rule) -> NDArray[np.int64]:
-    change = np.abs(p.last - p.first)  # type: ignore[attr-defined]
-    step = rule.spacing * width
-    if rule.form == CELLS:
-        step = min(step, WIDEST_CELL)
+def _counts(p: Pieces, width: float, rule: Rule) -> NDArray[np.int64]:
+    step = rule.spacing * width if rule.form == POINTS else rule.spacing
     # A piece of exactly `step` takes one node, whatever rounding says.
-    return np.maximum(1, np.ceil(change / step - 1e-9)).astype(np.int64)
+    count = np.ceil(np.abs(p.last - p.first) / step - 1e-9)
+    return np.asarray(np.maximum(count, 1), np.int64)
 
 
 def _of_curve(curve: TangentCurve, width: float, rule: Rule) -> tuple[Floats, Floats, Floats]:

@@ -29,7 +29,7 @@ from fabricusd.appearance.thread_terms import (
 )
 
 ACROSS_MINIMUM = 0.1
-"""Least `beta` of level `thread`: a highlight narrower than this share of the half width aliases."""
+"""Least `beta` of level `thread`, in half widths: a narrower highlight would alias."""
 
 
 @njit(**INLINE)
@@ -74,7 +74,7 @@ def seen_along(R, c, s, a_i, iz, scale_i, a_o, oz, scale_o, u):
 
 @njit(**INLINE)
 def segment(R, thesis, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
-    """`f_s M cos theta_i` as (surface, volume without `A`), and the sines of both azimuths phi.
+    """`f_s M cos theta_i` as (surface, volume without `A`).
 
     Times `seen_along` it is the integrand of level `far`; 0 where `M` is.
     """
@@ -87,15 +87,15 @@ def segment(R, thesis, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
     u = overlap(R, cos_half, precision)
     m = masked(R, max(cos_phi_i, R(0)), max(cos_phi_o, R(0)), u) * cos_i
     surface, volume = published_terms(R, thesis, row, t_i, cos_i, t_o, cos_o, cos_half)
-    return surface * m, volume * m, sin_phi_i, sin_phi_o, cos_half
+    return surface * m, volume * m
 
 
 @njit(**INLINE)
 def cell_lobes(R, row, half, c, s, a_i, b_i, iz, a_o, b_o, oz):
     """Surface and volume lobe averaged over a stretch of tangent angle, `half` [rad] to each side.
 
-    Across it theta_h is taken as linear in the tangent angle, with slope -(cos phi_i + cos phi_o)/2:
-    exact in the plane of the thread, an approximation out of it.
+    Across it theta_h is taken as linear in the tangent angle, with slope
+    -(cos phi_i + cos phi_o)/2: exact in the plane of the thread, an approximation out of it.
     """
     t_i, n_i = c * a_i - s * iz, s * a_i + c * iz
     t_o, n_o = c * a_o - s * oz, s * a_o + c * oz
@@ -129,17 +129,18 @@ def mean_gaussian(R, width, half_precision, norm, x, reach):
 
 
 @njit(**INLINE)
-def across(R, row, w, sin_phi_i, sin_phi_o, cos_half):
+def across(R, row, w, sin_phi_i, cos_phi_i, sin_phi_o, cos_phi_o):
     """Factors on the surface and the volume term at `w` in [-1, 1] across the thread.
 
     Each averages to 1 over w, so the mean of level `thread` over the width is level `weave`.
     """
-    # The bisector of the azimuths; where M is not 0 it stays within 90 degrees of the normal.
-    h = R(0.5) * (sin_phi_i + sin_phi_o) / max(cos_half, R(1e-6))
-    h = min(max(h, R(-1)), R(1))
+    # The bisector of the azimuths has the sine h; beyond 90 degrees it touches the edge.
+    y, x = sin_phi_i + sin_phi_o, cos_phi_i + cos_phi_o
+    edge = R(1) if y > R(0) else (R(-1) if y < R(0) else R(0))
+    h = edge if x < R(0) else y / max(math.sqrt(x * x + y * y), R(1e-6))
     beta = max(row[GAMMA_SURFACE], R(ACROSS_MINIMUM))
     scale = R(math.sqrt(0.5)) / beta
     ends = erf(R, (R(1) - h) * scale) + erf(R, (R(1) + h) * scale)
     z = beta * R(math.sqrt(2.0 * math.pi) / 4.0) * ends
-    x = (w - h) * scale
-    return exp(R, -x * x) / z, R(1) + R(0.5) * w * (sin_phi_i + sin_phi_o)
+    d = (w - h) * scale
+    return exp(R, -d * d) / z, R(1) + R(0.5) * w * (sin_phi_i + sin_phi_o)

@@ -19,18 +19,20 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.coverage import GAP, WARP, WEFT
+from fabricusd.appearance.coverage import GAP
 from fabricusd.appearance.curve import crest, peak
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.height import crown_of, highest_point, level_is_round, steepest
 from fabricusd.appearance.horizon import (
     AZIMUTHS,
     TEXELS,
+    horizon_at,
     horizon_error,
-    horizon_sine,
     horizon_table,
+    split_table,
 )
 from fabricusd.appearance.real import INLINE, KERNEL, LEAN
-from fabricusd.appearance.weave import find, height_on, wrap
+from fabricusd.appearance.weave import BLOCK, height_on, split, split_block, thread_at, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -126,6 +128,16 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: 
 
     What is not a number stays so, and never indexes a table.
     """
+    i, j, _, _, p, q = split(R, cloth, u, v)
+    in_u, in_v = split_table(shadow.table, u, v)
+    return lit_at(
+        R, cloth, shadow, u, v, i, j, in_u, in_v, p, q, which, thread, s, w, length, x, y, z
+    )
+
+
+@njit(**INLINE)
+def lit_at(R, cloth, shadow, u, v, i, j, in_u, in_v, p, q, which, thread, s, w, length, x, y, z):  # type: ignore[no-untyped-def]
+    """`lit` at a place that `weave.split` and `horizon.split_table` have found already."""
     flat = math.sqrt(x * x + y * y)
     if not (s >= R(0) and flat < R(2) and z < R(2)):
         return R(np.nan)
@@ -136,7 +148,7 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: 
     if flat <= R(1e-6) * z:
         return R(1)
     if shadow.method == HORIZON:
-        sine = horizon_sine(R, cloth, shadow.table, u, v, which, x, y)
+        sine = horizon_at(R, cloth, shadow.table, i, j, in_u, in_v, p, q, which, x, y)
         cosine = math.sqrt(max(R(0), R(1) - sine * sine))
         return _soft(R, z * cosine - flat * sine, shadow.softness)
     axis = height_on(R, cloth, thread, s, length)
@@ -146,7 +158,7 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: 
         if drop <= R(1e-6) * shadow.highest:
             return R(1)
         # No horizon lower than this one can touch the shadow's edge.
-        lowest = max(z / flat - shadow.softness * (R(1) + z * z / (flat * flat)), R(4e-3))
+        lowest = max(z / flat - shadow.softness * (R(1) + z * z / (flat * flat)), R(1e-6))
         distance = R(_to_crest(cloth, shadow, u, v, float(drop / lowest)))
         reach = math.sqrt(drop * drop + distance * distance)
         return _soft(R, (z * distance - flat * drop) / reach, shadow.softness)
@@ -170,7 +182,7 @@ def _soft(R, above, softness):  # type: ignore[no-untyped-def]
 @njit(**LEAN)
 def _to_crest(cloth, shadow, u, v, most):  # type: ignore[no-untyped-def]
     """Distance on the cloth [m] to the nearest of the highest points, at most `most`."""
-    end, pick = math.floor(u), math.floor(v)
+    end, pick = np.floor(u), np.floor(v)
     pitch_u, pitch_v = float(cloth.pitch[WARP]), float(cloth.pitch[WEFT])
     best = most
     for ring in range(SEARCH):
@@ -227,17 +239,32 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):  # type: ignore[no-unt
     return best
 
 
+@njit(**LEAN)
+def _split_block(R, cloth, table, uv, begin, cells, p, q):  # type: ignore[no-untyped-def]
+    """`split` and `split_table` of a block of places: cells (6, b) int32, p and q (b,)."""
+    split_block(R, cloth, uv, begin, cells, p, q)
+    for k in range(p.size):
+        cells[4, k], cells[5, k] = split_table(table, uv[begin + k, 0], uv[begin + k, 1])
+
+
 @njit(parallel=True, **KERNEL)
 def lit_all(R, cloth, shadow, uv, wi, out):  # type: ignore[no-untyped-def]
     """`lit` at weave coordinates uv (n, 2) float64 for light wi (n, 3), into out (n,)."""
     n = uv.shape[0]
-    block = 1024
-    for b in prange((n + block - 1) // block):
-        for k in range(b * block, min(n, (b + 1) * block)):
-            which, thread, s, w, _, length = find(R, cloth, uv[k, 0], uv[k, 1])
-            out[k] = lit(
-                R, cloth, shadow, uv[k, 0], uv[k, 1], which, thread, s, w, length,
-                wi[k, 0], wi[k, 1], wi[k, 2],
+    for b in prange((n + BLOCK - 1) // BLOCK):
+        begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
+        cells = np.empty((6, size), np.int32)
+        p, q = np.empty(size, out.dtype), np.empty(size, out.dtype)
+        _split_block(R, cloth, shadow.table, uv, begin, cells, p, q)
+        for x in range(size):
+            k = begin + x
+            i, j = cells[0, x], cells[1, x]
+            which, thread, s, w, _, length = thread_at(
+                R, cloth, i, j, cells[2, x], cells[3, x], p[x], q[x]
+            )
+            out[k] = lit_at(
+                R, cloth, shadow, uv[k, 0], uv[k, 1], i, j, cells[4, x], cells[5, x], p[x], q[x],
+                which, thread, s, w, length, wi[k, 0], wi[k, 1], wi[k, 2],
             )  # fmt: skip
 
 

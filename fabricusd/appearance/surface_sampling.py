@@ -12,6 +12,7 @@ Source: `docs/model.md` section 6. Scalar kernels, for the path tracer and the l
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any, NamedTuple
 
@@ -19,11 +20,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabricusd.appearance.blocks import node_range
 from fabricusd.appearance.coverage import WARP, WEFT, coverage
 from fabricusd.appearance.curve import pieces
-from fabricusd.appearance.far import node_range, normalization
+from fabricusd.appearance.far import normalization
 from fabricusd.appearance.frame import from_thread, to_thread
-from fabricusd.appearance.real import INLINE, KERNEL, atan2, cos, sin
+from fabricusd.appearance.real import INLINE, LEAN, atan2, cos, sin
 from fabricusd.appearance.sampling_lobes import (
     ISOTROPIC,
     STEEPEST,
@@ -89,8 +91,10 @@ class SamplingTables(NamedTuple):
 def sampling_tables(fabric: Fabric, tables: SurfaceTables) -> SamplingTables:
     """Stretches of `fabric` and the shares of their lobes, measured on `tables`."""
     R = tables.nodes.dtype.type
-    rows = np.array(_stretches(fabric), np.float64).reshape(-1, STRETCH_COLUMNS)
-    owner = _owners(rows, tables)
+    rows = stretches_of(fabric)
+    psi0 = np.arctan2(tables.nodes[:, NODE_SIN], tables.nodes[:, NODE_COS])
+    sets = np.where(np.arange(len(psi0)) >= tables.warp_start, WARP, WEFT)
+    owner = owners(rows, psi0, sets, tables.node_thread)
     stretches = rows.astype(R)
     energy = np.zeros((ELEVATIONS, AZIMUTHS, 3 * len(rows)))
     _measure(R, tables, stretches, owner, energy)
@@ -101,8 +105,8 @@ def sampling_tables(fabric: Fabric, tables: SurfaceTables) -> SamplingTables:
     return SamplingTables(stretches, np.ascontiguousarray(shares, dtype=R))
 
 
-def _stretches(fabric: Fabric) -> list[tuple[float, ...]]:
-    """Rows of `SamplingTables.stretches`."""
+def stretches_of(fabric: Fabric) -> NDArray[np.float64]:
+    """(s, 8) `SamplingTables.stretches` of a fabric."""
     rows = []
     area = coverage(fabric).type_area
     for j in (WEFT, WARP):
@@ -117,7 +121,7 @@ def _stretches(fabric: Fabric) -> list[tuple[float, ...]]:
                     for g in (thread.gamma_surface, thread.gamma_volume)
                 ]
                 rows.append((j, k, psi0, math.cos(psi0), math.sin(psi0), math.tan(psi0), *widths))
-    return rows
+    return np.array(rows, np.float64).reshape(-1, STRETCH_COLUMNS)
 
 
 def _curve_stretches(curve: TangentCurve, width: float) -> list[tuple[float, float]]:
@@ -138,7 +142,7 @@ def _curve_stretches(curve: TangentCurve, width: float) -> list[tuple[float, flo
     high = float(np.maximum(p.first, p.last)[~level].max())
     count = max(1, math.ceil((high - low) / WIDEST_STRETCH - 1e-9))
     edges = np.linspace(low, high, count + 1)
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in itertools.pairwise(edges):
         a = np.clip(np.minimum(p.first, p.last)[~level], first, last)
         b = np.clip(np.maximum(p.first, p.last)[~level], first, last)
         if (b - a).max() > 1e-9:
@@ -147,16 +151,19 @@ def _curve_stretches(curve: TangentCurve, width: float) -> list[tuple[float, flo
     return found
 
 
-def _owners(rows: NDArray[np.float64], tables: SurfaceTables) -> NDArray[np.int32]:
+def owners(
+    rows: NDArray[np.float64],
+    psi0: NDArray[Any],
+    sets: NDArray[np.intp],
+    threads: NDArray[np.int32],
+) -> NDArray[np.int32]:
     """(q,) the stretch that each quadrature node belongs to: the nearest of its thread and set."""
-    psi0 = np.arctan2(tables.nodes[:, NODE_SIN], tables.nodes[:, NODE_COS])
-    sets = np.where(np.arange(len(psi0)) >= tables.warp_start, WARP, WEFT)
     distance = np.abs(psi0[:, None] - rows[:, PSI0])
-    other = (sets[:, None] != rows[:, SET]) | (tables.node_thread[:, None] != rows[:, THREAD])
+    other = (sets[:, None] != rows[:, SET]) | (threads[:, None] != rows[:, THREAD])
     return np.argmin(np.where(other, np.inf, distance), axis=1).astype(np.int32)
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def _measure(R, tables, stretches, owner, energy):
     """Energy of every lobe at every view, each by directions drawn from the lobe itself."""
     for e in range(ELEVATIONS):
@@ -221,10 +228,10 @@ def _lobe_energy(R, tables, stretches, owner, y, lobe, ox, oy, oz):
 
 @njit(**INLINE)
 def _parts(R, tables, k, c, s, a_i, b_i, iz, a_o, b_o, oz):
-    """(surface, directed volume, isotropic volume) of `f_s M cos theta_i` at node k, by brightness."""
+    """`f_s M cos theta_i` at node k in grey: surface, directed volume, isotropic volume."""
     thread = tables.node_thread[k]
     row = tables.threads[thread]
-    surface, volume, _, _, _ = segment(
+    surface, volume = segment(
         R, row[MODEL] == R(THESIS), tables.smooth[thread], tables.overlap_precision,
         c, s, a_i, b_i, iz, a_o, b_o, oz,
     )  # fmt: skip
@@ -257,7 +264,7 @@ def share_at(R, shares, corner, k):
     return low + e * (high - low)
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def far_density(R, sampling, ix, iy, iz, ox, oy, oz):
     """pdf(wi) [1/sr] of `far_direction`; 0 at or below the cloth."""
     if iz <= R(0) or oz <= R(0):
@@ -289,7 +296,7 @@ def uniform_direction(R, u1, u2):
     return flat * cos(R, phi), flat * sin(R, phi), u1
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def far_direction(R, sampling, ox, oy, oz, u0, u1, u2):
     """wi (x, y, z) for a viewer above the cloth and three numbers in [0, 1)."""
     left = u0 - R(UNIFORM)
@@ -314,11 +321,11 @@ def far_direction(R, sampling, ox, oy, oz, u0, u1, u2):
 
 
 @njit(**INLINE)
-def _nearest_stretch(R, sampling, thread_set, thread, psi0):
+def nearest_stretch(R, stretches, thread_set, thread, psi0):
     """The stretch of a thread in a set whose tangent angle is nearest to psi0."""
     best, least = 0, R(1e9)
-    for y in range(sampling.stretches.shape[0]):
-        row = sampling.stretches[y]
+    for y in range(stretches.shape[0]):
+        row = stretches[y]
         if int(row[SET]) == thread_set and int(row[THREAD]) == thread:
             distance = abs(row[PSI0] - psi0)
             if distance < least:
@@ -329,7 +336,7 @@ def _nearest_stretch(R, sampling, thread_set, thread, psi0):
 @njit(**INLINE)
 def _point_shares(R, sampling, thread_set, thread, psi0, ox, oy, oz):
     """(surface, volume, isotropic) shares at one tangent angle: those of the stretch it is in."""
-    y = 3 * _nearest_stretch(R, sampling, thread_set, thread, psi0)
+    y = 3 * nearest_stretch(R, sampling.stretches, thread_set, thread, psi0)
     corner = view_corner(R, ox, oy, oz)
     surface = share_at(R, sampling.shares, corner, y + SURFACE)
     volume = share_at(R, sampling.shares, corner, y + VOLUME)
@@ -338,7 +345,7 @@ def _point_shares(R, sampling, thread_set, thread, psi0, ox, oy, oz):
     return surface * scale, volume * scale, isotropic * scale
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def point_density(R, tables, sampling, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):
     """pdf(wi) [1/sr] of `point_direction`; 0 at or below the cloth."""
     if iz <= R(0) or oz <= R(0):
@@ -361,7 +368,7 @@ def point_density(R, tables, sampling, thread_set, thread, psi0, ix, iy, iz, ox,
     return p + surface * on_surface + volume * on_volume + isotropic * on_isotropic
 
 
-@njit(**KERNEL)
+@njit(**LEAN)
 def point_direction(R, tables, sampling, thread_set, thread, psi0, ox, oy, oz, u0, u1, u2):
     """wi (x, y, z) at levels `weave` and `thread`, for a viewer above the cloth.
 

@@ -16,13 +16,18 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.coverage import GAP, WARP, WEFT, coverage
-from fabricusd.appearance.real import INLINE, KERNEL
+from fabricusd.appearance.coverage import GAP, coverage
+from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave
 
 FARTHEST = 2.0**52
 """Weave coordinates beyond this have no fraction left in float64."""
+
+
+BLOCK = 1024
+"""Places that a worker looks up at a time: what it notes about them stays in its nearest cache."""
 
 
 class WeaveHit(NamedTuple):
@@ -53,13 +58,30 @@ class WeaveHit(NamedTuple):
 def wrap(x, period):  # type: ignore[no-untyped-def]
     """Whole number `x` (float64) modulo `period`, non-negative, as an integer."""
     p = float(period)
-    r = x - p * math.floor(x / p)
+    r = x - p * np.floor(x / p)
     # The quotient is rounded: one period off either way where x is a multiple of it.
-    if r < 0.0:
-        r += p
-    if r >= p:
-        r -= p
-    return int(r)
+    r = r + p if r < 0.0 else r
+    r = r - p if r >= p else r
+    return np.int32(r)
+
+
+@njit(**INLINE)
+def split(R, cloth, u, v):  # type: ignore[no-untyped-def]
+    """Weave coordinates, float64, as what `thread_at` asks for: (i, j, end, pick, x, y).
+
+    i, j : cell of the grid; end, pick : places in the sequences of threads; x, y : in the cell, of
+    precision R, NaN where the coordinates are not finite or have no fraction.
+    """
+    sound = abs(u) <= FARTHEST and abs(v) <= FARTHEST
+    end, pick = np.floor(u) if sound else 0.0, np.floor(v) if sound else 0.0
+    return (
+        wrap(end, cloth.grid.shape[0]),
+        wrap(pick, cloth.grid.shape[1]),
+        wrap(end, cloth.sequence_length[WARP]),
+        wrap(pick, cloth.sequence_length[WEFT]),
+        R(u - end) if sound else R(np.nan),
+        R(v - pick),
+    )
 
 
 @njit(**INLINE)
@@ -126,20 +148,12 @@ def crown_on(R, cloth, thread_set, thread, w):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def find(R, cloth, u, v):  # type: ignore[no-untyped-def]
-    """Thread under weave coordinates (u, v), float64.
-
-    Returns (set, thread, s, w, angle, length): `length` is the visible run's own length [m], which
-    `height_on` asks for. In a gap the set is GAP and the rest 0. Coordinates that are not finite,
-    or that have no fraction, come back as set WEFT with NaN everywhere, so that nothing hides them.
-    """
+def thread_at(R, cloth, i, j, end, pick, x, y):  # type: ignore[no-untyped-def]
+    """The thread at a place that `split` has found; the answer is `find`'s."""
     none = R(0)
-    if not (abs(u) <= FARTHEST and abs(v) <= FARTHEST):
+    if not x >= none:
         nan = R(np.nan)
         return WEFT, 0, nan, nan, nan, nan
-    end, pick = math.floor(u), math.floor(v)
-    i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
-    x, y = R(u - end), R(v - pick)
     # Selections instead of branches from here: which thread a point meets cannot be predicted.
     top = int(cloth.grid[i, j])
     over = x if top == WARP else y
@@ -158,23 +172,50 @@ def find(R, cloth, u, v):  # type: ignore[no-untyped-def]
     s = max(R(0), min((place + seen) / cells, cloth.last))
     # b, and with it w, runs along -U on the warp.
     w = max(R(-1), min(-w if hit == WARP else w, R(1)))
-    count = end if hit == WARP else pick
-    thread = int(cloth.sequence[hit, wrap(count, cloth.sequence_length[hit])])
+    thread = int(cloth.sequence[hit, end if hit == WARP else pick])
     if not (on_top or beside):
         return GAP, 0, none, none, none, none
     length = cells * share * cloth.pitch[1 - hit]
     return hit, thread, s, w, angle_on(R, cloth, thread, s), length
 
 
+@njit(**INLINE)
+def find(R, cloth, u, v):  # type: ignore[no-untyped-def]
+    """Thread under weave coordinates (u, v), float64.
+
+    Returns (set, thread, s, w, angle, length): `length` is the visible run's own length [m], which
+    `height_on` asks for. In a gap the set is GAP and the rest 0. Coordinates that are not finite,
+    or that have no fraction, come back as set WEFT with NaN everywhere, so that nothing hides them.
+    """
+    i, j, end, pick, x, y = split(R, cloth, u, v)
+    return thread_at(R, cloth, i, j, end, pick, x, y)
+
+
+@njit(**LEAN)
+def split_block(R, cloth, uv, begin, cells, x, y):  # type: ignore[no-untyped-def]
+    """`split` of as many places from `begin` on as cells (4, b) int32, x and y (b,) hold.
+
+    A loop of its own, which LLVM vectorises; the lookup behind it is all gathers.
+    """
+    for k in range(x.size):
+        cells[0, k], cells[1, k], cells[2, k], cells[3, k], x[k], y[k] = split(
+            R, cloth, uv[begin + k, 0], uv[begin + k, 1]
+        )
+
+
 @njit(parallel=True, **KERNEL)
 def find_all(R, cloth, uv, sets, threads, s, w, angle, length):  # type: ignore[no-untyped-def]
     """`find` at each of uv (n, 2) float64, into the arrays behind it."""
     n = uv.shape[0]
-    block = 4096
-    for b in prange((n + block - 1) // block):
-        for k in range(b * block, min(n, (b + 1) * block)):
-            sets[k], threads[k], s[k], w[k], angle[k], length[k] = find(
-                R, cloth, uv[k, 0], uv[k, 1]
+    for b in prange((n + BLOCK - 1) // BLOCK):
+        begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
+        cells = np.empty((4, size), np.int32)
+        x, y = np.empty(size, s.dtype), np.empty(size, s.dtype)
+        split_block(R, cloth, uv, begin, cells, x, y)
+        for q in range(size):
+            k = begin + q
+            sets[k], threads[k], s[k], w[k], angle[k], length[k] = thread_at(
+                R, cloth, cells[0, q], cells[1, q], cells[2, q], cells[3, q], x[q], y[q]
             )
 
 
