@@ -37,14 +37,10 @@ def looking(eye: Any, at: Any = (0.0, 0.0, 0.0), up: Any = (0.0, 1.0, 0.0)) -> N
 
 def above(height: float = 2.0, width: float = 0.2) -> Camera:
     """An orthographic camera that looks down on the origin and sees `width` metres."""
-    return Camera(
-        frame=looking((0.0, height, 0.0)), orthographic=True, aperture=(width, width)
-    )
+    return Camera(frame=looking((0.0, height, 0.0)), orthographic=True, aperture=(width, width))
 
 
-def grid(
-    height: Any = None, *, size: float = 1.0, cells: int = 1, material: int = 0
-) -> Mesh:
+def grid(height: Any = None, *, size: float = 1.0, cells: int = 1, material: int = 0) -> Mesh:
     """A square in the plane y = 0, or y = height(x, z), its front upwards, with UVs in metres."""
     line = np.linspace(-size / 2, size / 2, cells + 1)
     x, z = np.meshgrid(line, line)
@@ -132,9 +128,7 @@ def worst_z(a: RenderResult, b: RenderResult, count: int = 4) -> float:
         b.layers["beauty"][..., :3], count
     )
     pixels = a.layers["beauty"].shape[0] * a.layers["beauty"].shape[1] / count**2
-    variance = (
-        blocks(a.layers["variance"], count) + blocks(b.layers["variance"], count)
-    ) / pixels
+    variance = (blocks(a.layers["variance"], count) + blocks(b.layers["variance"], count)) / pixels
     return float(np.max(np.abs(difference) / np.sqrt(variance + 1e-14)))
 
 

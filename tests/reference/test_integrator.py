@@ -210,8 +210,6 @@ def _folded_cloth(preset, level, estimator, brightness=1.0):
     )  # fmt: skip
 
 
-
-
 def test_a_picture_does_not_depend_on_how_many_workers_made_it():
     made = [_small(workers=n).layers["beauty"] for n in (1, 3, 2)]
     assert np.array_equal(made[0], made[1])

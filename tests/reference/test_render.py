@@ -66,7 +66,7 @@ def test_shadow_is_one_in_the_open_and_zero_behind_a_wall():
 
     roof = grid(size=0.4)
     roof = type(roof)(
-        path="roof", points=roof.points + [0, 0.5, 0], triangles=roof.triangles,
+        path="roof", points=roof.points + np.array([0, 0.5, 0]), triangles=roof.triangles,
         material=roof.material,
     )  # fmt: skip
     r = picture([grid(size=4.0), roof], [lambert(0.5)], [sun((1.0, 1.0, 0.0))],
@@ -87,9 +87,7 @@ def test_a_png_alone_and_frames_with_numbers(tmp_path):
     camera = UsdGeom.Camera.Define(stage, "/c")
     camera.AddTranslateOp().Set((0, 0.5, 6))
     stage.GetRootLayer().Save()
-    r = render(
-        tmp_path / "s.usda", tmp_path / "x.png", frames=(1, 2), width=32, height=16, spp=2
-    )
+    r = render(tmp_path / "s.usda", tmp_path / "x.png", frames=(1, 2), width=32, height=16, spp=2)
     assert [p.rsplit("/", 1)[1] for p in r.paths] == ["x.0001.png", "x.0002.png"]
     first, second = (read_image(p) for p in r.paths)
     assert not np.array_equal(first, second)

@@ -150,9 +150,7 @@ def test_subsets_have_materials_of_their_own(tmp_path):
     mesh = square(stage)
     mesh.GetFaceVertexCountsAttr().Set([3, 3])
     mesh.GetFaceVertexIndicesAttr().Set([0, 3, 2, 0, 2, 1])
-    UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st").Set(
-        [(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)]
-    )
+    UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st").Set([(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)])
     red = UsdShade.Material.Define(stage, "/red")
     shader = UsdShade.Shader.Define(stage, "/red/shader")
     shader.CreateIdAttr("UsdPreviewSurface")
@@ -305,9 +303,10 @@ def test_weave_coordinates_far_from_the_origin_keep_their_place_in_the_thread(tm
     base = records[:, 27:29]
     repeat = 2.0
     expected = np.mod(np.float64(np.float32(1e4)) * np.array([777, 555]), repeat)
-    assert np.abs(base[0] - expected).max() < 1e-3 or np.abs(
-        np.abs(base[0] - expected) - repeat
-    ).max() < 1e-3
+    assert (
+        np.abs(base[0] - expected).max() < 1e-3
+        or np.abs(np.abs(base[0] - expected) - repeat).max() < 1e-3
+    )
 
 
 def nan_points(stage):
