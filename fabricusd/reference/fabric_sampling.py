@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.coverage import WARP
-from fabricusd.appearance.real import INLINE, KERNEL, atan2, cos, sin
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, atan2, cos, sin
 from fabricusd.appearance.sampling_lobes import (
     ISOTROPIC,
     STEEPEST,
@@ -43,10 +43,10 @@ _EVEN = 3
 """In place of a lobe: uniform over the hemisphere."""
 
 # Rows of a block: the viewer, the light, the drawn direction; the stretch of thread it is drawn
-# from; three uniform numbers; both densities; after them the shares of all lobes.
+# from; two uniform numbers; both densities; three shares; after them the shares of all lobes.
 (_OX, _OY, _OZ, _IX, _IY, _IZ, _GX, _GY, _GZ, _WARP, _PSI0, _COS, _SIN, _TAN, _ON_SURFACE,
- _ON_VOLUME, _LOBE, _U1, _U2, _P_LIGHT, _P_GO, _SHARES) = (
-    row * BLOCK for row in range(22)
+ _ON_VOLUME, _LOBE, _U1, _U2, _P_LIGHT, _P_GO, _A, _B, _D, _SHARES) = (
+    row * BLOCK for row in range(25)
 )  # fmt: skip
 
 
@@ -78,21 +78,21 @@ def _load(wo, wi, start, size, block):
 
 
 @njit(**INLINE)
-def _choose(R, shares, first, count, u0, block, x):
+def _choose(R, shares, count, u0, block, x):
     """Lobe of `count` that u0 falls on, -1 for none of them: uniform."""
     left = u0 - R(UNIFORM)
     if left < R(0) or count == 0:
         return -1
     k = 0
     while k < count - 1:
-        left -= block[shares + (first + k) * BLOCK + x]
+        left -= block[shares + k * BLOCK + x]
         if left < R(0):
             break
         k += 1
     return k
 
 
-@njit(**INLINE)
+@njit(**LEAN)
 def _draw(R, size, block):
     """Directions from the lobes chosen, in the surface frame."""
     for x in range(size):
@@ -139,7 +139,7 @@ def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first):
     n = wo.shape[1]
     stretches = sampling.stretches
     lobes = 3 * stretches.shape[0]
-    block = np.empty(_SHARES + max(lobes, 1) * BLOCK, wo.dtype)
+    block = np.empty(_SHARES + lobes * BLOCK, wo.dtype)
     for start in range(0, n, BLOCK):
         size = min(BLOCK, n - start)
         _load(wo, wi, start, size, block)
@@ -148,7 +148,7 @@ def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first):
             for k in range(lobes):
                 block[_SHARES + k * BLOCK + x] = share_at(R, sampling.shares, corner, k)
             h = first + start + x
-            k = _choose(R, _SHARES, 0, lobes, u0[h], block, x)
+            k = _choose(R, _SHARES, lobes, u0[h], block, x)
             block[_U1 + x], block[_U2 + x] = u1[h], u2[h]
             block[_LOBE + x] = R(_EVEN) if k < 0 else R(k % 3)
             if lobes == 0:
@@ -168,17 +168,19 @@ def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first):
         _store(R, start, size, block, go, p_light, p_go, first)
 
 
-@njit(**INLINE)
+@njit(**LEAN)
 def _add_stretch(R, row, shares, size, block):
     """A stretch's part of both densities."""
     warp = R(1) if int(row[SET]) == WARP else R(0)
     psi0, c, s, tangent = row[PSI0], row[COS], row[SIN], row[TAN]
     surface, volume = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
+    # To a known place: a distance that the compiler does not know would keep the loop scalar.
+    for x in range(3 * BLOCK):
+        block[_A + x] = block[shares + x]
     for x in range(size):
         t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
         theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-        a, b = block[shares + x], block[shares + BLOCK + x]
-        d = block[shares + 2 * BLOCK + x]
+        a, b, d = block[_A + x], block[_B + x], block[_D + x]
         block[_P_LIGHT + x] += _lobes_at(
             R, warp, psi0, c, s, tangent, surface, volume, theta_o,
             block[_IX + x], block[_IY + x], block[_IZ + x], a, b, d,
@@ -198,7 +200,7 @@ def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, 
     """
     n = wo.shape[1]
     count = sampling.stretches.shape[0]
-    block = np.empty(_SHARES + 3 * BLOCK, wo.dtype)
+    block = np.empty(_SHARES, wo.dtype)
     for start in range(0, n, BLOCK):
         size = min(BLOCK, n - start)
         _load(wo, wi, start, size, block)
@@ -224,9 +226,8 @@ def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, 
                 d = share_at(R, sampling.shares, corner, k + ISOTROPIC)
                 scale = R(1.0 - UNIFORM) / (a + b + d)
                 a, b, d = a * scale, b * scale, d * scale
-            block[_SHARES + x], block[_SHARES + BLOCK + x] = a, b
-            block[_SHARES + 2 * BLOCK + x] = d
-            k = _choose(R, _SHARES, 0, 3 if on_thread else 0, u0[h], block, x)
+            block[_A + x], block[_B + x], block[_D + x] = a, b, d
+            k = _choose(R, _A, 3 if on_thread else 0, u0[h], block, x)
             block[_LOBE + x] = R(_EVEN) if k < 0 else R(k)
         for x in range(size):
             c, s = cos(R, block[_PSI0 + x]), sin(R, block[_PSI0 + x])
@@ -236,8 +237,7 @@ def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, 
             warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
             t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
             theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-            a, b = block[_SHARES + x], block[_SHARES + BLOCK + x]
-            d = block[_SHARES + 2 * BLOCK + x]
+            a, b, d = block[_A + x], block[_B + x], block[_D + x]
             angle, tangent = block[_PSI0 + x], block[_TAN + x]
             surface, volume = block[_ON_SURFACE + x], block[_ON_VOLUME + x]
             # Without a thread all shares are 0 and the whole is uniform.
