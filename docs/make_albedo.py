@@ -27,8 +27,8 @@ Made by `make docs` (`python docs/make_albedo.py`).
 
 The share of a white sky's light that reaches the viewer, by the angle between view and normal: the
 brightest channel, at the worst of 16 azimuths (8 for `conserving`). The published models do not
-conserve energy; *safe A* is the largest albedo of white threads at which no view sends back more than
-it gets. `fabricusd check` warns where a fabric's own colours go beyond 1 (`AlbedoIsSafe`).
+conserve energy; *safe A* is the largest albedo of white threads at which no view sends back more
+than it gets. `fabricusd check` warns where a fabric's own colours go beyond 1 (`AlbedoIsSafe`).
 
 In `conserving` the value is reflection plus transmission, multiple scattering included, from
 {samples} samples a view; an albedo there is one, and any from 0 to 1 is safe.
