@@ -59,7 +59,7 @@ def spread_pairs(count: int) -> tuple[Floats, Floats]:
 def measure_rule(fabric: Fabric, rule: Rule, pairs: int = PAIRS) -> Accuracy:
     """Mean absolute error of `rule` over pairs of directions, relative to the mean value.
 
-    Measured in float64 against a quadrature much finer than that, all models of the fabric together.
+    Measured in float64, all models of the fabric together, against a much finer quadrature.
     """
     reference = _reference(fabric, pairs)
     found = _far(fabric, rule, pairs)

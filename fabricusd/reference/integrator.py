@@ -110,7 +110,7 @@ class Tracer:
         wave.film[:, :count] = 0.0
         camera_rays(
             lens, width, pixels, first, samples, self.seed, wave.rays,
-            wave.lanes[LANE_WIDTH : LANE_SPREAD + 1],
+            wave.lanes[LANE_WIDTH : LANE_SPREAD + 1], wave.path_pixel, wave.path_sample,
         )  # fmt: skip
         wave.lanes[LANE_BETA : LANE_BETA + 3, :count] = 1.0
         wave.lanes[LANE_PDF, :count] = -1.0
@@ -125,7 +125,7 @@ class Tracer:
                 step, self.max_bounces, self.estimator, count, wave.rays, wave.lanes,
                 wave.lane_tags, self.lights, self.dome, wave.film, wave.keys,
                 self.tables.material, self._repeats, self.tables.records, self.level,
-                pixels, samples, first, self.seed, counts,
+                wave.path_pixel, wave.path_sample, self.seed, counts,
             )  # fmt: skip
             ends = np.cumsum(counts)
             hits = int(ends[-1])
@@ -134,7 +134,8 @@ class Tracer:
             prepare(
                 step, self.estimator, count, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
                 ends - counts, self.tables.records, self.lights, self.dome, self.surfaces,
-                self.epsilon, pixels, samples, first, self.seed, wave.film, wave.hits, wave.tags,
+                self.epsilon, wave.path_pixel, wave.path_sample, self.seed, wave.film, wave.hits,
+                wave.tags,
             )  # fmt: skip
             for queue in np.flatnonzero(counts):
                 start, end = int(ends[queue] - counts[queue]), int(ends[queue])

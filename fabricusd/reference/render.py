@@ -49,7 +49,8 @@ class RenderResult:
     paths : the files written; notes : what was left out or assumed, one line each
     rays : rays traced, shadow rays included; seconds : of sampling, without reading the scene
     not_finite : values that were left out because they were not finite
-    noise : the relative error that 99 % of the pixels' means stay below, estimated; complete : False after Ctrl-C
+    noise : the relative error that 99 % of the pixels' means stay below, estimated
+    complete : False after Ctrl-C
     """
 
     layers: dict[str, NDArray[np.float32]]

@@ -47,7 +47,7 @@ def _replace(fabric: Fabric, **changes: Any) -> Fabric:
 
 
 def read_side(prim: Usd.Prim, front: Usd.Prim | None = None) -> Fabric:
-    """A Fabric prim without its back, which may name its `front` as its own back and nothing else."""
+    """A Fabric prim without its back; a back may name its `front` as its own, and nothing else."""
     _require_clean(prim)
     if front is not None:
         beyond = prim.GetRelationship("fabric:back").GetForwardedTargets()

@@ -79,9 +79,10 @@ def test_the_mean_of_conserving_weave_over_shared_nodes_is_far(name):
 @pytest.mark.parametrize(("name", "model"), [(n, m) for n in PRESETS for m in MODELS])
 def test_the_mean_of_weave_over_places_is_far(name, model):
     fabric = with_model(PRESETS[name], model)
-    places = spread_places(60_000)
+    # Steep pile seen edge on: few places carry much of the value.
+    places = spread_places(300_000 if name == "velvet" else 60_000)
     over_places, far = np.zeros(3), np.zeros(3)
-    for wi, wo in zip(WI[:6], WO[:6], strict=True):
+    for wi, wo in zip(WI[:4], WO[:4], strict=True):
         value = surface.evaluate(fabric, wi, wo, uv=places, level="weave", multiple=False)
         over_places += value.mean(axis=0)
         far += surface.evaluate(fabric, wi, wo, max_error=6e-4, multiple=False)[0]

@@ -66,7 +66,7 @@ def test_shadow_is_one_in_the_open_and_zero_behind_a_wall():
 
     roof = grid(size=0.4)
     roof = type(roof)(
-        path="roof", points=roof.points + [0, 0.5, 0], triangles=roof.triangles,
+        path="roof", points=roof.points + np.array([0, 0.5, 0]), triangles=roof.triangles,
         material=roof.material,
     )  # fmt: skip
     r = picture([grid(size=4.0), roof], [lambert(0.5)], [sun((1.0, 1.0, 0.0))],
