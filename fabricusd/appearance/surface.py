@@ -162,8 +162,12 @@ def _density(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats)
     return out
 
 
-@lru_cache(maxsize=32)
 def _law(fabric: Fabric, max_error: float | None = None, multiple: bool = True) -> SurfaceLaw:
+    return _kept_law(fabric, max_error, multiple)
+
+
+@lru_cache(maxsize=32)
+def _kept_law(fabric: Fabric, max_error: float | None, multiple: bool) -> SurfaceLaw:
     rule = None if max_error is None else choose_rule(fabric, max_error)
     return surface_law(fabric, precision=np.float64, rule=rule, multiple=multiple)
 
