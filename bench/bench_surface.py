@@ -1,9 +1,10 @@
 """How fast the surface law is, and how exact in single precision: `python bench/bench_surface.py`.
 
 Everything runs in one process on the same directions, and time is that of the processor, all
-workers together: figures are per worker, and hold on a busy machine. NumPy's side is the law as it is written, `appearance.plain`; ratios compare nodes of the
-curves evaluated per second, since the two sides take different ones. Each figure is the best of
-several runs. `weave + horizon` looks up the place, its shadow by table, and the value.
+workers together: figures are per worker, and hold on a busy machine. NumPy's side is the law as it
+is written, `appearance.plain`; ratios compare nodes of the curves evaluated per second, since the
+two sides take different ones. Each figure is the best of several runs. `weave + horizon` looks up
+the place, its shadow by table, and the value.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ import numpy as np
 from fabricusd.appearance import plain
 from fabricusd.appearance.accuracy import spread_pairs
 from fabricusd.appearance.compiled import compile_fabric
-from fabricusd.appearance.shadow import compile_shadow, lit_all
-from fabricusd.appearance.surface import far_all, points_all
+from fabricusd.appearance.shadow import compile_shadow
+from fabricusd.appearance.surface import far_all, points_all, weave_all
 from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.weave import find_all
 from fabricusd.schema import load
@@ -58,8 +59,7 @@ def measure(name: str, count: int, repeats: int) -> None:
     shadow = compile_shadow(fabric, "horizon", precision=R)
     uv = np.random.default_rng(1).random((count, 2)) * 1e4
     sets, threads = np.empty(count, np.uint8), np.empty(count, np.int32)
-    s, w, angle, length, g = (np.empty(count, R) for _ in range(5))
-    light = np.ascontiguousarray(wi.T)
+    s, w, angle, length = (np.empty(count, R) for _ in range(4))
 
     def look_up() -> None:
         find_all(R, cloth, uv, sets, threads, s, w, angle, length)
@@ -68,10 +68,7 @@ def measure(name: str, count: int, repeats: int) -> None:
         points_all(R, tables, False, sets, threads, angle, w, wi, wo, out)
 
     def weave_and_horizon() -> None:
-        look_up()
-        lit_all(R, cloth, shadow, uv, light, g)
-        weave()
-        np.multiply(out, g, out=out)
+        weave_all(R, cloth, shadow, tables, uv, wi, wo, out)
 
     far_time = best(lambda: far_all(R, tables, wi, wo, out), repeats)
     single = out.astype(np.float64)
