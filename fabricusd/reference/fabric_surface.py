@@ -51,6 +51,7 @@ from fabricusd.reference.wave import (
 
 R = np.float32
 _STRAIGHT = R(-1)
+_ONE_AT_A_TIME = threading.Lock()
 
 
 class _Scratch:
@@ -77,11 +78,12 @@ class _Side:
         self.fabric, self.method = fabric, shadow
         self.law: SurfaceLaw = surface_law(fabric, precision=np.float32)
         self._near: dict[int, tuple[CompiledFabric, Shadow]] = {}
-        self._lock = threading.Lock()
 
     def near(self, level: int) -> tuple[CompiledFabric, Shadow]:
         """Weave and shadowing of level `weave` or `thread`, made when first needed."""
-        with self._lock:
+        # One at a time for all cloths: some of these tables are made by numba's own workers, which
+        # may not be called from two threads at once.
+        with _ONE_AT_A_TIME:
             if level not in self._near:
                 name = "thread" if level == THREAD_LEVEL else "weave"
                 self._near[level] = (

@@ -95,11 +95,13 @@ class Film:
         deviation = np.sqrt(np.einsum("c,cp->p", _LUMINANCE**2, self.variance()))
         floor = max(0.01 * float(luminance.mean()), 1e-12)
         error = (deviation / np.maximum(np.abs(luminance), floor)).reshape(self.height, self.width)
-        padded = np.pad(error, 1, mode="edge")
-        around = [
-            padded[j : j + self.height, i : i + self.width] for j in range(3) for i in range(3)
-        ]
-        return np.asarray(np.max(around, axis=0).ravel())
+        rows = error.copy()
+        np.maximum(rows[1:], error[:-1], out=rows[1:])
+        np.maximum(rows[:-1], error[1:], out=rows[:-1])
+        worst = rows.copy()
+        np.maximum(worst[:, 1:], rows[:, :-1], out=worst[:, 1:])
+        np.maximum(worst[:, :-1], rows[:, 1:], out=worst[:, :-1])
+        return np.asarray(worst.ravel())
 
     def layer(self, name: str) -> NDArray[np.float32]:
         """One AOV, (height, width, channels) float32; 0 where nothing was sampled."""

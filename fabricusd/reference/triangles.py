@@ -23,6 +23,9 @@ from fabricusd.reference.scene import FabricSurface, Mesh, Scene
 P0, E1, E2, N, T, ST, D1, D2, HAND, RATE = 0, 3, 6, 9, 18, 27, 29, 31, 33, 34
 RECORD = 36
 
+PART = 1 << 16
+"""Triangles that are worked on together."""
+
 CREASE = math.radians(40.0)
 """Below it, two faces around a point are one smooth surface: a fold of up to 80 degrees."""
 
@@ -81,39 +84,44 @@ def _stack(parts: list[NDArray[Any]], empty: tuple[int, ...], kind: Any) -> NDAr
 def _mesh_tables(
     scene: Scene, mesh: Mesh, keep: NDArray[np.bool_], centre: NDArray[np.float64]
 ) -> tuple[Any, ...]:
-    """Points, triangles, records, UV and materials of one mesh's triangles to keep."""
-    tri = np.asarray(mesh.triangles)[keep]
+    """Points, triangles, records, UV and materials of one mesh's triangles to keep.
+
+    Written column by column, in float32 once the points are centred: a million triangles are
+    meant to fit into a gigabyte with all that is done to them.
+    """
+    tri = np.asarray(mesh.triangles, np.int32)[keep]
     material = np.asarray(mesh.material, np.int32)[keep]
-    points = np.where(np.isfinite(mesh.points), mesh.points, 0.0) - centre
-    corners = points[tri]
-    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    finite = np.where(np.isfinite(mesh.points), mesh.points, 0.0)
+    points = (finite - centre).astype(np.float32)
+    records = np.zeros((len(tri), RECORD), np.float32)
+    corner = points[tri[:, 0]]
+    e1, e2 = points[tri[:, 1]] - corner, points[tri[:, 2]] - corner
+    records[:, P0 : P0 + 3], records[:, E1 : E1 + 3], records[:, E2 : E2 + 3] = corner, e1, e2
+    del corner
     area2 = np.cross(e1, e2)
     if mesh.normals is not None:
-        normals = _unit(np.asarray(mesh.normals, np.float64)[keep], area2[:, None])
+        normals = _unit(np.asarray(mesh.normals, np.float32)[keep], area2[:, None])
     elif mesh.smooth:
         normals = smooth_normals(points, tri)
     else:
         normals = np.repeat(_unit(area2, area2)[:, None], 3, axis=1)
-    uv = np.zeros((len(tri), 3, 2)) if mesh.uv is None else np.asarray(mesh.uv, np.float64)[keep]
-    uv = np.where(np.isfinite(uv), uv, 0.0)
-    st = weave_coordinates(scene, mesh, uv, corners, material)
-    tangents, hand = _grain(points, tri, e1, e2, st, normals)
-    d1, d2 = st[:, 1] - st[:, 0], st[:, 2] - st[:, 0]
-    records = np.empty((len(tri), RECORD), np.float32)
-    records[:, P0 : P0 + 3], records[:, E1 : E1 + 3] = corners[:, 0], e1
-    records[:, E2 : E2 + 3] = e2
     records[:, N : N + 9] = normals.reshape(-1, 9)
+    uv = np.zeros((len(tri), 3, 2)) if mesh.uv is None else np.asarray(mesh.uv, np.float64)[keep]
+    np.nan_to_num(uv, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+    st = weave_coordinates(scene, mesh, uv, area2, material)
+    tangents, records[:, HAND] = _grain(points, tri, e1, e2, st, normals)
     records[:, T : T + 9] = tangents.reshape(-1, 9)
+    del normals, tangents
     records[:, ST : ST + 2] = _inside_repeat(scene, st[:, 0], material)
-    records[:, D1 : D1 + 2], records[:, D2 : D2 + 2] = d1, d2
-    records[:, HAND] = hand
+    records[:, D1 : D1 + 2] = d1 = st[:, 1] - st[:, 0]
+    records[:, D2 : D2 + 2] = d2 = st[:, 2] - st[:, 0]
     # Gradients of both coordinates over the surface: coordinates per metre.
-    square = np.maximum(np.einsum("ij,ij->i", area2, area2), 1e-300)[:, None]
+    square = np.maximum(np.einsum("ij,ij->i", area2, area2), np.float32(1e-36))[:, None]
     along, up = np.cross(e2, area2) / square, np.cross(area2, e1) / square
     for axis in range(2):
         gradient = d1[:, axis, None] * along + d2[:, axis, None] * up
         records[:, RATE + axis] = np.linalg.norm(gradient, axis=1)
-    return points, tri, records, uv.reshape(-1, 6), material
+    return points, tri, records, uv.astype(np.float32).reshape(-1, 6), material
 
 
 def _sound_triangles(scene: Scene, mesh: Mesh) -> NDArray[np.bool_]:
@@ -129,10 +137,13 @@ def _sound_triangles(scene: Scene, mesh: Mesh) -> NDArray[np.bool_]:
             f"has {int((~finite).sum())} points that are not finite; "
             f"{int((~whole).sum())} triangles are left out",
         )
-    p = np.where(finite[:, None], mesh.points, 0.0)[tri]
-    longest = np.max(np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2), axis=1)
-    area2 = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    solid = area2 > 1e-10 * longest**2
+    points = np.where(finite[:, None], mesh.points, 0.0)
+    solid = np.zeros(len(tri), bool)
+    for part in _parts(len(tri)):
+        p = points[tri[part]]
+        longest = np.max(np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2), axis=1)
+        area2 = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+        solid[part] = area2 > 1e-10 * longest**2
     if (whole & ~solid).any():
         scene.note(mesh.path, f"has {int((whole & ~solid).sum())} triangles without area, left out")
     return np.asarray(whole & solid)
@@ -142,33 +153,45 @@ def _unit(v: NDArray[Any], instead: NDArray[Any]) -> NDArray[Any]:
     """`v` at length 1, and `instead` at length 1 where `v` has none or is not finite."""
     length = np.linalg.norm(v, axis=-1, keepdims=True)
     good = np.isfinite(length) & (length > 1e-12)
-    other = instead / np.maximum(np.linalg.norm(instead, axis=-1, keepdims=True), 1e-300)
+    other = instead / np.maximum(np.linalg.norm(instead, axis=-1, keepdims=True), 1e-30)
     return np.where(good, v / np.where(good, length, 1.0), other)
 
 
-def smooth_normals(points: NDArray[np.float64], tri: NDArray[Any]) -> NDArray[np.float64]:
+def _parts(count: int) -> list[slice]:
+    """Slices of at most PART triangles, so that what is computed on the way stays small."""
+    return [slice(k, min(k + PART, count)) for k in range(0, count, PART)]
+
+
+def smooth_normals(points: NDArray[Any], tri: NDArray[Any]) -> NDArray[np.float32]:
     """(m, 3, 3) unit normals at the corners: faces around a point, weighted by their angle there.
 
     Points at one place are one point, so a seam of the UVs is no crease. A corner whose mean is
     turned away from its own face by more than CREASE keeps that face's normal, as on a box.
     """
-    shared = _same_places(points)[tri]
-    corners = points[tri]
+    place = _same_places(points)
+    total = np.zeros((int(place.max(initial=0)) + 1, 3))
+    for part in _parts(len(tri)):
+        corners, shared = points[tri[part]], place[tri[part]]
+        face = _face_normals(corners)
+        for k in range(3):
+            a = corners[:, (k + 1) % 3] - corners[:, k]
+            b = corners[:, (k + 2) % 3] - corners[:, k]
+            sine = np.linalg.norm(np.cross(a, b), axis=1)
+            angle = np.arctan2(sine, np.einsum("ij,ij->i", a, b))
+            np.add.at(total, shared[:, k], angle[:, None] * face)
+    normals = np.empty((len(tri), 3, 3), np.float32)
+    for part in _parts(len(tri)):
+        face = _face_normals(points[tri[part]])
+        mean = _unit(total[place[tri[part]]], face[:, None])
+        cosine = np.einsum("mkc,mc->mk", mean, face)
+        normals[part] = np.where((cosine < math.cos(CREASE))[..., None], face[:, None], mean)
+    return normals
+
+
+def _face_normals(corners: NDArray[Any]) -> NDArray[Any]:
+    """(n, 3, 3) corners -> (n, 3) unit normals."""
     face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    face = _unit(face, face + 1e-300)
-    total = np.zeros((int(shared.max(initial=0)) + 1, 3))
-    for k in range(3):
-        a = corners[:, (k + 1) % 3] - corners[:, k]
-        b = corners[:, (k + 2) % 3] - corners[:, k]
-        sine = np.linalg.norm(np.cross(a, b), axis=1)
-        angle = np.arctan2(sine, np.einsum("ij,ij->i", a, b))
-        for axis in range(3):
-            total[:, axis] += np.bincount(
-                shared[:, k], weights=angle * face[:, axis], minlength=len(total)
-            )
-    mean = _unit(total[shared], face[:, None])
-    cosine = np.einsum("mkc,mc->mk", mean, face)
-    return np.where((cosine < math.cos(CREASE))[..., None], face[:, None], mean)
+    return _unit(face, face)
 
 
 def _same_places(points: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -183,30 +206,31 @@ def weave_coordinates(
     scene: Scene,
     mesh: Mesh,
     uv: NDArray[np.float64],
-    corners: NDArray[np.float64],
+    area2: NDArray[Any],
     material: NDArray[np.int32],
 ) -> NDArray[np.float64]:
-    """(m, 3, 2) coordinates for the surface: threads where it is a fabric, UV elsewhere."""
+    """(m, 3, 2) coordinates for the surface: threads where it is a fabric, UV elsewhere.
+
+    area2 : (m, 3) - cross products of two edges [m2]
+    """
     st = uv.copy()
     for index in np.unique(material):
         surface = scene.materials[index]
         if not isinstance(surface, FabricSurface):
             continue
         mine = material == index
-        metres = measured_scale(uv[mine], corners[mine])
+        metres = measured_scale(uv[mine], area2[mine])
         if not metres > 0:
             scene.note(mesh.path, "has no UVs with an area; its fabric lies without a grain")
         st[mine] = surface.binding.weave_coordinates(uv[mine], metres or 1.0)
     return st
 
 
-def measured_scale(uv: NDArray[np.float64], corners: NDArray[np.float64]) -> float:
+def measured_scale(uv: NDArray[np.float64], area2: NDArray[Any]) -> float:
     """Metres of cloth per UV unit, by area; 0 where the UVs have none."""
     a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     flat = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()
-    solid = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    ).sum()
+    solid = np.linalg.norm(area2, axis=1).sum(dtype=np.float64)
     return float(np.sqrt(solid / flat)) if flat > 0 else 0.0
 
 
@@ -224,40 +248,47 @@ def _inside_repeat(
 
 
 def _grain(
-    points: NDArray[np.float64],
+    points: NDArray[Any],
     tri: NDArray[Any],
-    e1: NDArray[np.float64],
-    e2: NDArray[np.float64],
+    e1: NDArray[Any],
+    e2: NDArray[Any],
     st: NDArray[np.float64],
-    normals: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    normals: NDArray[Any],
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """(m, 3, 3) unit directions of growing u at the corners, and (m,) handedness of (u, v, N).
 
     Averaged over the triangles that share a point, its u direction and its handedness; a seam of
     the UVs with another grain stays a seam. Any direction where the coordinates have no area.
     """
-    d1, d2 = st[:, 1] - st[:, 0], st[:, 2] - st[:, 0]
-    det = d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]
-    along = (e1 * d2[:, 1:] - e2 * d1[:, 1:]) * np.sign(det)[:, None]
-    face = np.cross(e1, e2)
-    helper = np.where(np.abs(face[:, :1]) < 0.7 * np.linalg.norm(face, axis=1)[:, None],
-                      [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])  # fmt: skip
-    along = _unit(along, np.cross(np.cross(face, helper), face))
-    hand = np.where(det < 0, -1.0, 1.0)
-    weight = np.linalg.norm(face, axis=1)[:, None]
-    # Corners share a grain when place, handedness and the coordinates there agree.
-    place = _same_places(points)[tri].astype(np.int64)
+    along = np.empty((len(tri), 3), np.float32)
+    hand = np.empty(len(tri), np.float32)
+    key = np.empty((len(tri), 3), np.int64)
+    place = _same_places(points).astype(np.int64)
     scale = max(float(np.ptp(st)) * 1e-6, 1e-12)
-    cells = np.round(st / scale).astype(np.int64)
-    key = place * 6364136223846793005 ^ cells[..., 0] * 1442695040888963407
-    key = key ^ cells[..., 1] * 3935559000370003845 ^ (det < 0)[:, None].astype(np.int64)
+    for part in _parts(len(tri)):
+        d1, d2 = st[part, 1] - st[part, 0], st[part, 2] - st[part, 0]
+        det = d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]
+        direction = (e1[part] * d2[:, 1:] - e2[part] * d1[:, 1:]) * np.sign(det)[:, None]
+        face = np.cross(e1[part], e2[part])
+        steep = np.abs(face[:, :1]) < 0.7 * np.linalg.norm(face, axis=1)[:, None]
+        helper = np.where(steep, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+        along[part] = _unit(direction, np.cross(np.cross(face, helper), face))
+        hand[part] = np.where(det < 0, -1.0, 1.0)
+        # Corners share a grain when place, handedness and the coordinates there agree.
+        cells = np.round(st[part] / scale).astype(np.int64)
+        mixed = place[tri[part]] * 6364136223846793005 ^ cells[..., 0] * 1442695040888963407
+        mixed = mixed ^ cells[..., 1] * 3935559000370003845
+        key[part] = mixed ^ (det < 0)[:, None].astype(np.int64)
     group = np.unique(key, return_inverse=True)[1].reshape(key.shape)
-    total = np.zeros((int(group.max(initial=0)) + 1, 3))
-    for k in range(3):
-        for axis in range(3):
-            total[:, axis] += np.bincount(
-                group[:, k], weights=(weight * along)[:, axis], minlength=len(total)
-            )
-    mean = _unit(total[group], along[:, None])
-    flat = mean - normals * np.einsum("mij,mij->mi", mean, normals)[..., None]
-    return _unit(flat, along[:, None]), hand
+    del key
+    total = np.zeros((int(group.max(initial=0)) + 1, 3), np.float32)
+    for part in _parts(len(tri)):
+        weighted = along[part] * np.linalg.norm(np.cross(e1[part], e2[part]), axis=1)[:, None]
+        for k in range(3):
+            np.add.at(total, group[part, k], weighted)
+    tangents = np.empty((len(tri), 3, 3), np.float32)
+    for part in _parts(len(tri)):
+        mean, own = _unit(total[group[part]], along[part, None]), normals[part]
+        flat = mean - own * np.einsum("mij,mij->mi", mean, own)[..., None]
+        tangents[part] = _unit(flat, along[part, None])
+    return tangents, hand
