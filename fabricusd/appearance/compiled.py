@@ -26,11 +26,11 @@ class CompiledFabric(NamedTuple):
     """Arrays and scalars of one fabric; `real` below is the precision asked for.
 
     grid : (m, n) uint8 - 1 where end i lies over pick j
-    runs : (m, n, 2) uint16, uint32 beyond 65535 threads - place of the cell in the visible run of
-        the thread on top (cells from its start along the thread), and length of that run (cells)
-    under_runs : (m, n, 2) - the same for the thread underneath, along its own direction; (1, 1, 2)
-        zeros where no set is seen underneath
-    sequence_weft, sequence_warp : (k,) int32 - thread types, repeated without end
+    runs : (m, n, slots, 2) uint16, uint32 beyond 65535 threads - in slot 0 for the thread on top,
+        in slot 1 for the one underneath (only where `under` is a set): place of the cell in the
+        visible run (cells from its start along the thread), and length of that run (cells)
+    sequence : (2, k) int32 - thread types of each set, in as many columns as the longer one takes
+    sequence_length : (2,) int64 - after how many threads the types repeat
     width : (2,) real - share of its cells' width that a set takes where it is on top
     under : int - the set that is seen underneath the other, or GAP
     under_width : real - share of its width that it shows there
@@ -38,7 +38,8 @@ class CompiledFabric(NamedTuple):
     gap : real - share that no thread covers
     pitch : (2,) real - distance from one thread of the set to the next [m]
     half_thickness : (2, k) real - [m]; half the visible width where the thread states none
-    curve_start : (k, p) real - start of each linear piece of a type's curve, in run lengths; 2 pads
+    curve_start : (k, p) real - start of each linear piece of a type's curve, in run lengths; padded
+        with 2 to a power of two
     curve_angle, curve_slope : (k, p) real - angle there [rad], change of angle per run length
     curve_height : (k, p) real - height there, in run lengths
     pile : (k,) uint8 - 1 where the type's curve has no height field
@@ -46,15 +47,14 @@ class CompiledFabric(NamedTuple):
         share of the cloth's area (sums to 1 - gap), position in run lengths
     node_thread, node_set : (q,) int32 - whose node it is
     masking_width : real - standard deviation of `u` [rad]
-    last : real - the largest number below 1
+    last, tiny : real - the largest number below 1, the smallest normal number
     opaque : int - 1 where no light passes
     """
 
     grid: NDArray[np.uint8]
     runs: NDArray[Any]
-    under_runs: NDArray[Any]
-    sequence_weft: NDArray[np.int32]
-    sequence_warp: NDArray[np.int32]
+    sequence: NDArray[np.int32]
+    sequence_length: NDArray[np.int64]
     width: Reals
     under: int
     under_width: Any
@@ -74,6 +74,7 @@ class CompiledFabric(NamedTuple):
     node_set: NDArray[np.int32]
     masking_width: Any
     last: Any
+    tiny: Any
     opaque: int
 
 
@@ -96,15 +97,17 @@ def compile_fabric(
         return np.ascontiguousarray(x, dtype=real)
 
     share = coverage(fabric)
-    runs, under_runs = _run_tables(fabric.weave.cells, share.under)
+    lengths = np.array([len(s.sequence) for s in sets(fabric)])
+    sequence = np.zeros((2, lengths.max()), np.int32)
+    for row, thread_set in zip(sequence, sets(fabric), strict=True):
+        row[: len(thread_set.sequence)] = thread_set.sequence
     pitch = np.array([s.pitch for s in sets(fabric)])
     angle, weight, position, thread, thread_set = _nodes(fabric, share, error)
     return CompiledFabric(
         grid=np.ascontiguousarray(fabric.weave.cells, dtype=np.uint8),
-        runs=runs,
-        under_runs=under_runs,
-        sequence_weft=np.array(fabric.weft.sequence, np.int32),
-        sequence_warp=np.array(fabric.warp.sequence, np.int32),
+        runs=_run_table(fabric.weave.cells, share.under),
+        sequence=sequence,
+        sequence_length=lengths,
         width=reals(share.width),
         under=share.under,
         under_width=real(share.under_width),
@@ -121,26 +124,45 @@ def compile_fabric(
         node_set=thread_set,
         masking_width=real(fabric.masking_width),
         last=np.nextafter(real(1), real(0)),
+        tiny=np.finfo(real).tiny,
         opaque=int(fabric.opaque),
     )
 
 
-def _run_tables(cells: NDArray[np.bool_], under: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """`runs` and `under_runs` of the grid: warp runs go along the picks, weft runs along the ends.
+def _run_table(cells: NDArray[np.bool_], under: int) -> NDArray[Any]:
+    """`runs` of the grid: those of the warp go along the picks, those of the weft along the ends.
 
-    Along each thread a run is the same stretch of equal cells for the set on top and for the set
-    underneath, so one table per direction serves both.
+    Along a thread a run is the same stretch of equal cells whether it is on top there or
+    underneath, so one table per direction serves both slots.
     """
     kind: Any = np.uint16 if max(cells.shape) <= np.iinfo(np.uint16).max else np.uint32
+    found = np.empty((*cells.shape, 1 if under == GAP else 2, 2), kind)
+    cells = np.ascontiguousarray(cells)
     by_end = np.empty((*cells.shape, 2), kind)
-    _fill_runs(np.ascontiguousarray(cells), by_end)
-    by_pick = np.empty((*cells.T.shape, 2), kind)
+    _fill_runs(cells, by_end)
+    by_pick = np.empty((*cells.shape[::-1], 2), kind)
     _fill_runs(np.ascontiguousarray(cells.T), by_pick)
-    warp_runs, weft_runs = by_end, by_pick.transpose(1, 0, 2)
-    runs = np.where(cells[..., None], warp_runs, weft_runs)
-    if under == GAP:
-        return runs, np.zeros((1, 1, 2), kind)
-    return runs, np.where(cells[..., None], weft_runs, warp_runs)
+    _share_out(cells, by_end, by_pick, found)
+    return found
+
+
+@njit(cache=True)
+def _share_out(cells, by_end, by_pick, out):  # type: ignore[no-untyped-def]
+    """Runs along the warp (m, n, 2) and along the weft (n, m, 2) -> out (m, n, slots, 2)."""
+    block = 64
+    for i0 in range(0, cells.shape[0], block):
+        for j0 in range(0, cells.shape[1], block):
+            for i in range(i0, min(i0 + block, cells.shape[0])):
+                for j in range(j0, min(j0 + block, cells.shape[1])):
+                    for k in range(2):
+                        if cells[i, j]:
+                            out[i, j, 0, k] = by_end[i, j, k]
+                            if out.shape[2] > 1:
+                                out[i, j, 1, k] = by_pick[j, i, k]
+                        else:
+                            out[i, j, 0, k] = by_pick[j, i, k]
+                            if out.shape[2] > 1:
+                                out[i, j, 1, k] = by_end[i, j, k]
 
 
 @njit(cache=True)
@@ -155,18 +177,18 @@ def _fill_runs(lines, out):  # type: ignore[no-untyped-def]
         first = 0
         while first < n and lines[r, first] == lines[r, first - 1]:
             first += 1
-        if first == n:
-            first = 0
-        start = 0
-        while start < n:
-            end = start + 1
-            value = lines[r, (first + start) % n]
-            while end < n and lines[r, (first + end) % n] == value:
-                end += 1
-            for k in range(start, end):
-                out[r, (first + k) % n, 0] = k - start
-                out[r, (first + k) % n, 1] = end - start
-            start = end
+        start = 0 if first == n else first
+        left = n
+        while left > 0:
+            count, k = 1, start + 1 if start + 1 < n else 0
+            while count < left and lines[r, k] == lines[r, start]:
+                count += 1
+                k = k + 1 if k + 1 < n else 0
+            for place in range(count):
+                out[r, start, 0] = place
+                out[r, start, 1] = count
+                start = start + 1 if start + 1 < n else 0
+            left -= count
 
 
 def _half_thickness(fabric: Fabric, share: Coverage, pitch: NDArray[np.float64]) -> Reals:
@@ -177,9 +199,10 @@ def _half_thickness(fabric: Fabric, share: Coverage, pitch: NDArray[np.float64])
 
 
 def _curve_tables(fabric: Fabric) -> dict[str, NDArray[np.float64]]:
-    """The linear pieces of every type's curve, padded to the longest with starts that none reach."""
+    """The linear pieces of every type's curve, padded to a power of two by unreachable starts."""
     found = [pieces(t.curve) for t in fabric.thread_list]
-    shape = (len(found), max(len(p.start) for p in found))
+    longest = max(len(p.start) for p in found)
+    shape = (len(found), 1 << (longest - 1).bit_length())
     start, angle = np.full(shape, 2.0), np.zeros(shape)
     slope, height = np.zeros(shape), np.zeros(shape)
     for row, (p, thread) in enumerate(zip(found, fabric.thread_list, strict=True)):

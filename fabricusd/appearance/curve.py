@@ -106,13 +106,31 @@ def height_at(curve: TangentCurve, s: ArrayLike) -> Floats:
 
 def peak(curve: TangentCurve) -> float:
     """The highest height along the run, in run lengths; 0 for pile."""
+    return float(height_at(curve, crest(curve)).max())
+
+
+def crest(curve: TangentCurve) -> Floats:
+    """(q, 2) stretches of the run, first and last position, where its height is the greatest.
+
+    A hump has a crest of one point. Pile, like a straight thread, is one crest from end to end.
+    """
     if is_pile(curve):
-        return 0.0
+        return np.array([[0.0, 1.0]])
     p = pieces(curve)
     # The height turns where the angle passes 0, inside a piece, or at a piece's border.
     change = np.where(p.last == p.first, 1.0, p.last - p.first)
     turn = p.start + p.length * np.clip(-p.first / change, 0.0, 1.0)
-    return float(max(0.0, height_at(curve, np.concatenate((p.start, turn, [1.0]))).max()))
+    level = (p.first == 0.0) & (p.last == 0.0)
+    stretches = np.concatenate(
+        (
+            np.stack((turn, turn), axis=1),
+            np.stack((p.start, np.where(level, p.start + p.length, p.start)), axis=1),
+            [[1.0, 1.0]],
+        )
+    )
+    height = height_at(curve, stretches[:, 0])
+    highest = height >= height.max() - 1e-9
+    return np.unique(stretches[highest], axis=0)
 
 
 def is_pile(curve: TangentCurve) -> bool:

@@ -17,14 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.coverage import GAP, WARP, WEFT, coverage
+from fabricusd.appearance.real import INLINE, KERNEL
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave
 
 FARTHEST = 2.0**52
 """Weave coordinates beyond this have no fraction left in float64."""
-
-FAST = {"contract", "reassoc", "arcp", "nsz"}
-"""LLVM's licence to reorder arithmetic; NaN and infinity keep their meaning, we look for them."""
 
 
 class WeaveHit(NamedTuple):
@@ -51,7 +49,7 @@ class WeaveHit(NamedTuple):
     gap: NDArray[np.bool_]
 
 
-@njit(cache=True, inline="always")
+@njit(**INLINE)
 def wrap(x, period):  # type: ignore[no-untyped-def]
     """Whole number `x` (float64) modulo `period`, non-negative, as an integer."""
     p = float(period)
@@ -64,20 +62,21 @@ def wrap(x, period):  # type: ignore[no-untyped-def]
     return int(r)
 
 
-@njit(cache=True, inline="always", fastmath=FAST)
+@njit(**INLINE)
 def piece_of(R, cloth, thread, s):  # type: ignore[no-untyped-def]
-    """Index of the linear piece of the thread's curve at `s`, the later one at a jump."""
-    low, high = 0, cloth.curve_start.shape[1]
-    while high - low > 1:
-        middle = (low + high) >> 1
-        if s >= cloth.curve_start[thread, middle]:
-            low = middle
-        else:
-            high = middle
-    return low
+    """Index of the linear piece of the thread's curve at `s`, the later one at a jump.
+
+    A binary search without branches: the table is padded to a power of two by starts beyond 1.
+    """
+    k = 0
+    step = cloth.curve_start.shape[1] >> 1
+    while step > 0:
+        k += step if s >= cloth.curve_start[thread, k + step] else 0
+        step >>= 1
+    return k
 
 
-@njit(cache=True, inline="always", fastmath=FAST)
+@njit(**INLINE)
 def angle_on(R, cloth, thread, s):  # type: ignore[no-untyped-def]
     """Tangent angle [rad] of thread type `thread` at `s`."""
     k = piece_of(R, cloth, thread, s)
@@ -87,15 +86,12 @@ def angle_on(R, cloth, thread, s):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, fastmath=FAST)
-def height_on(R, cloth, thread, s, length):  # type: ignore[no-untyped-def]
-    """Height [m] of the axis at `s` on a run of `length` [m]: minus the integral of tan(angle).
+@njit(**INLINE)
+def rise_on(R, cloth, thread, k, s):  # type: ignore[no-untyped-def]
+    """Height at `s` on linear piece `k` of the thread's curve, in run lengths.
 
-    In closed form as `curve._rise`; 0 on pile.
+    Minus the integral of tan(angle), in closed form as `curve._rise`.
     """
-    if cloth.pile[thread] != 0 or length == R(0):
-        return R(0)
-    k = piece_of(R, cloth, thread, s)
     part = s - cloth.curve_start[thread, k]
     first = cloth.curve_angle[thread, k]
     slope = cloth.curve_slope[thread, k]
@@ -103,22 +99,28 @@ def height_on(R, cloth, thread, s, length):  # type: ignore[no-untyped-def]
     if abs(change) < R(1e-3):
         # Second-order Taylor about the middle: the logarithms would cancel in float32.
         tangent = math.tan(first + R(0.5) * change)
-        rise = (
-            -part * tangent * (R(1) + change * change * (R(1) + tangent * tangent) * R(1.0 / 12.0))
-        )
+        rise = -part * tangent * (R(1) + change * change * (R(1) + tangent * tangent) / R(12))
     else:
         ratio = R(-2) * math.sin(first + R(0.5) * change) * math.sin(R(0.5) * change)
         rise = math.log1p(ratio / math.cos(first)) / slope
-    return length * (cloth.curve_height[thread, k] + rise)
+    return cloth.curve_height[thread, k] + rise
 
 
-@njit(cache=True, inline="always", fastmath=FAST)
+@njit(**INLINE)
+def height_on(R, cloth, thread, s, length):  # type: ignore[no-untyped-def]
+    """Height [m] of the thread's axis at `s` on a visible run of `length` [m]; 0 on pile."""
+    if cloth.pile[thread] != 0:
+        return R(0)
+    return length * rise_on(R, cloth, thread, piece_of(R, cloth, thread, s), s)
+
+
+@njit(**INLINE)
 def crown_on(R, cloth, thread_set, thread, w):  # type: ignore[no-untyped-def]
     """Height [m] that the round of the thread adds at `w`: half the thickness, sqrt(1 - w^2)."""
     return cloth.half_thickness[thread_set, thread] * math.sqrt(max(R(0), R(1) - w * w))
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(**INLINE)
 def find(R, cloth, u, v):  # type: ignore[no-untyped-def]
     """Thread under weave coordinates (u, v), float64.
 
@@ -131,44 +133,35 @@ def find(R, cloth, u, v):  # type: ignore[no-untyped-def]
         nan = R(np.nan)
         return WEFT, 0, nan, nan, nan, nan
     end, pick = math.floor(u), math.floor(v)
-    x, y = u - end, v - pick
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
+    x, y = R(u - end), R(v - pick)
+    # Selections instead of branches from here: which thread a point meets cannot be predicted.
     top = int(cloth.grid[i, j])
-    if top == WARP:
-        over, along = x, y
-    else:
-        over, along = y, x
-    width = float(cloth.width[top])
-    offset = over - 0.5
-    if abs(offset) <= 0.5 * width and width > 0.0:
-        hit = top
-        w = R(2.0 * offset / width)
-        place, cells = float(cloth.runs[i, j, 0]), float(cloth.runs[i, j, 1])
-        s = (place + along) / cells
-        share = 1.0
-    elif cloth.under == 1 - top and abs(along - 0.5) <= 0.5 * float(cloth.under_width):
-        # Beside the thread on top: its visible stretches put together carry the whole curve.
-        hit = 1 - top
-        w = R(2.0 * (along - 0.5) / float(cloth.under_width))
-        share = 1.0 - width
-        place, cells = float(cloth.under_runs[i, j, 0]), float(cloth.under_runs[i, j, 1])
-        seen = over if offset < 0.0 else over - width
-        s = (place + seen / share) / cells
-    else:
+    over = x if top == WARP else y
+    along = y if top == WARP else x
+    width = cloth.width[top]
+    offset = over - R(0.5)
+    on_top = abs(offset) <= R(0.5) * width and width > R(0)
+    beside = cloth.under == 1 - top and abs(along - R(0.5)) <= R(0.5) * cloth.under_width
+    hit = top if on_top else 1 - top
+    # Beside the thread on top, the visible stretches put together carry the whole curve.
+    share = R(1) if on_top else R(1) - width
+    seen = along if on_top else (over if offset < R(0) else over - width) / max(share, cloth.tiny)
+    w = R(2) * (offset if on_top else along - R(0.5)) / (width if on_top else cloth.under_width)
+    slot = 0 if on_top else cloth.runs.shape[2] - 1
+    place, cells = R(cloth.runs[i, j, slot, 0]), R(cloth.runs[i, j, slot, 1])
+    s = max(R(0), min((place + seen) / cells, cloth.last))
+    # b, and with it w, runs along -U on the warp.
+    w = max(R(-1), min(-w if hit == WARP else w, R(1)))
+    count = end if hit == WARP else pick
+    thread = int(cloth.sequence[hit, wrap(count, cloth.sequence_length[hit])])
+    if not (on_top or beside):
         return GAP, 0, none, none, none, none
-    if hit == WARP:
-        thread = int(cloth.sequence_warp[wrap(end, cloth.sequence_warp.shape[0])])
-        crossing = cloth.pitch[WEFT]
-        w = -w
-    else:
-        thread = int(cloth.sequence_weft[wrap(pick, cloth.sequence_weft.shape[0])])
-        crossing = cloth.pitch[WARP]
-    t = max(R(0), min(R(s), cloth.last))
-    w = max(R(-1), min(w, R(1)))
-    return hit, thread, t, w, angle_on(R, cloth, thread, t), R(cells * share) * crossing
+    length = cells * share * cloth.pitch[1 - hit]
+    return hit, thread, s, w, angle_on(R, cloth, thread, s), length
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True, **KERNEL)
 def find_all(R, cloth, uv, sets, threads, s, w, angle, length):  # type: ignore[no-untyped-def]
     """`find` at each of uv (n, 2) float64, into the arrays behind it."""
     n = uv.shape[0]
@@ -180,7 +173,7 @@ def find_all(R, cloth, uv, sets, threads, s, w, angle, length):  # type: ignore[
             )
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True, **KERNEL)
 def heights_all(R, cloth, sets, threads, s, w, length, height, crown):  # type: ignore[no-untyped-def]
     """`height_on` and `crown_on` at each hit, 0 in gaps, into `height` and `crown`."""
     for k in prange(sets.shape[0]):

@@ -1,0 +1,71 @@
+"""A block of direction pairs on its way through the vectorised loops.
+
+All rows lie one behind the other in one array: pointers of their own would have to be checked for
+overlap before a loop is vectorised, and there would be too many.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from fabricusd.appearance.frame import WARP
+from fabricusd.appearance.real import INLINE
+from fabricusd.appearance.segment import along_set, seen_along
+from fabricusd.appearance.surface_tables import NODE_COS, NODE_SIN, NODE_WEIGHT
+
+BLOCK = 512
+"""Directions that the vectorised loops carry through the nodes together: their partial sums stay
+in the first-level cache."""
+
+AXIS_I, ACROSS_I, UP_I, SCALE_I = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
+AXIS_O, ACROSS_O, UP_O, SCALE_O = 4 * BLOCK, 5 * BLOCK, 6 * BLOCK, 7 * BLOCK
+OVERLAP = 8 * BLOCK
+NORMALIZATION, RED, GREEN, BLUE = 9 * BLOCK, 10 * BLOCK, 11 * BLOCK, 12 * BLOCK
+"""Where each row starts: what `segment.along_set` gives (UP is N.w), then the sums."""
+
+ROWS = 13
+
+
+@njit(**INLINE)
+def node_range(tables, thread_set):
+    """(first, last + 1) of the set's nodes."""
+    if thread_set == WARP:
+        return tables.warp_start, tables.nodes.shape[0]
+    return 0, tables.warp_start
+
+
+@njit(**INLINE)
+def prepare(R, thread_set, precision, wi, wo, start, size, block):
+    """What the set's threads share, for a block."""
+    for x in range(size):
+        iz, oz = wi[2, start + x], wo[2, start + x]
+        a_i, b_i, scale_i, a_o, b_o, scale_o, u = along_set(
+            R, thread_set, precision,
+            wi[0, start + x], wi[1, start + x], iz, wo[0, start + x], wo[1, start + x], oz,
+        )  # fmt: skip
+        block[AXIS_I + x], block[ACROSS_I + x] = a_i, b_i
+        block[UP_I + x], block[SCALE_I + x] = iz, scale_i
+        block[AXIS_O + x], block[ACROSS_O + x] = a_o, b_o
+        block[UP_O + x], block[SCALE_O + x] = oz, scale_o
+        block[OVERLAP + x] = u
+
+
+@njit(**INLINE)
+def masking_at(R, c, s, block, x):
+    """`P` at place x of a block."""
+    return seen_along(
+        R, c, s, block[AXIS_I + x], block[UP_I + x], block[SCALE_I + x],
+        block[AXIS_O + x], block[UP_O + x], block[SCALE_O + x], block[OVERLAP + x],
+    )  # fmt: skip
+
+
+@njit(**INLINE)
+def add_masking(R, tables, k, size, block):
+    """Node k's share of `Q`, for a block."""
+    c, s, weight = (
+        tables.nodes[k, NODE_COS],
+        tables.nodes[k, NODE_SIN],
+        tables.nodes[k, NODE_WEIGHT],
+    )
+    for x in range(size):
+        block[NORMALIZATION + x] += weight * masking_at(R, c, s, block, x)

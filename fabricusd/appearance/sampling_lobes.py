@@ -1,0 +1,93 @@
+"""The lobes that the surface sampler mixes: directions of one thread, cut at the cloth's horizon.
+
+A lobe stands for a stretch of thread around one tangent angle psi0. In that thread's frame
+
+    p(theta, phi) = p(theta)/cos theta * cos phi/(2 sin phi_m),   |phi| < phi_m
+    phi_m(theta) = acos(clamp(tan theta tan psi0, 0, 1))
+
+which is above the cloth and in front of the thread, where the published law is not 0, and nowhere
+else. `p(theta)` is a normal distribution cut at the inclinations that are above the cloth at all,
+or, for the isotropic term, uniform in sin theta. Every density is per steradian and exact. Source:
+`docs/model.md` section 6; the normal's mean is the mirror inclination moved inside the cut, so that
+its mass there never vanishes.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from fabricusd.appearance.real import INLINE, asin, atan2, cos, erf, erfinv, exp, sin
+
+STEEPEST = math.radians(89.5)
+"""Tangent angles of lobes stop here: beyond, hardly a direction is above the cloth."""
+
+SURFACE, VOLUME, ISOTROPIC = 0, 1, 2
+"""The lobes of one thread, in the order of every table."""
+
+_HALF_PI = math.pi / 2
+_SQRT_2 = math.sqrt(2.0)
+
+
+@njit(**INLINE)
+def theta_range(R, psi0):
+    """Inclinations (low, high) [rad] that are above the cloth for some azimuth."""
+    if psi0 >= R(0):
+        return R(-_HALF_PI), R(_HALF_PI) - psi0
+    return R(-_HALF_PI) - psi0, R(_HALF_PI)
+
+
+@njit(**INLINE)
+def cut_normal(R, x, mean, deviation, low, high):
+    """Density [1/rad] at x of a normal distribution cut to [low, high]; `mean` is inside."""
+    scale = R(1 / _SQRT_2) / deviation
+    mass = erf(R, (high - mean) * scale) - erf(R, (low - mean) * scale)
+    z = (x - mean) * scale
+    return R(2 / math.sqrt(math.pi)) * scale * exp(R, -z * z) / mass
+
+
+@njit(**INLINE)
+def sample_cut_normal(R, u, mean, deviation, low, high):
+    """Its value for a number u in [0, 1)."""
+    scale = R(1 / _SQRT_2) / deviation
+    first, last = erf(R, (low - mean) * scale), erf(R, (high - mean) * scale)
+    x = mean + erfinv(R, first + u * (last - first)) / scale
+    return min(max(x, low), high)
+
+
+@njit(**INLINE)
+def lobe_densities(R, psi0, tangent, surface, volume, theta_o, t, b, n):
+    """Densities [1/sr] of the three lobes at a direction (t, b, n) of the thread frame.
+
+    The direction is above the cloth and n > 0; tangent : tan psi0; surface, volume : the normals'
+    deviations [rad].
+    """
+    cos_theta = math.sqrt(b * b + n * n)
+    inverse = R(1) / max(cos_theta, R(1e-6))
+    theta = atan2(R, t, cos_theta)
+    low, high = theta_range(R, psi0)
+    mean = min(max(-theta_o, low), high)
+    edge = min(max(t * tangent * inverse, R(0)), R(1))
+    sin_m = math.sqrt(max((R(1) - edge) * (R(1) + edge), R(1e-12)))
+    around = R(0.5) * n * inverse / sin_m
+    on_surface = cut_normal(R, theta, mean, surface, low, high) * inverse * around
+    on_volume = cut_normal(R, theta, mean, volume, low, high) * inverse * around
+    return on_surface, on_volume, around / (sin(R, high) - sin(R, low))
+
+
+@njit(**INLINE)
+def sample_lobe(R, lobe, psi0, tangent, deviation, theta_o, u1, u2):
+    """(t, b, n) of the thread frame from `lobe`, whose normal has `deviation` [rad]."""
+    low, high = theta_range(R, psi0)
+    if lobe == ISOTROPIC:
+        sin_low = sin(R, low)
+        theta = asin(R, sin_low + u1 * (sin(R, high) - sin_low))
+        theta = min(max(theta, low), high)
+    else:
+        mean = min(max(-theta_o, low), high)
+        theta = sample_cut_normal(R, u1, mean, deviation, low, high)
+    t, cos_theta = sin(R, theta), max(cos(R, theta), R(0))
+    edge = min(max(t * tangent / max(cos_theta, R(1e-6)), R(0)), R(1))
+    sin_phi = (R(2) * u2 - R(1)) * math.sqrt((R(1) - edge) * (R(1) + edge))
+    return t, cos_theta * sin_phi, cos_theta * math.sqrt((R(1) - sin_phi) * (R(1) + sin_phi))

@@ -1,0 +1,280 @@
+"""Thread-to-thread shadowing: four answers to "does this light reach this point of the weave?".
+
+`g(x, wi)` from 0 to 1, `docs/model.md` section 5. Every method reads the same height field, and
+each is 1 on pile, which has none, and 0 for light at or below the cloth:
+
+none    : 1, the neighbouring threads are left to the masking term
+peak    : the nearest of the highest points is the horizon in every direction, [Bisker2011] 5.2.3
+horizon : a table of the horizon by place on the thread and azimuth, [Max1988]
+traced  : the height field is marched along the ray, the answer that the others are measured by
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import ArrayLike, NDArray
+
+from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
+from fabricusd.appearance.coverage import GAP, WARP, WEFT
+from fabricusd.appearance.curve import crest, peak
+from fabricusd.appearance.height import crown_of, highest_point, level_is_round, steepest
+from fabricusd.appearance.horizon import (
+    AZIMUTHS,
+    TEXELS,
+    horizon_error,
+    horizon_sine,
+    horizon_table,
+)
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN
+from fabricusd.appearance.weave import find, height_on, wrap
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+
+METHODS = ("none", "peak", "horizon", "traced")
+NONE, PEAK, HORIZON, TRACED = range(4)
+
+PEAK_SOFTNESS = math.radians(5.0)
+"""Width of the edge of a `peak` shadow. The horizon it asks about is a guess; a sharper edge would
+only alias."""
+
+SEARCH = 64
+"""Cells around a point in which `peak` looks for the highest point; beyond it the horizon of every
+published fabric is under a quarter of a degree."""
+
+
+class Shadow(NamedTuple):
+    """What a shadowing method needs beside the compiled fabric.
+
+    method : int - NONE, PEAK, HORIZON or TRACED
+    rounded : int - 1 where threads are round across their width (level `thread`)
+    highest : real - greatest height of the field [m]
+    softness : real - width of the shadow's edge in the light's elevation [rad]; `traced` has none
+    crest_first, crest_last : (k, q) real - stretches of each type's run as high as its peak, empty
+        where the last is less than the first
+    crest_height : (k,) real - height there, in run lengths
+    table : (I, J, slots, along, across, azimuths) uint8 - sine of the horizon's elevation times
+        255, see `horizon`; empty for the other methods
+    """
+
+    method: int
+    rounded: int
+    highest: Any
+    softness: Any
+    crest_first: NDArray[Any]
+    crest_last: NDArray[Any]
+    crest_height: NDArray[Any]
+    table: NDArray[np.uint8]
+
+
+def compile_shadow(
+    fabric: Fabric,
+    method: str = "horizon",
+    *,
+    level: str = "weave",
+    softness: float | None = None,
+    azimuths: int = AZIMUTHS,
+    texels: tuple[int, int] = TEXELS,
+    precision: type[np.floating[Any]] = np.float32,
+) -> Shadow:
+    """The tables of shadowing `method`, one of METHODS, for `fabric`.
+
+    level : "weave" or "thread", whether threads are flat or round across their width
+    softness : angular width of the light, over which a shadow's edge is spread [rad]; None takes
+        the table's own error for `horizon` and PEAK_SOFTNESS for `peak`
+    azimuths, texels : size of the horizon table, directions and (along, across) a thread in a cell
+
+    Raises `FabricError` for a repeat whose horizon table would not fit in memory.
+    """
+    if method not in METHODS:
+        raise FabricError("shadow", f"is '{method}'; it must be one of {', '.join(METHODS)}")
+    if softness is not None and not softness > 0:
+        raise FabricError("softness", f"is {softness}; it must be above 0")
+    rounded = level_is_round(level)
+    cloth = compile_fabric(fabric, precision=np.float64)
+    highest = highest_point(fabric, cloth)
+    table = np.zeros((1, 1, 1, 1, 1, 1), np.uint8)
+    if method == "horizon":
+        table = horizon_table(fabric, cloth, rounded, highest, azimuths, texels)
+        if softness is None:
+            softness = horizon_error(cloth, rounded, highest, table)
+    found = [crest(t.curve) for t in fabric.thread_list]
+    first = np.ones((len(found), max(len(c) for c in found)))
+    last = np.zeros_like(first)
+    for row, stretches in enumerate(found):
+        first[row, : len(stretches)], last[row, : len(stretches)] = stretches.T
+    return Shadow(
+        method=METHODS.index(method),
+        rounded=rounded,
+        highest=precision(highest),
+        softness=precision(PEAK_SOFTNESS if softness is None else softness),
+        crest_first=first.astype(precision),
+        crest_last=last.astype(precision),
+        crest_height=np.array([peak(t.curve) for t in fabric.thread_list], precision),
+        table=table,
+    )
+
+
+@njit(**INLINE)
+def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: ignore[no-untyped-def]
+    """Share of light from direction (x, y, z) in the surface frame that reaches a point: `g`.
+
+    u, v : weave coordinates, float64; the next five are what `weave.find` gave there
+
+    What is not a number stays so, and never indexes a table.
+    """
+    flat = math.sqrt(x * x + y * y)
+    if not (s >= R(0) and flat < R(2) and z < R(2)):
+        return R(np.nan)
+    if z <= R(0):
+        return R(0)
+    if shadow.method == NONE or which == GAP or cloth.pile[thread] != 0:
+        return R(1)
+    if flat <= R(1e-6) * z:
+        return R(1)
+    if shadow.method == HORIZON:
+        sine = horizon_sine(R, cloth, shadow.table, u, v, which, x, y)
+        cosine = math.sqrt(max(R(0), R(1) - sine * sine))
+        return _soft(R, z * cosine - flat * sine, shadow.softness)
+    axis = height_on(R, cloth, thread, s, length)
+    if shadow.method == PEAK:
+        # [Bisker2011] gives a place on the thread one height, whatever the level: no round here.
+        drop = shadow.highest - axis - cloth.half_thickness[which, thread]
+        if drop <= R(1e-6) * shadow.highest:
+            return R(1)
+        # No horizon lower than this one can touch the shadow's edge.
+        lowest = max(z / flat - shadow.softness * (R(1) + z * z / (flat * flat)), R(4e-3))
+        distance = R(_to_crest(cloth, shadow, u, v, float(drop / lowest)))
+        reach = math.sqrt(drop * drop + distance * distance)
+        return _soft(R, (z * distance - flat * drop) / reach, shadow.softness)
+    crown = crown_of(R, cloth, shadow.rounded, which, thread, w)
+    slope = float(z) / float(flat)
+    found = steepest(
+        cloth, shadow.rounded, float(shadow.highest), u, v,
+        which, float(crown), float(axis + crown),
+        float(x) / float(flat), float(y) / float(flat), slope, True,
+    )  # fmt: skip
+    return R(0) if found > slope else R(1)
+
+
+@njit(**INLINE)
+def _soft(R, above, softness):  # type: ignore[no-untyped-def]
+    """A smooth step from 0 to 1 over `softness`, in how far the light stands above the horizon."""
+    t = max(R(0), min(R(1), above / softness + R(0.5)))
+    return t * t * (R(3) - R(2) * t)
+
+
+@njit(**LEAN)
+def _to_crest(cloth, shadow, u, v, most):  # type: ignore[no-untyped-def]
+    """Distance on the cloth [m] to the nearest of the highest points, at most `most`."""
+    end, pick = math.floor(u), math.floor(v)
+    pitch_u, pitch_v = float(cloth.pitch[WARP]), float(cloth.pitch[WEFT])
+    best = most
+    for ring in range(SEARCH):
+        if (ring - 1) * min(pitch_u, pitch_v) > best:
+            break
+        for di in range(-ring, ring + 1):
+            step = 1 if abs(di) == ring else max(1, 2 * ring)
+            for dj in range(-ring, ring + 1, step):
+                best = _crest_in_cell(cloth, shadow, u, v, end + di, pick + dj, best)
+    return best
+
+
+@njit(**LEAN)
+def _crest_in_cell(cloth, shadow, u, v, end, pick, best):  # type: ignore[no-untyped-def]
+    """The smaller of `best` and the distance [m] to the highest points in one cell."""
+    i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
+    top = int(cloth.grid[i, j])
+    width = float(cloth.width[top])
+    low = 0.5 - 0.5 * width
+    for slot in range(2 if cloth.under == 1 - top else 1):
+        which = top if slot == 0 else 1 - top
+        visible = width if slot == 0 else float(cloth.under_width)
+        if which == WARP:
+            thread = int(cloth.sequence[WARP, wrap(end, cloth.sequence_length[WARP])])
+        else:
+            thread = int(cloth.sequence[WEFT, wrap(pick, cloth.sequence_length[WEFT])])
+        share = 1.0 if slot == 0 else 1.0 - width
+        place = float(cloth.runs[i, j, slot, 0])
+        cells = float(cloth.runs[i, j, slot, 1])
+        height = cells * share * float(cloth.pitch[1 - which]) * float(
+            shadow.crest_height[thread]
+        ) + float(cloth.half_thickness[which, thread])
+        if visible <= 0.0 or cloth.pile[thread] != 0 or height < 0.999999 * shadow.highest:
+            continue
+        across = 0.5 * visible
+        for q in range(shadow.crest_first.shape[1]):
+            a = max(0.0, float(shadow.crest_first[thread, q]) * cells - place)
+            b = min(1.0, float(shadow.crest_last[thread, q]) * cells - place)
+            if a > b:
+                continue
+            if slot == 1:
+                a, b = a * share, b * share
+                a, b = a if a < low else a + width, b if b < low else b + width
+            if which == WARP:
+                du = max(0.0, abs(u - end - 0.5) - across)
+                dv = max(0.0, a - (v - pick), (v - pick) - b)
+            else:
+                du = max(0.0, a - (u - end), (u - end) - b)
+                dv = max(0.0, abs(v - pick - 0.5) - across)
+            best = min(
+                best,
+                math.hypot(du * float(cloth.pitch[WARP]), dv * float(cloth.pitch[WEFT])),
+            )
+    return best
+
+
+@njit(parallel=True, **KERNEL)
+def lit_all(R, cloth, shadow, uv, wi, out):  # type: ignore[no-untyped-def]
+    """`lit` at weave coordinates uv (n, 2) float64 for light wi (n, 3), into out (n,)."""
+    n = uv.shape[0]
+    block = 1024
+    for b in prange((n + block - 1) // block):
+        for k in range(b * block, min(n, (b + 1) * block)):
+            which, thread, s, w, _, length = find(R, cloth, uv[k, 0], uv[k, 1])
+            out[k] = lit(
+                R, cloth, shadow, uv[k, 0], uv[k, 1], which, thread, s, w, length,
+                wi[k, 0], wi[k, 1], wi[k, 2],
+            )  # fmt: skip
+
+
+def shadowing(
+    fabric: Fabric,
+    wi: ArrayLike,
+    uv_threads: ArrayLike,
+    method: str = "horizon",
+    *,
+    level: str = "weave",
+    compiled: tuple[CompiledFabric, Shadow] | None = None,
+) -> NDArray[Any]:
+    """`g` (n,) for light from unit directions wi (n, 3) at weave coordinates uv_threads (n, 2).
+
+    compiled : the fabric and `compile_shadow` of it, where the caller has them; `method` and
+        `level` are then the shadow's. Otherwise both are made, in float64.
+    """
+    if compiled is None:
+        cloth = compile_fabric(fabric, precision=np.float64)
+        shadow = compile_shadow(fabric, method, level=level, precision=np.float64)
+    else:
+        cloth, shadow = compiled
+    real = cloth.curve_start.dtype.type
+    uv = np.ascontiguousarray(uv_threads, np.float64)
+    light = np.ascontiguousarray(wi, real)
+    if uv.ndim != 2 or uv.shape[1] != 2 or light.shape != (len(uv), 3):
+        raise FabricError(
+            "wi, uv_threads", f"have shapes {light.shape}, {uv.shape}; they must be (n, 3), (n, 2)"
+        )
+    for name, values in (("wi", light), ("uv_threads", uv)):
+        bad = ~np.isfinite(values).all(axis=1)
+        if bad.any():
+            raise FabricError(
+                name,
+                f"has {int(bad.sum())} of {len(uv)} rows that are not finite, the first at "
+                f"{int(np.argmax(bad))}",
+            )
+    out = np.empty(len(uv), real)
+    lit_all(real, cloth, shadow, uv, light, out)
+    return out

@@ -1,0 +1,331 @@
+"""The cloth's surface law: evaluate, sample, pdf, at every level and with every shadowing.
+
+Directions are unit vectors in the surface frame: x = U (the weft runs along it), y = V (the warp),
+z = N on the viewer's side. `wo` points to the viewer and is given, `wi` to the light. A value is
+radiance per unit `L_i dwi`: the cosine is in it. The published models are 0 where either direction
+is at or below the cloth.
+
+    far     the whole repeat at once; no place, no shadowing
+    weave   the thread under a point of the weave
+    thread  the same, and the place across the thread
+
+Arrays are float64 and exact to rounding; the kernels behind them take float32 as well and are what
+the path tracer calls: `far`, `levels`, `surface_sampling`. Source: `docs/model.md` sections 4-6.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import ArrayLike, NDArray
+
+from fabricusd.appearance.accuracy import choose_rule
+from fabricusd.appearance.blocks import BLOCK
+from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
+from fabricusd.appearance.far import far_values
+from fabricusd.appearance.levels import point_values
+from fabricusd.appearance.real import KERNEL
+from fabricusd.appearance.shadow import METHODS, Shadow, compile_shadow, lit_all
+from fabricusd.appearance.surface_sampling import (
+    SamplingTables,
+    far_density,
+    far_direction,
+    point_density,
+    point_direction,
+    sampling_tables,
+)
+from fabricusd.appearance.surface_tables import SurfaceTables, surface_tables
+from fabricusd.appearance.weave import WeaveHit, lookup
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+
+Floats = NDArray[np.float64]
+
+LEVELS = ("far", "weave", "thread")
+
+_CHUNK = 16 * BLOCK
+"""Directions that one worker takes at a time."""
+
+
+class Sample(NamedTuple):
+    """Directions drawn for given viewers.
+
+    wi : (n, 3) float - unit vectors in the surface frame
+    f : (n, 3) float - radiance per unit `L_i dwi`, cosine included
+    pdf : (n,) float - density of wi [1/sr]; 0 with f = 0 where nothing can be drawn
+    """
+
+    wi: Floats
+    f: Floats
+    pdf: Floats
+
+
+def evaluate(
+    fabric: Fabric,
+    wi: ArrayLike,
+    wo: ArrayLike,
+    uv: ArrayLike | None = None,
+    level: str = "far",
+    shadow: str = "none",
+    *,
+    max_error: float | None = None,
+) -> Floats:
+    """(n, 3) radiance per unit `L_i dwi` towards wo, cosine included.
+
+    wi, wo : (n, 3) unit vectors in the surface frame, or (3,) for all
+    uv : (n, 2) weave coordinates in threads (ends along U, picks along V), or (2,) for all; asked
+        for at levels `weave` and `thread`
+    level : one of LEVELS
+    shadow : one of `shadow.METHODS`; level `far` has no place that could be shadowed and takes
+        none of them
+    max_error : bound on the mean relative error of the quadrature over the curves, see
+        `accuracy.choose_rule`; None takes `quadrature.default_rule`
+
+    Raises FabricError for directions that are not finite unit vectors, an unknown level or
+    shadowing, a place that is missing or not finite, a bound that cannot be met.
+    """
+    i, o = _pairs(wi, wo)
+    tables, _ = _prepared(fabric, max_error)
+    hit, places = _places(fabric, uv, level, i.shape[1])
+    _check_shadow(shadow)
+    out = np.empty_like(i)
+    _evaluate(tables, hit, level, i, o, out)
+    if hit is not None and shadow != "none":
+        out *= _lit(fabric, shadow, level, places, i)
+    return np.ascontiguousarray(out.T)
+
+
+def pdf(
+    fabric: Fabric,
+    wi: ArrayLike,
+    wo: ArrayLike,
+    uv: ArrayLike | None = None,
+    level: str = "far",
+    shadow: str = "none",
+) -> Floats:
+    """(n,) density [1/sr] with which `sample` draws wi for the viewer wo, whatever the shadowing.
+
+    Arguments and errors as for `evaluate`.
+    """
+    i, o = _pairs(wi, wo)
+    tables, sampling = _prepared(fabric, None)
+    hit, _ = _places(fabric, uv, level, i.shape[1])
+    _check_shadow(shadow)
+    out = np.empty(i.shape[1])
+    _density(tables, sampling, hit, i, o, out)
+    return out
+
+
+def sample(
+    fabric: Fabric,
+    wo: ArrayLike,
+    u: ArrayLike,
+    uv: ArrayLike | None = None,
+    level: str = "far",
+    shadow: str = "none",
+) -> Sample:
+    """Directions towards the light for the viewers wo, `f/pdf` as even as the lobes allow.
+
+    wo : (n, 3) unit vectors in the surface frame, or (3,) for all
+    u : (n, 3) numbers in [0, 1): lobe, inclination, azimuth
+
+    The rest, and errors, as for `evaluate`.
+    """
+    numbers = np.atleast_2d(np.asarray(u, np.float64))
+    if numbers.ndim != 2 or numbers.shape[1] != 3:
+        raise FabricError("u", f"has shape {numbers.shape}; it must be (n, 3)")
+    bad = int(np.count_nonzero(~((numbers >= 0) & (numbers <= 1))))
+    if bad:
+        raise FabricError("u", f"holds {bad} number(s) outside 0 to 1")
+    o = _repeated(_directions("wo", wo), len(numbers), "wo")
+    tables, sampling = _prepared(fabric, None)
+    hit, places = _places(fabric, uv, level, len(numbers))
+    _check_shadow(shadow)
+    i, f, p = np.empty_like(o), np.empty_like(o), np.empty(o.shape[1])
+    _draw(tables, sampling, hit, o, np.ascontiguousarray(numbers.T), i)
+    _evaluate(tables, hit, level, i, o, f)
+    _density(tables, sampling, hit, i, o, p)
+    if hit is not None and shadow != "none":
+        f *= _lit(fabric, shadow, level, places, i)
+    return Sample(np.ascontiguousarray(i.T), np.ascontiguousarray(f.T), p)
+
+
+@lru_cache(maxsize=32)
+def _prepared(fabric: Fabric, max_error: float | None) -> tuple[SurfaceTables, SamplingTables]:
+    rule = None if max_error is None else choose_rule(fabric, max_error)
+    tables = surface_tables(fabric, rule=rule)
+    return tables, sampling_tables(fabric, tables)
+
+
+@lru_cache(maxsize=32)
+def _shadowed(fabric: Fabric, method: str, level: str) -> tuple[CompiledFabric, Shadow]:
+    return (
+        compile_fabric(fabric, precision=np.float64),
+        compile_shadow(fabric, method, level=level, precision=np.float64),
+    )
+
+
+def _lit(fabric: Fabric, method: str, level: str, uv: Floats, wi: Floats) -> Floats:
+    """(n,) share of the light from wi (3, n) that reaches each place."""
+    cloth, shadow = _shadowed(fabric, method, level)
+    out = np.empty(len(uv))
+    real: Any = np.float64
+    lit_all(real, cloth, shadow, uv, np.ascontiguousarray(wi.T), out)
+    return out
+
+
+def _check_shadow(method: str) -> None:
+    if method not in METHODS:
+        raise FabricError("shadow", f"is '{method}'; it must be one of {', '.join(METHODS)}")
+
+
+def _places(
+    fabric: Fabric, uv: ArrayLike | None, level: str, count: int
+) -> tuple[WeaveHit | None, Floats]:
+    """What lies under each of `count` places, None at level `far`; and the places, (count, 2)."""
+    if level not in LEVELS:
+        raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
+    if level == "far":
+        return None, np.empty((0, 2))
+    if uv is None:
+        raise FabricError("uv", f"is missing; level {level} asks for weave coordinates, (n, 2)")
+    places = np.atleast_2d(np.asarray(uv, np.float64))
+    if places.ndim != 2 or places.shape[1] != 2 or len(places) not in (1, count):
+        raise FabricError("uv", f"has shape {places.shape}; it must be ({count}, 2) or (2,)")
+    places = np.ascontiguousarray(np.broadcast_to(places, (count, 2)))
+    return lookup(_cloth(fabric), places), places
+
+
+@lru_cache(maxsize=32)
+def _cloth(fabric: Fabric) -> CompiledFabric:
+    return compile_fabric(fabric, precision=np.float64)
+
+
+def _directions(name: str, w: ArrayLike) -> Floats:
+    """(3, n) unit vectors to rounding, from (n, 3) or (3,)."""
+    rows = np.atleast_2d(np.asarray(w, np.float64))
+    if rows.ndim != 2 or rows.shape[1] != 3:
+        raise FabricError(name, f"has shape {rows.shape}; it must be (n, 3)")
+    bad = ~np.isfinite(rows).all(axis=1)
+    if bad.any():
+        raise FabricError(
+            name,
+            f"has {int(bad.sum())} of {len(rows)} directions that are not finite, the first at "
+            f"{int(np.argmax(bad))}",
+        )
+    length = np.linalg.norm(rows, axis=1)
+    off = np.abs(length - 1.0)
+    if off.size and off.max() > 1e-3:
+        k = int(off.argmax())
+        raise FabricError(f"{name} {k}", f"has length {length[k]:.6g}; it must be a unit vector")
+    return np.ascontiguousarray((rows / length[:, None]).T)
+
+
+def _repeated(w: Floats, count: int, name: str) -> Floats:
+    if w.shape[1] == count:
+        return w
+    if w.shape[1] != 1:
+        raise FabricError(name, f"has {w.shape[1]} directions; it must have {count}, or 1")
+    return np.repeat(w, count, axis=1)
+
+
+def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Floats, Floats]:
+    """Both directions as (3, n), one of them repeated if it is single."""
+    i, o = _directions("wi", wi), _directions("wo", wo)
+    n = i.shape[1] if o.shape[1] == 1 else o.shape[1]
+    return _repeated(i, n, "wi"), _repeated(o, n, "wo")
+
+
+def _evaluate(
+    tables: SurfaceTables, hit: WeaveHit | None, level: str, wi: Floats, wo: Floats, out: Floats
+) -> None:
+    real: Any = np.float64
+    if hit is None:
+        far_all(real, tables, wi, wo, out)
+        return
+    across = level == "thread"
+    points_all(real, tables, across, hit.set, hit.thread, hit.angle, hit.across, wi, wo, out)
+
+
+def _density(
+    tables: SurfaceTables,
+    sampling: SamplingTables,
+    hit: WeaveHit | None,
+    wi: Floats,
+    wo: Floats,
+    out: Floats,
+) -> None:
+    real: Any = np.float64
+    if hit is None:
+        _far_densities(real, sampling, wi, wo, out)
+    else:
+        _point_densities(real, tables, sampling, hit.set, hit.thread, hit.angle, wi, wo, out)
+
+
+def _draw(
+    tables: SurfaceTables,
+    sampling: SamplingTables,
+    hit: WeaveHit | None,
+    wo: Floats,
+    u: Floats,
+    wi: Floats,
+) -> None:
+    real: Any = np.float64
+    if hit is None:
+        _far_directions(real, sampling, wo, u, wi)
+    else:
+        _point_directions(real, tables, sampling, hit.set, hit.thread, hit.angle, wo, u, wi)
+
+
+@njit(**KERNEL, parallel=True)
+def far_all(R, tables, wi, wo, out):  # type: ignore[no-untyped-def]
+    """Level `far` of all pairs, on all workers: wi, wo, out (3, n) of precision R."""
+    n = wi.shape[1]
+    for chunk in prange((n + _CHUNK - 1) // _CHUNK):
+        far_values(R, tables, wi, wo, out, chunk * _CHUNK, min(n, (chunk + 1) * _CHUNK))
+
+
+@njit(**KERNEL, parallel=True)
+def points_all(R, tables, across_too, sets, threads, psi0, w, wi, wo, out):  # type: ignore[no-untyped-def]
+    """Level `weave`, or `thread` if `across_too`, on all workers: `levels.point_values`."""
+    n = wi.shape[1]
+    for chunk in prange((n + _CHUNK - 1) // _CHUNK):
+        first, last = chunk * _CHUNK, min(n, (chunk + 1) * _CHUNK)
+        point_values(R, tables, across_too, sets, threads, psi0, w, wi, wo, out, first, last)
+
+
+@njit(**KERNEL, parallel=True)
+def _far_densities(R, sampling, wi, wo, out):  # type: ignore[no-untyped-def]
+    for k in prange(out.size):
+        out[k] = far_density(
+            R, sampling, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
+        )
+
+
+@njit(**KERNEL, parallel=True)
+def _far_directions(R, sampling, wo, u, wi):  # type: ignore[no-untyped-def]
+    for k in prange(u.shape[1]):
+        wi[0, k], wi[1, k], wi[2, k] = far_direction(
+            R, sampling, wo[0, k], wo[1, k], wo[2, k], u[0, k], u[1, k], u[2, k]
+        )
+
+
+@njit(**KERNEL, parallel=True)
+def _point_densities(R, tables, sampling, sets, threads, psi0, wi, wo, out):  # type: ignore[no-untyped-def]
+    for k in prange(out.size):
+        out[k] = point_density(
+            R, tables, sampling, sets[k], threads[k], psi0[k],
+            wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k],
+        )  # fmt: skip
+
+
+@njit(**KERNEL, parallel=True)
+def _point_directions(R, tables, sampling, sets, threads, psi0, wo, u, wi):  # type: ignore[no-untyped-def]
+    for k in prange(u.shape[1]):
+        wi[0, k], wi[1, k], wi[2, k] = point_direction(
+            R, tables, sampling, sets[k], threads[k], psi0[k],
+            wo[0, k], wo[1, k], wo[2, k], u[0, k], u[1, k], u[2, k],
+        )  # fmt: skip

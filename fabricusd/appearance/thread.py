@@ -1,0 +1,268 @@
+"""One thread by itself: evaluate, sample, pdf; and the columns and kernels that other tools read.
+
+Directions are unit vectors in the thread frame, x along the thread's tangent, z along its normal
+(`frame`). `f_s` is per steradian and carries no cosine; a light's share of the radiance is
+`f_s L_i cos(theta_i)` with the inclination's cosine `sqrt(1 - x^2)`. A thread scatters over the
+whole sphere.
+
+    evaluate, sample, pdf        (n, 3) float64 arrays of directions: exact to rounding
+    evaluate_soa                 (3, n) arrays of either precision: the fast loop
+    terms, density, ...          scalar kernels on a row of `pack_threads`
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import ArrayLike, NDArray
+
+from fabricusd.appearance.real import KERNEL
+from fabricusd.appearance.thread_sampling import density, sample_direction
+from fabricusd.appearance.thread_table import pack_threads, thread_row
+from fabricusd.appearance.thread_terms import (
+    ALBEDO_B,
+    ALBEDO_G,
+    ALBEDO_R,
+    BRIGHTNESS,
+    CONSERVING,
+    GAMMA_SURFACE,
+    GAMMA_VOLUME,
+    INVERSE_T_MAX,
+    IOR_EXCESS,
+    ISOTROPIC,
+    MICROCYLINDER,
+    MODEL,
+    SURFACE_GAIN,
+    THESIS,
+    conserving_terms,
+    pair_angles,
+    published_terms,
+    terms,
+    terms_at,
+    transmission,
+)
+from fabricusd.errors import FabricError
+from fabricusd.fabric import DEFAULT_MODEL, MODELS, Thread
+
+__all__ = [
+    "ALBEDO_B",
+    "ALBEDO_G",
+    "ALBEDO_R",
+    "BRIGHTNESS",
+    "CONSERVING",
+    "GAMMA_SURFACE",
+    "GAMMA_VOLUME",
+    "IOR_EXCESS",
+    "ISOTROPIC",
+    "MICROCYLINDER",
+    "MODEL",
+    "SURFACE_GAIN",
+    "THESIS",
+    "Sample",
+    "density",
+    "evaluate",
+    "evaluate_soa",
+    "pack_threads",
+    "pdf",
+    "sample",
+    "sample_direction",
+    "terms",
+    "terms_at",
+    "thread_row",
+]
+
+Reals = NDArray[Any]
+Floats = NDArray[np.float64]
+
+BLOCK = 4096
+"""Directions that one worker takes at a time: 150 kB in float32, which stays in its cache."""
+
+
+class Sample(NamedTuple):
+    """Directions drawn for given viewers.
+
+    wi : (n, 3) float - unit vectors in the thread frame
+    f : (n, 3) float - `f_s(wi, wo)` [1/sr], without cosine
+    pdf : (n,) float - density of wi [1/sr], above 0
+    """
+
+    wi: Floats
+    f: Floats
+    pdf: Floats
+
+
+def evaluate(thread: Thread, wi: ArrayLike, wo: ArrayLike, model: str | None = None) -> Floats:
+    """(n, 3) `f_s(wi, wo)` [1/sr] per channel, without cosine; never negative, always finite.
+
+    wi, wo : (n, 3) unit vectors in the thread frame, or (3,) for all
+    model : one of `fabric.MODELS`; None takes the thread's, or else the default
+
+    Raises FabricError for directions that are not finite or not of length 1, and unknown models.
+    """
+    i, o = _pairs(wi, wo)
+    out = np.empty_like(i)
+    _evaluate_soa(np.float64, thread_row(thread, _model_of(thread, model)), i, o, out)
+    return np.ascontiguousarray(out.T)
+
+
+def pdf(thread: Thread, wi: ArrayLike, wo: ArrayLike, model: str | None = None) -> Floats:
+    """(n,) density [1/sr] with which `sample` draws wi for the viewer wo; integrates to 1.
+
+    Arguments and errors as for `evaluate`.
+    """
+    i, o = _pairs(wi, wo)
+    out = np.empty(i.shape[1])
+    _density_soa(np.float64, thread_row(thread, _model_of(thread, model)), i, o, out)
+    return out
+
+
+def sample(thread: Thread, wo: ArrayLike, u: ArrayLike, model: str | None = None) -> Sample:
+    """Directions towards the light for the viewers wo, `f cos(theta_i)/pdf` nearly even.
+
+    wo : (n, 3) unit vectors in the thread frame, or (3,) for all
+    u : (n, 3) numbers in [0, 1): lobe, inclination, azimuth
+
+    Errors as for `evaluate`, and for numbers outside [0, 1].
+    """
+    numbers = np.atleast_2d(np.asarray(u, np.float64))
+    if numbers.ndim != 2 or numbers.shape[1] != 3:
+        raise FabricError("u", f"has shape {numbers.shape}; it must be (n, 3)")
+    bad = int(np.count_nonzero(~((numbers >= 0) & (numbers <= 1))))
+    if bad:
+        raise FabricError("u", f"holds {bad} number(s) outside 0 to 1")
+    o = _directions("wo", wo)
+    if o.shape[1] == 1:
+        o = np.repeat(o, len(numbers), axis=1)
+    if o.shape[1] != len(numbers):
+        raise FabricError("u", f"has {len(numbers)} rows and wo {o.shape[1]}; they must agree")
+    row = thread_row(thread, _model_of(thread, model))
+    i, f, p = np.empty_like(o), np.empty_like(o), np.empty(o.shape[1])
+    _sample_soa(np.float64, row, o, np.ascontiguousarray(numbers.T), i)
+    _evaluate_soa(np.float64, row, i, o, f)
+    _density_soa(np.float64, row, i, o, p)
+    return Sample(np.ascontiguousarray(i.T), np.ascontiguousarray(f.T), p)
+
+
+def evaluate_soa(row: Reals, wi: Reals, wo: Reals, out: Reals | None = None) -> Reals:
+    """`evaluate` for those who hold structures of arrays: no checks, no copies, all workers.
+
+    row : one row of `pack_threads`; wi, wo, out : (3, n) C-contiguous, all of the row's precision
+    Returns out, made if not given: (3, n) `f_s` [1/sr].
+    """
+    if out is None:
+        out = np.empty_like(wi)
+    _evaluate_soa(row.dtype.type, row, wi, wo, out)
+    return out
+
+
+def _model_of(thread: Thread, model: str | None) -> str:
+    name = model or thread.model or DEFAULT_MODEL
+    if name not in MODELS:
+        raise FabricError("model", f"is '{name}'; it must be one of {', '.join(MODELS)}")
+    return name
+
+
+def _directions(name: str, w: ArrayLike) -> Floats:
+    """(3, n) unit vectors to rounding, from (n, 3) or (3,)."""
+    rows = np.atleast_2d(np.asarray(w, np.float64))
+    if rows.ndim != 2 or rows.shape[1] != 3:
+        raise FabricError(name, f"has shape {rows.shape}; it must be (n, 3)")
+    bad = int(np.count_nonzero(~np.isfinite(rows).all(axis=1)))
+    if bad:
+        raise FabricError(name, f"holds {bad} direction(s) that are not finite")
+    length = np.linalg.norm(rows, axis=1)
+    off = np.abs(length - 1.0)
+    if off.size and off.max() > 1e-3:
+        k = int(off.argmax())
+        raise FabricError(f"{name} {k}", f"has length {length[k]:.6g}; it must be a unit vector")
+    return np.ascontiguousarray((rows / length[:, None]).T)
+
+
+def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Floats, Floats]:
+    """Both directions as (3, n), one of them repeated if it is single."""
+    i, o = _directions("wi", wi), _directions("wo", wo)
+    n = max(i.shape[1], o.shape[1])
+    if i.shape[1] == 1:
+        i = np.repeat(i, n, axis=1)
+    if o.shape[1] == 1:
+        o = np.repeat(o, n, axis=1)
+    if i.shape != o.shape:
+        raise FabricError("wi", f"has {i.shape[1]} directions and wo {o.shape[1]}; they must agree")
+    return i, o
+
+
+# The loops below read a row's constants from a tuple: as loads from an array, LLVM would have to
+# assume that every store into `out` changes them, and would not vectorise.
+
+
+@njit(**KERNEL)
+def _constants(row):  # type: ignore[no-untyped-def]
+    """The row's columns before the transmission table."""
+    return (
+        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9],
+        row[10], row[11], row[12], row[13], row[14], row[15], row[16], row[17], row[18],
+    )  # fmt: skip
+
+
+@njit(**KERNEL)
+def _published_block(R, thesis, row, ix, iy, iz, ox, oy, oz, r, g, b):  # type: ignore[no-untyped-def]
+    for k in range(ix.size):
+        cos_i, cos_o, cos_half = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
+        surface, volume = published_terms(R, thesis, row, ix[k], cos_i, ox[k], cos_o, cos_half)
+        r[k] = surface + volume * row[ALBEDO_R]
+        g[k] = surface + volume * row[ALBEDO_G]
+        b[k] = surface + volume * row[ALBEDO_B]
+
+
+@njit(**KERNEL)
+def _conserving_block(R, row, through, ix, iy, iz, ox, oy, oz, r, g, b):  # type: ignore[no-untyped-def]
+    for k in range(ix.size):
+        cos_i, cos_o, cos_half = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
+        surface, volume = conserving_terms(R, row, through[k], ix[k], cos_i, ox[k], cos_o, cos_half)
+        r[k] = surface + volume * row[ALBEDO_R]
+        g[k] = surface + volume * row[ALBEDO_G]
+        b[k] = surface + volume * row[ALBEDO_B]
+
+
+@njit(**KERNEL)
+def _through_block(R, row, iy, iz, oy, oz, out):  # type: ignore[no-untyped-def]
+    """T(theta_i) T(theta_o)/T_max: the table look-up, which keeps the loop above from gathering."""
+    for k in range(out.size):
+        cos_i, cos_o, _ = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
+        through = transmission(R, row, cos_i) * transmission(R, row, cos_o)
+        out[k] = through * row[INVERSE_T_MAX]
+
+
+@njit(**KERNEL, parallel=True)
+def _evaluate_soa(R, row, wi, wo, out):  # type: ignore[no-untyped-def]
+    n = wi.shape[1]
+    constants = _constants(row)
+    model = row[MODEL]
+    for block in prange((n + BLOCK - 1) // BLOCK):
+        s = slice(block * BLOCK, min(n, (block + 1) * BLOCK))
+        ix, iy, iz = wi[0, s], wi[1, s], wi[2, s]
+        ox, oy, oz = wo[0, s], wo[1, s], wo[2, s]
+        r, g, b = out[0, s], out[1, s], out[2, s]
+        if model == R(CONSERVING):
+            through = np.empty(ix.size, R)
+            _through_block(R, row, iy, iz, oy, oz, through)
+            _conserving_block(R, constants, through, ix, iy, iz, ox, oy, oz, r, g, b)
+        elif model == R(THESIS):
+            _published_block(R, True, constants, ix, iy, iz, ox, oy, oz, r, g, b)
+        else:
+            _published_block(R, False, constants, ix, iy, iz, ox, oy, oz, r, g, b)
+
+
+@njit(**KERNEL, parallel=True)
+def _density_soa(R, row, wi, wo, out):  # type: ignore[no-untyped-def]
+    for k in prange(out.size):
+        out[k] = density(R, row, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k])
+
+
+@njit(**KERNEL, parallel=True)
+def _sample_soa(R, row, wo, u, wi):  # type: ignore[no-untyped-def]
+    for k in prange(u.shape[1]):
+        x, y, z = sample_direction(R, row, wo[0, k], wo[1, k], wo[2, k], u[0, k], u[1, k], u[2, k])
+        wi[0, k], wi[1, k], wi[2, k] = x, y, z
