@@ -7,6 +7,7 @@ count as `Fabric.threads`, the grid is `[end, pick]`.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.coverage import GAP, WARP, WEFT, Coverage, coverage, sets
 from fabricusd.appearance.curve import is_pile, nodes, pieces
+from fabricusd.appearance.thread import pack_threads
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -25,12 +27,14 @@ Reals = NDArray[Any]
 class CompiledFabric(NamedTuple):
     """Arrays and scalars of one fabric; `real` below is the precision asked for.
 
+    threads : (k, F) real - `thread.pack_threads`, a row per thread type
     grid : (m, n) uint8 - 1 where end i lies over pick j
     runs : (m, n, slots, 2) uint16, uint32 beyond 65535 threads - in slot 0 for the thread on top,
         in slot 1 for the one underneath (only where `under` is a set): place of the cell in the
         visible run (cells from its start along the thread), and length of that run (cells)
     sequence : (2, k) int32 - thread types of each set, in as many columns as the longer one takes
     sequence_length : (2,) int64 - after how many threads the types repeat
+    repeat : (2,) real - ends and picks after which grid *and* threads repeat
     width : (2,) real - share of its cells' width that a set takes where it is on top
     under : int - the set that is seen underneath the other, or GAP
     under_width : real - share of its width that it shows there
@@ -51,10 +55,12 @@ class CompiledFabric(NamedTuple):
     opaque : int - 1 where no light passes
     """
 
+    threads: Reals
     grid: NDArray[np.uint8]
     runs: NDArray[Any]
     sequence: NDArray[np.int32]
     sequence_length: NDArray[np.int64]
+    repeat: Reals
     width: Reals
     under: int
     under_width: Any
@@ -104,10 +110,12 @@ def compile_fabric(
     pitch = np.array([s.pitch for s in sets(fabric)])
     angle, weight, position, thread, thread_set = _nodes(fabric, share, error)
     return CompiledFabric(
+        threads=pack_threads(fabric, real),
         grid=np.ascontiguousarray(fabric.weave.cells, dtype=np.uint8),
         runs=_run_table(fabric.weave.cells, share.under),
         sequence=sequence,
         sequence_length=lengths,
+        repeat=reals(true_repeat(fabric)),
         width=reals(share.width),
         under=share.under,
         under_width=real(share.under_width),
@@ -126,6 +134,14 @@ def compile_fabric(
         last=np.nextafter(real(1), real(0)),
         tiny=np.finfo(real).tiny,
         opaque=int(fabric.opaque),
+    )
+
+
+def true_repeat(fabric: Fabric) -> tuple[int, int]:
+    """Ends and picks after which the weave and the sequences of threads both start again."""
+    return (
+        math.lcm(fabric.weave.ends, len(fabric.warp.sequence)),
+        math.lcm(fabric.weave.picks, len(fabric.weft.sequence)),
     )
 
 

@@ -66,10 +66,15 @@ def wrap(x, period):  # type: ignore[no-untyped-def]
 def piece_of(R, cloth, thread, s):  # type: ignore[no-untyped-def]
     """Index of the linear piece of the thread's curve at `s`, the later one at a jump.
 
-    A binary search without branches: the table is padded to a power of two by starts beyond 1.
+    Counting every start up to `s` beats a search on curves of a few pieces: it has no branches to
+    mispredict. The table is padded to a power of two by starts beyond 1.
     """
-    k = 0
-    step = cloth.curve_start.shape[1] >> 1
+    k, pieces = 0, cloth.curve_start.shape[1]
+    if pieces <= 32:
+        for p in range(1, pieces):
+            k += int(s >= cloth.curve_start[thread, p])
+        return k
+    step = pieces >> 1
     while step > 0:
         k += step if s >= cloth.curve_start[thread, k + step] else 0
         step >>= 1

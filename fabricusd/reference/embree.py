@@ -1,0 +1,247 @@
+"""Nearest hits and occlusion through Embree 4, in packets of 16 rays.
+
+The C library that the embreex wheel ships is called by name from compiled kernels, without the
+interpreter in between. Where that library is not found, embreex's own Python interface answers the
+same two questions, slower. No other file of the project knows Embree.
+
+Rays travel as Embree's own `RTCRayHit16`: an array (packets, ROWS, 16) float32 whose rows are named
+below; rows 9, 10, 11, 17, 18, ... hold unsigned integers. A lane whose `TFAR` is below its `TNEAR`
+is not traced, which is how a packet that is not full is padded.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import glob
+import importlib.util
+import os
+import sys
+from typing import Any
+
+import numpy as np
+from llvmlite import binding
+from numba import njit, types
+from numpy.typing import NDArray
+
+from fabricusd.errors import FabricError
+
+LANES = 16
+ROWS = 24
+"""Rows of a packet: 21 in Embree 4.4 with instance arrays, padded for what a later one adds."""
+
+OX, OY, OZ, TNEAR, DX, DY, DZ, TIME, TFAR, MASK, ID, FLAGS = range(12)
+NGX, NGY, NGZ, HIT_U, HIT_V, PRIMITIVE, GEOMETRY, INSTANCE = range(12, 20)
+
+MISS = np.uint32(0xFFFFFFFF)
+"""`PRIMITIVE` and `GEOMETRY` of a ray that hit nothing."""
+
+_FLOAT3, _UINT3 = 0x9003, 0x5003
+_ROBUST = 4
+_TRIANGLES = 0
+_INDEX, _VERTEX = 0, 1
+_VERSION, _NATIVE16 = 0, 34
+
+
+def _find_library() -> str | None:
+    """The Embree 4 library of the embreex wheel, or None."""
+    if os.environ.get("FABRICUSD_EMBREE") == "python":
+        return None
+    spec = importlib.util.find_spec("embreex")
+    if spec is None or spec.origin is None:
+        return None
+    package = os.path.dirname(spec.origin)
+    for pattern in (
+        os.path.join(os.path.dirname(package), "embreex.libs", "libembree4*"),
+        os.path.join(os.path.dirname(package), "embreex.libs", "embree4*.dll"),
+        os.path.join(package, ".dylibs", "libembree4*"),
+    ):
+        found = sorted(glob.glob(pattern))
+        if found:
+            return found[0]
+    return None
+
+
+def _declare(library: ctypes.CDLL) -> None:
+    """Give the few functions that build a scene their types."""
+    pointer, size, unsigned = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_uint
+    for name, result, *arguments in (
+        ("rtcNewDevice", pointer, ctypes.c_char_p),
+        ("rtcNewScene", pointer, pointer),
+        ("rtcNewGeometry", pointer, pointer, ctypes.c_int),
+        ("rtcSetSharedGeometryBuffer", None, pointer, ctypes.c_int, unsigned, ctypes.c_int,
+         pointer, size, size, size),
+        ("rtcCommitGeometry", None, pointer),
+        ("rtcReleaseGeometry", None, pointer),
+        ("rtcAttachGeometry", unsigned, pointer, pointer),
+        ("rtcSetSceneFlags", None, pointer, ctypes.c_int),
+        ("rtcCommitScene", None, pointer),
+        ("rtcReleaseScene", None, pointer),
+        ("rtcReleaseDevice", None, pointer),
+        ("rtcGetDeviceProperty", ctypes.c_ssize_t, pointer, ctypes.c_int),
+        ("rtcGetDeviceError", ctypes.c_int, pointer),
+    ):  # fmt: skip
+        function = getattr(library, name)
+        function.restype = result
+        function.argtypes = arguments
+
+
+_LIBRARY: ctypes.CDLL | None = None
+_PATH = _find_library()
+if _PATH is not None:
+    try:
+        _LIBRARY = ctypes.CDLL(_PATH)
+        _declare(_LIBRARY)
+        # Kernels find the functions by name, also those that come out of numba's disk cache.
+        binding.load_library_permanently(_PATH)
+    except (OSError, AttributeError, RuntimeError):
+        _LIBRARY = None
+
+_trace16 = types.void(types.uintp, types.uintp, types.uintp, types.uintp)
+_rtcIntersect16 = types.ExternalFunction("rtcIntersect16", _trace16)
+_rtcOccluded16 = types.ExternalFunction("rtcOccluded16", _trace16)
+
+
+@njit(cache=True, nogil=True)
+def _intersect_packets(scene, valid, arguments, rays, count):
+    base = rays.ctypes.data
+    stride = rays.strides[0]
+    for p in range(count):
+        _rtcIntersect16(valid, scene, base + p * stride, arguments)
+
+
+@njit(cache=True, nogil=True)
+def _occluded_packets(scene, valid, arguments, rays, count):
+    base = rays.ctypes.data
+    stride = rays.strides[0]
+    for p in range(count):
+        _rtcOccluded16(valid, scene, base + p * stride, arguments)
+
+
+def aligned_empty(shape: tuple[int, ...], dtype: Any = np.float32) -> NDArray[Any]:
+    """An uninitialised C-contiguous array that starts on a 64-byte line."""
+    wanted = np.dtype(dtype)
+    size = int(np.prod(shape)) * wanted.itemsize
+    raw = np.empty(size + 64, np.uint8)
+    start = -raw.ctypes.data % 64
+    return raw[start : start + size].view(wanted).reshape(shape)
+
+
+def new_packets(rays: int) -> NDArray[np.float32]:
+    """Room for `rays` rays: (ceil(rays / 16), ROWS, 16) float32, every lane inactive."""
+    packets = aligned_empty(((rays + LANES - 1) // LANES, ROWS, LANES))
+    packets[:] = 0.0
+    packets[:, TFAR] = -1.0
+    packets.view(np.uint32)[:, MASK] = 0xFFFFFFFF
+    return packets
+
+
+class Accelerator:
+    """Triangles that rays can be asked about.
+
+    points : (n, 3) float, triangles : (m, 3) int. Raises `FabricError` where Embree refuses them.
+    Safe to ask from several workers at once.
+    """
+
+    def __init__(self, points: NDArray[Any], triangles: NDArray[Any]) -> None:
+        # Embree reads 16 bytes for the last vertex.
+        self._points = np.zeros((len(points) + 1, 3), np.float32)
+        self._points[:-1] = points
+        self._triangles = np.ascontiguousarray(triangles, np.uint32)
+        self._device = self._scene = 0
+        self._python: Any = None
+        if _LIBRARY is None:
+            self._python = _python_scene(self._points[:-1], self._triangles)
+            return
+        self._device = _LIBRARY.rtcNewDevice(b"")
+        if not self._device:
+            raise FabricError("Embree", "gives no device on this processor")
+        self._scene = _LIBRARY.rtcNewScene(self._device)
+        _LIBRARY.rtcSetSceneFlags(self._scene, _ROBUST)
+        mesh = _LIBRARY.rtcNewGeometry(self._device, _TRIANGLES)
+        for kind, layout, data, count in (
+            (_VERTEX, _FLOAT3, self._points, len(points)),
+            (_INDEX, _UINT3, self._triangles, len(self._triangles)),
+        ):
+            _LIBRARY.rtcSetSharedGeometryBuffer(
+                mesh, kind, 0, layout, data.ctypes.data, 0, 12, count
+            )
+        _LIBRARY.rtcCommitGeometry(mesh)
+        _LIBRARY.rtcAttachGeometry(self._scene, mesh)
+        _LIBRARY.rtcReleaseGeometry(mesh)
+        _LIBRARY.rtcCommitScene(self._scene)
+        error = _LIBRARY.rtcGetDeviceError(self._device)
+        if error:
+            raise FabricError("Embree", f"refuses the scene's {len(triangles)} triangles ({error})")
+        self._valid = aligned_empty((LANES,), np.int32)
+        self._valid[:] = -1
+
+    @property
+    def version(self) -> str:
+        """Which Embree answers, and whether it has packets of 16 in hardware."""
+        if _LIBRARY is None:
+            return f"embreex {getattr(sys.modules.get('embreex'), '__version__', '?')}"
+        number = _LIBRARY.rtcGetDeviceProperty(self._device, _VERSION)
+        native = bool(_LIBRARY.rtcGetDeviceProperty(self._device, _NATIVE16))
+        words = f"{number // 10000}.{number // 100 % 100}.{number % 100}"
+        return f"Embree {words}, packets of 16 {'native' if native else 'emulated'}"
+
+    def intersect(self, rays: NDArray[np.float32], count: int) -> None:
+        """Find the nearest hit of the first `count` packets: TFAR and the hit rows are written.
+
+        The caller sets GEOMETRY to MISS beforehand. A miss leaves TFAR and GEOMETRY as they are.
+        """
+        if self._python is not None:
+            _python_trace(self._python, rays, count, occlusion=False)
+            return
+        _intersect_packets(self._scene, self._valid.ctypes.data, 0, rays, count)
+
+    def occluded(self, rays: NDArray[np.float32], count: int) -> None:
+        """Set TFAR to -inf for each ray of the first `count` packets that something blocks."""
+        if self._python is not None:
+            _python_trace(self._python, rays, count, occlusion=True)
+            return
+        _occluded_packets(self._scene, self._valid.ctypes.data, 0, rays, count)
+
+    def __del__(self) -> None:
+        if _LIBRARY is not None and getattr(self, "_scene", 0):
+            _LIBRARY.rtcReleaseScene(self._scene)
+            _LIBRARY.rtcReleaseDevice(self._device)
+
+
+def _python_scene(points: NDArray[np.float32], triangles: NDArray[np.uint32]) -> Any:
+    """The same triangles in a scene of embreex."""
+    try:
+        from embreex import rtcore_scene
+        from embreex.mesh_construction import TriangleMesh
+    except ImportError:
+        raise FabricError("Embree", "is not installed; `pip install embreex` brings it") from None
+    scene = rtcore_scene.EmbreeScene(robust=True)
+    TriangleMesh(scene, points, triangles.astype(np.int32))
+    return scene
+
+
+def _python_trace(scene: Any, rays: NDArray[np.float32], count: int, *, occlusion: bool) -> None:
+    """`intersect` or `occluded` through embreex, which takes rays that start at their origin."""
+    block = rays[:count]
+    near, far = block[:, TNEAR], block[:, TFAR]
+    active = near <= far
+    direction = np.stack([block[:, r][active] for r in (DX, DY, DZ)], axis=1)
+    start = near[active]
+    origin = np.stack([block[:, r][active] for r in (OX, OY, OZ)], axis=1)
+    origin = origin + start[:, None] * direction
+    reach = (far[active] - start).astype(np.float32)
+    if not len(origin):
+        return
+    hit = scene.run(origin, direction, np.minimum(reach, np.float32(1e30)), output=True)
+    found = (hit["primID"] != -1) & (hit["tfar"] <= reach)
+    if occlusion:
+        far[active] = np.where(found, np.float32(-np.inf), far[active])
+        return
+    far[active] = np.where(found, hit["tfar"] + start, far[active])
+    whole = block.view(np.uint32)
+    for row, value in ((PRIMITIVE, hit["primID"]), (GEOMETRY, np.zeros(len(found)))):
+        whole[:, row][active] = np.where(found, value, MISS).astype(np.uint32)
+    for row, value in ((HIT_U, hit["u"]), (HIT_V, hit["v"])):
+        block[:, row][active] = value
+    for axis, row in enumerate((NGX, NGY, NGZ)):
+        block[:, row][active] = hit["Ng"][:, axis]

@@ -1,0 +1,101 @@
+"""Pictures in files: EXR with layers and metadata, PNG, textures. Only here is OpenImageIO used."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from fabricusd.errors import FabricError
+from fabricusd.files import readable_file, whole_file
+from fabricusd.reference.view_transform import srgb_decode
+
+
+def write_exr(
+    path: str | os.PathLike[str],
+    layers: Mapping[str, NDArray[Any]],
+    channels: Mapping[str, tuple[str, ...]],
+    metadata: Mapping[str, Any],
+) -> None:
+    """One EXR of float32 layers (h, w, c): `beauty` as R, G, B, A, others as `layer.channel`.
+
+    metadata : str, int and float values. Written whole or not at all; `FabricError` if it cannot.
+    """
+    names, planes = [], []
+    for layer, pixels in layers.items():
+        for k, channel in enumerate(channels[layer]):
+            names.append(channel if layer == "beauty" else f"{layer}.{channel}")
+            planes.append(pixels[..., k])
+    data = np.ascontiguousarray(np.stack(planes, axis=-1), np.float32)
+    spec = oiio.ImageSpec(data.shape[1], data.shape[0], data.shape[2], oiio.FLOAT)
+    spec.channelnames = tuple(names)
+    spec.attribute("compression", "zip")
+    spec.attribute("oiio:ColorSpace", "lin_rec709")
+    for key, value in metadata.items():
+        spec.attribute(key, value if isinstance(value, int | float | str) else str(value))
+    _write(path, spec, data)
+
+
+def write_png(path: str | os.PathLike[str], pixels: NDArray[np.uint8]) -> None:
+    """(h, w, 3) uint8 sRGB code values to a PNG, whole or not at all."""
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], oiio.UINT8)
+    spec.attribute("oiio:ColorSpace", "sRGB")
+    _write(path, spec, np.ascontiguousarray(pixels))
+
+
+def _write(path: str | os.PathLike[str], spec: Any, data: NDArray[Any]) -> None:
+    with whole_file(path) as temporary:
+        output = oiio.ImageOutput.create(str(temporary))
+        if output is None:
+            raise FabricError(str(path), "is no picture format; it must end in .exr or .png")
+        good = output.open(str(temporary), spec) and output.write_image(data) and output.close()
+        reason = output.geterror()
+        # The file is complete only once the writer is gone.
+        del output
+        if not good:
+            raise FabricError(str(path), f"cannot be written: {' '.join(str(reason).split())}")
+
+
+def read_image(
+    path: str | os.PathLike[str], *, color_space: str = "auto", most: int = 0
+) -> NDArray[np.float32]:
+    """(h, w, c) float32, linear, c being 1 or 3; raises `FabricError` where it cannot be read.
+
+    color_space : "auto" decodes sRGB from 8-bit pictures, "sRGB" always, "raw" never
+    most : shrink to at most this many pixels a side; 0 keeps all
+    """
+    source = readable_file(path)
+    buffer = oiio.ImageBuf(str(source))
+    pixels = buffer.get_pixels(oiio.FLOAT) if buffer.read(0, 0, True, oiio.FLOAT) else None
+    if pixels is None or pixels.size == 0:
+        reason = " ".join(str(buffer.geterror()).split())
+        raise FabricError(str(path), f"cannot be read as a picture: {reason}")
+    spec = buffer.nativespec()
+    eight_bit = spec.format.basetype == oiio.UINT8
+    pixels = np.asarray(pixels, np.float32)
+    pixels = pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1]
+    if most and max(pixels.shape[:2]) > most:
+        step = -(-max(pixels.shape[:2]) // most)
+        h, w = pixels.shape[0] // step * step, pixels.shape[1] // step * step
+        pixels = pixels[:h, :w].reshape(h // step, step, w // step, step, -1).mean(axis=(1, 3))
+    if color_space == "sRGB" or (color_space == "auto" and eight_bit):
+        pixels = srgb_decode(pixels)
+    return np.ascontiguousarray(pixels, np.float32)
+
+
+def read_exr_layers(
+    path: str | os.PathLike[str],
+) -> tuple[dict[str, NDArray[np.float32]], dict[str, Any]]:
+    """Layers (h, w, c) and metadata of an EXR that `write_exr` wrote."""
+    buffer = oiio.ImageBuf(str(readable_file(path)))
+    pixels = np.asarray(buffer.get_pixels(oiio.FLOAT), np.float32)
+    planes: dict[str, list[NDArray[np.float32]]] = {}
+    for k, name in enumerate(buffer.spec().channelnames):
+        layer, _, _ = name.rpartition(".")
+        planes.setdefault(layer or "beauty", []).append(pixels[..., k])
+    metadata = {a.name: a.value for a in buffer.spec().extra_attribs}
+    return {layer: np.stack(p, axis=-1) for layer, p in planes.items()}, metadata

@@ -1,0 +1,184 @@
+"""Paths in batches: trace, arrive, shade, depart, until none is left.
+
+Each stage is one compiled loop over all rays of a batch, which releases the interpreter, so workers
+are plain Python threads and a batch is what the scheduler hands out.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.appearance.compiled import true_repeat
+from fabricusd.errors import FabricError
+from fabricusd.reference import arrivals
+from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, arrive, prepare
+from fabricusd.reference.camera import Lens, camera_rays
+from fabricusd.reference.departures import depart, record_first, settle, thin_out
+from fabricusd.reference.embree import Accelerator
+from fabricusd.reference.fabric_surface import FabricShader
+from fabricusd.reference.lights import build_lights
+from fabricusd.reference.preview_surface import OPACITY, OPACITY_MAP, build_surfaces, shade_preview
+from fabricusd.reference.scene import FabricSurface, Scene
+from fabricusd.reference.triangles import build_tables
+from fabricusd.reference.wave import (
+    BEAUTY_ROWS,
+    FAR_LEVEL,
+    LANE_BETA,
+    LANE_PDF,
+    LANE_SPREAD,
+    LANE_WIDTH,
+    THREAD_LEVEL,
+    WEAVE_LEVEL,
+    Wave,
+)
+
+LEVELS = {
+    "far": FAR_LEVEL, "weave": WEAVE_LEVEL, "thread": THREAD_LEVEL, "auto": AUTO_LEVEL,
+}  # fmt: skip
+ESTIMATORS = {
+    "mis": arrivals.MIS,
+    "light": arrivals.LIGHT_ONLY,
+    "surface": arrivals.SURFACE_ONLY,
+    "uniform": arrivals.UNIFORM,
+}
+MOST_LAYERS = 32
+"""See-through surfaces that one ray may pass before it is taken as blocked."""
+
+
+class Tracer:
+    """A scene made ready for rays.
+
+    estimator : "mis", or for tests one of "light", "surface", "uniform"; all have the same mean.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        max_bounces: int = 4,
+        level: str = "auto",
+        shadow: str = "horizon",
+        seed: int = 0,
+        estimator: str = "mis",
+    ) -> None:
+        if level not in LEVELS:
+            raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
+        if max_bounces < 0:
+            raise FabricError("max bounces", f"is {max_bounces}; it must be at least 0")
+        self.tables = build_tables(scene)
+        self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
+        self.lights, self.dome = build_lights(scene.lights, self.tables.centre, self.tables.radius)
+        self.surfaces = build_surfaces(scene)
+        self.max_bounces = max_bounces
+        self.level = LEVELS[level]
+        self.estimator = ESTIMATORS[estimator]
+        self.seed = np.uint32(seed & 0xFFFFFFFF)
+        self.epsilon = np.float32(1e-7 * self.tables.radius + 1e-12)
+        count = max(len(scene.materials), 1)
+        self.shaders: list[Any] = [None] * count
+        self._repeats = np.zeros((count, 2), np.float32)
+        self.opacity = np.where(
+            self.surfaces.table[:, OPACITY_MAP] >= 0, -1.0, self.surfaces.table[:, OPACITY]
+        ).astype(np.float32)
+        for k, surface in enumerate(scene.materials):
+            if isinstance(surface, FabricSurface):
+                fabric = surface.binding.fabric
+                self._repeats[k] = true_repeat(fabric)
+                self.shaders[k] = FabricShader(fabric, shadow)
+                self.opacity[k] = 1.0 - self.shaders[k].gap
+        self.see_through = bool((self.opacity < 1).any())
+
+    def trace(
+        self,
+        wave: Wave,
+        lens: Lens,
+        width: int,
+        pixels: NDArray[np.int32],
+        first: int,
+        samples: int,
+        counters: NDArray[np.int64],
+    ) -> None:
+        """Follow `samples` paths of each pixel to their end; `wave.film` holds what they saw.
+
+        counters : (3,) int64 - rays, shadow rays and values that were not finite, added up.
+        """
+        count = len(pixels) * samples
+        aovs = len(wave.film) > BEAUTY_ROWS
+        wave.film[:, :count] = 0.0
+        camera_rays(
+            lens, width, pixels, first, samples, self.seed, wave.rays,
+            wave.lanes[LANE_WIDTH : LANE_SPREAD + 1],
+        )  # fmt: skip
+        wave.lanes[LANE_BETA : LANE_BETA + 3, :count] = 1.0
+        wave.lanes[LANE_PDF, :count] = -1.0
+        wave.lane_tags[0, :count] = np.arange(count)
+        wave.lane_tags[1, :count] = 0
+        counts = np.zeros(QUEUES * len(self.shaders), np.int64)
+        result = np.zeros(3, np.int64)
+        for step in range(self.max_bounces + 2 + MOST_LAYERS):
+            self.accelerator.intersect(wave.rays, (count + 15) // 16)
+            counters[0] += count
+            arrive(
+                step, self.max_bounces, self.estimator, count, wave.rays, wave.lanes,
+                wave.lane_tags, self.lights, self.dome, wave.film, wave.keys,
+                self.tables.material, self._repeats, self.tables.records, self.level,
+                pixels, samples, first, self.seed, counts,
+            )  # fmt: skip
+            ends = np.cumsum(counts)
+            hits = int(ends[-1])
+            if hits == 0:
+                break
+            prepare(
+                step, self.estimator, count, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
+                ends - counts, self.tables.records, self.lights, self.dome, self.surfaces,
+                self.epsilon, pixels, samples, first, self.seed, wave.film, wave.hits, wave.tags,
+            )  # fmt: skip
+            for queue in np.flatnonzero(counts):
+                start, end = int(ends[queue] - counts[queue]), int(ends[queue])
+                self._shade(wave, int(queue), start, end)
+            if aovs and step <= MOST_LAYERS:
+                record_first(
+                    hits, lens.eye, lens.axis, wave.hits, wave.tags, self.tables.uv, wave.film
+                )
+            result[:] = 0
+            depart(
+                self.estimator, hits, self.max_bounces, wave.hits, wave.tags, wave.film,
+                wave.shadow_rays, wave.shadow, wave.shadow_path, wave.next_rays, wave.next_lanes,
+                wave.next_tags, result,
+            )  # fmt: skip
+            counters[1] += result[0]
+            counters[2] += result[2]
+            self._settle(wave, int(result[0]), aovs)
+            wave.swap()
+            count = int(result[1])
+            if count == 0:
+                break
+
+    def _shade(self, wave: Wave, queue: int, start: int, end: int) -> None:
+        """Fill the surface's rows of hits `start` to `end`."""
+        shader = self.shaders[queue // QUEUES]
+        if shader is None:
+            shade_preview(self.surfaces, wave.hits, wave.tags, start, end)
+        else:
+            shader(queue // 2 % 3, queue % 2, wave, start, end)
+
+    def _settle(self, wave: Wave, count: int, aovs: bool) -> None:
+        """Trace the shadow rays and add what they bring."""
+        if count == 0:
+            return
+        if not self.see_through:
+            self.accelerator.occluded(wave.shadow_rays, (count + 15) // 16)
+            settle(count, wave.shadow_rays, wave.shadow, wave.shadow_path, wave.film, aovs)
+            return
+        for _ in range(MOST_LAYERS):
+            self.accelerator.intersect(wave.shadow_rays, (count + 15) // 16)
+            count = thin_out(
+                count, wave.shadow_rays, wave.shadow, wave.shadow_path, self.opacity,
+                self.surfaces, self.tables.material, self.tables.records, self.epsilon, aovs,
+                wave.film,
+            )  # fmt: skip
+            if count == 0:
+                break

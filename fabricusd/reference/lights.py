@@ -1,0 +1,326 @@
+"""Lights as rows of one table: chosen by power, sampled by area or solid angle, hit by rays.
+
+Lights are no obstacles: a ray goes on behind them, so what a ray sees is the sum over all that it
+passes before its first triangle. That keeps sampling and hitting two estimators of one integral.
+Each `pdf` is per solid angle and holds the chance of choosing the light.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabricusd.appearance.real import LEAN, cos, sin
+from fabricusd.reference.dome import (
+    LUMINANCE,
+    Dome,
+    build_dome,
+    density_at,
+    place_of,
+    radiance_at,
+    sample_dome,
+)
+from fabricusd.reference.scene import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE, Light
+
+R = np.float32
+_PI = R(math.pi)
+
+# Columns of the table. X and Y are half the extent of a rect, the radii of a disk, X half the axis
+# of a cylinder; Z is the unit direction it shines to, for a distant light the one it comes from.
+KIND, CHANCE, RED, P, X, Y, Z, SIZE, AREA, VISIBLE = 0, 1, 2, 5, 8, 11, 14, 17, 18, 19
+COLUMNS = 20
+
+
+def build_lights(
+    lights: list[Light], centre: NDArray[np.float64], radius: float
+) -> tuple[NDArray[np.float32], Dome]:
+    """The table (n, COLUMNS) float32 and the dome's picture, all domes added into one."""
+    table = np.zeros((0, COLUMNS), np.float32)
+    rows = [_row(light, centre) for light in lights if light.kind != DOME]
+    domes = [light for light in lights if light.kind == DOME]
+    dome = _merge_domes(domes)
+    if domes:
+        row = np.zeros(COLUMNS)
+        row[KIND] = DOME
+        row[VISIBLE] = 1.0
+        rows.append(row)
+    if rows:
+        table = np.ascontiguousarray(rows, np.float32)
+        power = np.array([_irradiance(row, dome, radius) for row in rows])
+        total = power.sum()
+        # No light is forgotten altogether: the estimate of its power is rough.
+        share = power / total if total > 0 else np.full(len(rows), 1 / len(rows))
+        share = 0.9 * share + 0.1 / len(rows)
+        table[:, CHANCE] = share / share.sum()
+    return table, dome
+
+
+def _row(light: Light, centre: NDArray[np.float64]) -> NDArray[np.float64]:
+    row = np.zeros(COLUMNS)
+    axes, position = light.frame[:3, :3], light.frame[:3, 3] - centre
+    lengths = np.maximum(np.linalg.norm(axes, axis=0), 1e-30)
+    row[KIND], row[RED : RED + 3], row[P : P + 3] = light.kind, light.radiance, position
+    row[VISIBLE] = float(light.camera_visible)
+    z = -axes[:, 2] / lengths[2]
+    x, y = axes[:, 0], axes[:, 1]
+    if light.kind == DISTANT:
+        z = -z
+        x, y = x / lengths[0], y / lengths[1]
+        row[SIZE] = math.cos(0.5 * light.angle)
+        # 1 - cos without cancellation, for the solid angle.
+        row[AREA] = 2 * math.sin(0.25 * light.angle) ** 2
+    elif light.kind == RECT:
+        x, y = 0.5 * light.width * x, 0.5 * light.height * y
+        row[AREA] = 4 * np.linalg.norm(np.cross(x, y))
+    elif light.kind == DISK:
+        x, y = light.radius * x, light.radius * y
+        row[AREA] = math.pi * np.linalg.norm(np.cross(x, y))
+    elif light.kind == SPHERE:
+        row[SIZE] = light.radius * float(np.mean(lengths))
+        row[AREA] = 4 * math.pi * row[SIZE] ** 2
+    elif light.kind == CYLINDER:
+        row[SIZE] = light.radius * float(np.mean(lengths[1:]))
+        x, y, z = 0.5 * light.height * x, y / lengths[1], axes[:, 2] / lengths[2]
+        row[AREA] = 2 * math.pi * row[SIZE] * light.height * lengths[0]
+    row[X : X + 3], row[Y : Y + 3], row[Z : Z + 3] = x, y, z
+    return row
+
+
+def _irradiance(row: NDArray[np.float64], dome: Dome, radius: float) -> float:
+    """Rough irradiance at the scene's centre, for choosing among lights."""
+    if row[KIND] == DOME:
+        h = dome.image.shape[0]
+        edges = np.cos(np.pi * np.arange(h + 1) / h)
+        solid = (edges[:-1] - edges[1:])[:, None] * 2 * np.pi / dome.image.shape[1]
+        return float((dome.image @ LUMINANCE * solid).sum() / 2)
+    brightness = float(row[RED : RED + 3] @ LUMINANCE)
+    if row[KIND] == DISTANT:
+        return brightness * (2 * math.pi * row[AREA] if row[AREA] > 0 else 1.0)
+    distance2 = float(row[P : P + 3] @ row[P : P + 3])
+    share = 0.25 if row[KIND] in (SPHERE, CYLINDER) else 0.5
+    return brightness * share * row[AREA] / max(distance2, 0.25 * radius**2, 1e-12)
+
+
+def _merge_domes(domes: list[Light]) -> Dome:
+    """One picture of all domes; kept as it is where there is only one."""
+    if not domes:
+        return build_dome(np.zeros((1, 1, 3)), np.eye(3))
+    pictures = []
+    for light in domes:
+        image = np.ones((1, 1, 3), np.float32) if light.image is None else light.image
+        pictures.append(np.asarray(image, np.float32) * np.float32(light.radiance))
+    turns = [_rotation(light.frame) for light in domes]
+    if len(domes) == 1:
+        return build_dome(pictures[0], turns[0])
+    h = max(p.shape[0] for p in pictures)
+    w = max(p.shape[1] for p in pictures)
+    total = np.zeros((h, w, 3), np.float32)
+    for picture, turn in zip(pictures, turns, strict=True):
+        _add_dome(total, build_dome(picture, turn))
+    return build_dome(total, np.eye(3))
+
+
+@njit(**LEAN)
+def _add_dome(total, dome):
+    h, w = total.shape[0], total.shape[1]
+    for j in range(h):
+        for i in range(w):
+            theta = (R(j) + R(0.5)) * (_PI / R(h))
+            longitude = (R(i) + R(0.5)) * (R(2) * _PI / R(w)) - R(0.5) * _PI
+            sine = sin(R, theta)
+            x, y, z = sine * cos(R, longitude), cos(R, theta), sine * sin(R, longitude)
+            column, row, _ = place_of(dome, x, y, z)
+            red, green, blue = radiance_at(dome, column, row)
+            total[j, i, 0] += red
+            total[j, i, 1] += green
+            total[j, i, 2] += blue
+
+
+def _rotation(frame: NDArray[np.float64]) -> NDArray[np.float64]:
+    """World to local, from the frame's axes made orthonormal."""
+    x = frame[:3, 0] / max(float(np.linalg.norm(frame[:3, 0])), 1e-30)
+    y = frame[:3, 1] - x * (x @ frame[:3, 1])
+    y = y / max(float(np.linalg.norm(y)), 1e-30)
+    z = np.cross(x, y)
+    return np.stack([x, y, z * np.sign(z @ frame[:3, 2] or 1.0)])
+
+
+@njit(**LEAN)
+def choose_light(table, u):
+    """Index of the light that a uniform number chooses."""
+    last = table.shape[0] - 1
+    for k in range(last):
+        u = u - table[k, CHANCE]
+        if u < R(0):
+            return k
+    return last
+
+
+@njit(**LEAN)
+def _to_surface(light, px, py, pz, qx, qy, qz, cosine_of):
+    """Direction, distance and pdf towards a point q of the light whose normal is `cosine_of`."""
+    dx, dy, dz = qx - px, qy - py, qz - pz
+    square = max(dx * dx + dy * dy + dz * dz, R(1e-20))
+    distance = math.sqrt(square)
+    inverse = R(1) / distance
+    dx, dy, dz = dx * inverse, dy * inverse, dz * inverse
+    nx, ny, nz = cosine_of
+    cosine = -(dx * nx + dy * ny + dz * nz)
+    if cosine <= R(1e-6):
+        return dx, dy, dz, distance, R(0)
+    return dx, dy, dz, distance, light[CHANCE] * square / (cosine * light[AREA])
+
+
+@njit(**LEAN)
+def _cone(light, ax, ay, az, one_minus_cos, u0, u1):
+    """A direction in the cone around the unit axis a, uniform by solid angle, and its pdf."""
+    down = u0 * one_minus_cos
+    sine = math.sqrt(max(down * (R(2) - down), R(0)))
+    phi = R(2) * _PI * u1
+    a, b, c = sine * cos(R, phi), sine * sin(R, phi), R(1) - down
+    sign = R(1) if az >= R(0) else R(-1)
+    k = R(-1) / (sign + az)
+    m = ax * ay * k
+    x = a * (R(1) + sign * ax * ax * k) + b * m + c * ax
+    y = a * sign * m + b * (sign + ay * ay * k) + c * ay
+    z = -a * sign * ax - b * ay + c * az
+    return x, y, z, light[CHANCE] / (R(2) * _PI * one_minus_cos)
+
+
+@njit(**LEAN)
+def sample_light(light, dome, px, py, pz, u0, u1, u2):
+    """Towards one light from p, by three uniform numbers: (dx, dy, dz, distance, r, g, b, pdf).
+
+    pdf is 0 where the light does not shine on p, and *minus* the chance of the choice for a light
+    without extent, whose (r, g, b) is an irradiance and which no ray hits.
+    """
+    kind = int(light[KIND])
+    far = R(1e30)
+    red, green, blue = light[RED], light[RED + 1], light[RED + 2]
+    if kind == DOME:
+        dx, dy, dz, column, row, pdf = sample_dome(dome, u0, u1, u2)
+        red, green, blue = radiance_at(dome, column, row)
+        return dx, dy, dz, far, red, green, blue, pdf * light[CHANCE]
+    zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
+    if kind == DISTANT:
+        if light[AREA] <= R(0):
+            return zx, zy, zz, far, red, green, blue, -light[CHANCE]
+        dx, dy, dz, pdf = _cone(light, zx, zy, zz, light[AREA], u0, u1)
+        return dx, dy, dz, far, red, green, blue, pdf
+    cx, cy, cz = light[P], light[P + 1], light[P + 2]
+    if kind == SPHERE:
+        ax, ay, az = cx - px, cy - py, cz - pz
+        square = ax * ax + ay * ay + az * az
+        radius2 = light[SIZE] * light[SIZE]
+        if square <= radius2:
+            return zx, zy, zz, far, red, green, blue, R(0)
+        distance = math.sqrt(square)
+        ax, ay, az = ax / distance, ay / distance, az / distance
+        sine2 = radius2 / square
+        one_minus_cos = sine2 / (R(1) + math.sqrt(R(1) - sine2))
+        dx, dy, dz, pdf = _cone(light, ax, ay, az, one_minus_cos, u0, u1)
+        along = (dx * ax + dy * ay + dz * az) * distance
+        reach = along - math.sqrt(max(radius2 - square + along * along, R(0)))
+        return dx, dy, dz, reach, red, green, blue, pdf
+    xx, xy, xz = light[X], light[X + 1], light[X + 2]
+    yx, yy, yz = light[Y], light[Y + 1], light[Y + 2]
+    if kind == CYLINDER:
+        a, phi = R(2) * u0 - R(1), R(2) * _PI * u1
+        c, s = cos(R, phi), sin(R, phi)
+        nx, ny, nz = c * yx + s * zx, c * yy + s * zy, c * yz + s * zz
+        r = light[SIZE]
+        qx, qy, qz = cx + a * xx + r * nx, cy + a * xy + r * ny, cz + a * xz + r * nz
+    else:
+        nx, ny, nz = zx, zy, zz
+        a, b = R(2) * u0 - R(1), R(2) * u1 - R(1)
+        if kind == DISK:
+            r, phi = math.sqrt(u0), R(2) * _PI * u1
+            a, b = r * cos(R, phi), r * sin(R, phi)
+        qx, qy, qz = cx + a * xx + b * yx, cy + a * xy + b * yy, cz + a * xz + b * yz
+    dx, dy, dz, distance, pdf = _to_surface(light, px, py, pz, qx, qy, qz, (nx, ny, nz))
+    return dx, dy, dz, distance, red, green, blue, pdf
+
+
+@njit(**LEAN)
+def hit_light(light, dome, px, py, pz, dx, dy, dz, reach):
+    """What a ray sees of one light nearer than `reach`: (r, g, b, pdf); pdf 0 where nothing."""
+    kind = int(light[KIND])
+    none = R(0)
+    red, green, blue = light[RED], light[RED + 1], light[RED + 2]
+    if kind == DOME:
+        if reach < R(1e29):
+            return none, none, none, none
+        column, row, sine = place_of(dome, dx, dy, dz)
+        red, green, blue = radiance_at(dome, column, row)
+        return red, green, blue, density_at(dome, column, row, sine) * light[CHANCE]
+    zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
+    if kind == DISTANT:
+        if light[AREA] <= R(0) or reach < R(1e29):
+            return none, none, none, none
+        # |d - z|^2 = 2 (1 - cos), which keeps the sun's half degree in float32.
+        ax, ay, az = dx - zx, dy - zy, dz - zz
+        if R(0.5) * (ax * ax + ay * ay + az * az) > light[AREA]:
+            return none, none, none, none
+        return red, green, blue, light[CHANCE] / (R(2) * _PI * light[AREA])
+    ax, ay, az = light[P] - px, light[P + 1] - py, light[P + 2] - pz
+    if kind == SPHERE:
+        square = ax * ax + ay * ay + az * az
+        radius2 = light[SIZE] * light[SIZE]
+        along = ax * dx + ay * dy + az * dz
+        bx, by, bz = ax - along * dx, ay - along * dy, az - along * dz
+        inside = radius2 - (bx * bx + by * by + bz * bz)
+        if square <= radius2 or along <= none or inside < none:
+            return none, none, none, none
+        if along - math.sqrt(inside) >= reach:
+            return none, none, none, none
+        sine2 = radius2 / square
+        one_minus_cos = sine2 / (R(1) + math.sqrt(R(1) - sine2))
+        return red, green, blue, light[CHANCE] / (R(2) * _PI * one_minus_cos)
+    if kind == CYLINDER:
+        t, cosine = _hit_tube(light, ax, ay, az, dx, dy, dz)
+    else:
+        t, cosine = _hit_plane(light, kind, ax, ay, az, dx, dy, dz)
+    if t <= none or t >= reach or cosine <= R(1e-6):
+        return none, none, none, none
+    return red, green, blue, light[CHANCE] * t * t / (cosine * light[AREA])
+
+
+@njit(**LEAN)
+def _hit_plane(light, kind, ax, ay, az, dx, dy, dz):
+    """Distance to a rect or disk and the cosine there; distance 0 for a miss."""
+    zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
+    cosine = -(dx * zx + dy * zy + dz * zz)
+    if cosine <= R(1e-6):
+        return R(0), R(0)
+    t = -(ax * zx + ay * zy + az * zz) / cosine
+    qx, qy, qz = t * dx - ax, t * dy - ay, t * dz - az
+    xx, xy, xz = light[X], light[X + 1], light[X + 2]
+    yx, yy, yz = light[Y], light[Y + 1], light[Y + 2]
+    a = (qx * xx + qy * xy + qz * xz) / (xx * xx + xy * xy + xz * xz)
+    b = (qx * yx + qy * yy + qz * yz) / (yx * yx + yy * yy + yz * yz)
+    inside = a * a + b * b <= R(1) if kind == DISK else max(abs(a), abs(b)) <= R(1)
+    return (t if inside else R(0)), cosine
+
+
+@njit(**LEAN)
+def _hit_tube(light, ax, ay, az, dx, dy, dz):
+    """Distance to the outside of a cylinder and the cosine there; distance 0 for a miss."""
+    xx, xy, xz = light[X], light[X + 1], light[X + 2]
+    half2 = xx * xx + xy * xy + xz * xz
+    da, pa = (dx * xx + dy * xy + dz * xz) / half2, (ax * xx + ay * xy + az * xz) / half2
+    ex, ey, ez = dx - da * xx, dy - da * xy, dz - da * xz
+    fx, fy, fz = ax - pa * xx, ay - pa * xy, az - pa * xz
+    e2 = ex * ex + ey * ey + ez * ez
+    ef = ex * fx + ey * fy + ez * fz
+    r2 = light[SIZE] * light[SIZE]
+    f2 = fx * fx + fy * fy + fz * fz
+    root = ef * ef - e2 * (f2 - r2)
+    if e2 <= R(1e-12) or root <= R(0) or f2 <= r2:
+        return R(0), R(0)
+    t = (ef - math.sqrt(root)) / e2
+    if abs(t * da - pa) > R(1):
+        return R(0), R(0)
+    return t, math.sqrt(root) / light[SIZE]

@@ -1,0 +1,60 @@
+"""OBJ, GLB, GLTF and PLY files through trimesh: triangles, UVs, and one fabric for all of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Binding
+from fabricusd.reference.scene import FabricSurface, Material, Mesh, PreviewSurface, Scene
+
+
+def read_mesh_file(path: Path, binding: Binding | None) -> Scene:
+    """The file's meshes; lengths are taken as metres, +y as up.
+
+    Every mesh with UVs is made of `binding`; without a binding all are grey.
+    """
+    import trimesh
+
+    try:
+        loaded: Any = trimesh.load_scene(path, process=False)
+        nodes = [(name, *loaded.graph[name]) for name in loaded.graph.nodes_geometry]
+    except Exception as error:
+        words = " ".join(str(error).split())[:200]
+        raise FabricError(str(path), f"cannot be read as a mesh: {words}") from error
+    scene = Scene()
+    cloth: Material = PreviewSurface(name="grey")
+    scene.materials.append(cloth)
+    if binding is not None:
+        scene.materials.append(FabricSurface(name=binding.fabric.name, binding=binding))
+    for node, transform, geometry in nodes:
+        part = loaded.geometry[geometry]
+        faces = getattr(part, "faces", None)
+        if faces is None or not len(faces):
+            continue
+        name = f"{path.name}:{node}"
+        coordinates = getattr(part.visual, "uv", None)
+        uv = None
+        if coordinates is not None and len(coordinates) == len(part.vertices):
+            uv = np.asarray(coordinates, np.float64)[faces]
+        material = 0
+        if binding is not None:
+            if uv is None:
+                scene.note(name, "has no UVs; it is rendered grey instead of as a fabric")
+            else:
+                material = 1
+        scene.meshes.append(
+            Mesh(
+                path=name,
+                points=trimesh.transform_points(np.asarray(part.vertices), transform),
+                triangles=np.asarray(faces),
+                uv=uv,
+                material=np.full(len(faces), material, np.int32),
+            )
+        )
+    if not scene.meshes:
+        raise FabricError(str(path), "holds no triangles")
+    return scene

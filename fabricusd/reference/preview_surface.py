@@ -1,0 +1,254 @@
+"""Surfaces other than cloth: Lambert under GGX, as UsdPreviewSurface describes them.
+
+[Walter2007] GGX, height-correlated masking, sampled by visible normals in the form of
+[Dupuy2023]. The diffuse part is scaled by the smaller of both directions' Fresnel transmittance,
+which keeps it reciprocal and passive.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabricusd.appearance.real import INLINE, LEAN, cos, sin
+from fabricusd.reference.scene import PreviewSurface, Scene, Texture
+from fabricusd.reference.wave import (
+    CHANCE,
+    F_PDF,
+    GO,
+    GO_PDF,
+    KEEP,
+    MATERIAL,
+    PLACE,
+    THREAD,
+    WEIGHT,
+    WI,
+    WO,
+    F,
+)
+
+R = np.float32
+_PI = R(math.pi)
+
+# Columns of the table of surfaces; each *_MAP is an index into the textures, or -1.
+DIFFUSE, METALLIC, ROUGHNESS, IOR, OPACITY, THRESHOLD, EMISSIVE = 0, 3, 4, 5, 6, 7, 8
+DIFFUSE_MAP, METALLIC_MAP, ROUGHNESS_MAP, OPACITY_MAP, EMISSIVE_MAP = 11, 12, 13, 14, 15
+COLUMNS = 16
+_MAPS = {
+    "diffuse": DIFFUSE_MAP, "metallic": METALLIC_MAP, "roughness": ROUGHNESS_MAP,
+    "opacity": OPACITY_MAP, "emissive": EMISSIVE_MAP,
+}  # fmt: skip
+_WRAPS = ("repeat", "clamp", "mirror", "black")
+
+
+class Surfaces(NamedTuple):
+    """table : (materials, COLUMNS) float32; maps : (k, 6) int64 - start in `texels`, height, width,
+    channels, wrap along u, wrap along v; texels : (t,) float32."""
+
+    table: NDArray[np.float32]
+    maps: NDArray[np.int64]
+    texels: NDArray[np.float32]
+
+
+def build_surfaces(scene: Scene) -> Surfaces:
+    """One row per material of the scene; rows of fabrics stay empty."""
+    table = np.zeros((max(len(scene.materials), 1), COLUMNS), np.float32)
+    table[:, DIFFUSE_MAP:] = -1.0
+    table[:, OPACITY] = 1.0
+    maps: list[list[int]] = []
+    pixels: list[NDArray[np.float32]] = []
+    start = 0
+    for row, surface in zip(table, scene.materials, strict=False):
+        if not isinstance(surface, PreviewSurface):
+            continue
+        row[DIFFUSE : DIFFUSE + 3], row[EMISSIVE : EMISSIVE + 3] = surface.diffuse, surface.emissive
+        row[METALLIC], row[ROUGHNESS], row[IOR] = surface.metallic, surface.roughness, surface.ior
+        row[OPACITY], row[THRESHOLD] = surface.opacity, surface.opacity_threshold
+        for name, column in _MAPS.items():
+            texture = surface.textures.get(name)
+            if texture is None:
+                continue
+            row[column] = len(maps)
+            maps.append(_map_row(texture, start))
+            pixels.append(np.asarray(texture.pixels, np.float32).ravel())
+            start += pixels[-1].size
+    return Surfaces(
+        table,
+        np.array(maps, np.int64).reshape(-1, 6),
+        np.concatenate(pixels) if pixels else np.zeros(1, np.float32),
+    )
+
+
+def _map_row(texture: Texture, start: int) -> list[int]:
+    h, w, c = texture.pixels.shape
+    return [start, h, w, c, _WRAPS.index(texture.wrap[0]), _WRAPS.index(texture.wrap[1])]
+
+
+@njit(**INLINE)
+def _wrapped(i, n, mode):
+    """Texel index `i` brought into [0, n), or -1 for black."""
+    if mode == 0:
+        return i % n
+    if mode == 1:
+        return min(max(i, 0), n - 1)
+    if mode == 2:
+        j = i % (2 * n)
+        return min(j, 2 * n - 1 - j)
+    return i if 0 <= i < n else -1
+
+
+@njit(**LEAN)
+def texture_at(surfaces, index, u, v):
+    """Bilinear lookup: (r, g, b); v grows upwards from the bottom row."""
+    m = surfaces.maps[index]
+    start, h, w, channels = m[0], m[1], m[2], m[3]
+    x, y = u * R(w) - R(0.5), (R(1) - v) * R(h) - R(0.5)
+    if not (abs(x) < R(1e8) and abs(y) < R(1e8)):
+        return R(0), R(0), R(0)
+    i, j = math.floor(x), math.floor(y)
+    s, t = x - R(i), y - R(j)
+    red, green, blue = R(0), R(0), R(0)
+    for corner in range(4):
+        di, dj = corner & 1, corner >> 1
+        a, b = _wrapped(i + di, w, m[4]), _wrapped(j + dj, h, m[5])
+        if a < 0 or b < 0:
+            continue
+        weight = (s if di else R(1) - s) * (t if dj else R(1) - t)
+        k = start + (b * w + a) * channels
+        red += weight * surfaces.texels[k]
+        green += weight * surfaces.texels[k + (1 if channels > 1 else 0)]
+        blue += weight * surfaces.texels[k + (2 if channels > 2 else 0)]
+    return red, green, blue
+
+
+@njit(**LEAN)
+def opacity_at(surfaces, material, u, v):
+    """Share of the light that does not go straight through."""
+    row = surfaces.table[material]
+    opacity = row[OPACITY]
+    if row[OPACITY_MAP] >= R(0):
+        opacity, _, _ = texture_at(surfaces, int(row[OPACITY_MAP]), u, v)
+    if row[THRESHOLD] > R(0):
+        return R(1) if opacity >= row[THRESHOLD] else R(0)
+    return min(max(opacity, R(0)), R(1))
+
+
+@njit(**LEAN)
+def emission_at(surfaces, material, u, v):
+    """Radiance that the surface itself sends out: (r, g, b)."""
+    row = surfaces.table[material]
+    if row[EMISSIVE_MAP] >= R(0):
+        return texture_at(surfaces, int(row[EMISSIVE_MAP]), u, v)
+    return row[EMISSIVE], row[EMISSIVE + 1], row[EMISSIVE + 2]
+
+
+@njit(**INLINE)
+def _fresnel(f0, f90, c):
+    d = R(1) - c
+    d2 = d * d
+    return f0 + (f90 - f0) * d2 * d2 * d
+
+
+@njit(**LEAN)
+def _evaluate(red, green, blue, metallic, alpha, f0, share, ox, oy, oz, ix, iy, iz):
+    """f times cosine (r, g, b) and pdf of `wi`, both directions above the surface."""
+    if iz <= R(0) or oz <= R(0):
+        return R(0), R(0), R(0), R(0)
+    hx, hy, hz = ix + ox, iy + oy, iz + oz
+    inverse = R(1) / math.sqrt(max(hx * hx + hy * hy + hz * hz, R(1e-20)))
+    hx, hy, hz = hx * inverse, hy * inverse, hz * inverse
+    c = max(hx * ox + hy * oy + hz * oz, R(0))
+    a2 = alpha * alpha
+    # Written with the tangent's parts: a2 - 1 would cancel in float32 at small roughness.
+    d = (hx * hx + hy * hy) + a2 * hz * hz
+    distribution = a2 / max(_PI * d * d, R(1e-20))
+    go = math.sqrt(a2 * (ox * ox + oy * oy) + oz * oz)
+    gi = math.sqrt(a2 * (ix * ix + iy * iy) + iz * iz)
+    # G2 / (4 cos_i cos_o) times cos_i, height-correlated.
+    visible = R(0.5) * iz / max(iz * go + oz * gi, R(1e-20))
+    specular = distribution * visible
+    f90 = min(R(50) * f0, R(1))
+    through = R(1) - max(_fresnel(f0, f90, oz), _fresnel(f0, f90, iz))
+    diffuse = (R(1) - metallic) * through * iz / _PI
+    dielectric = _fresnel(f0, f90, c) * (R(1) - metallic)
+    pdf = share * distribution / max(R(2) * (oz + go), R(1e-20)) + (R(1) - share) * iz / _PI
+    return (
+        red * diffuse + specular * (dielectric + metallic * _fresnel(red, R(1), c)),
+        green * diffuse + specular * (dielectric + metallic * _fresnel(green, R(1), c)),
+        blue * diffuse + specular * (dielectric + metallic * _fresnel(blue, R(1), c)),
+        pdf,
+    )
+
+
+@njit(**LEAN)
+def _sample(alpha, share, ox, oy, oz, u0, u1, u2):
+    """A direction for `wi`: GGX by visible normals with the chance `share`, else by cosine."""
+    phi = R(2) * _PI * u1
+    c, s = cos(R, phi), sin(R, phi)
+    if u0 >= share:
+        r = math.sqrt(u2)
+        return r * c, r * s, math.sqrt(max(R(1) - u2, R(0)))
+    sx, sy, sz = alpha * ox, alpha * oy, oz
+    inverse = R(1) / math.sqrt(sx * sx + sy * sy + sz * sz)
+    sx, sy, sz = sx * inverse, sy * inverse, sz * inverse
+    z = (R(1) - u2) * (R(1) + sz) - sz
+    r = math.sqrt(max(R(1) - z * z, R(0)))
+    hx, hy, hz = alpha * (r * c + sx), alpha * (r * s + sy), max(z + sz, R(1e-7))
+    inverse = R(1) / math.sqrt(hx * hx + hy * hy + hz * hz)
+    hx, hy, hz = hx * inverse, hy * inverse, hz * inverse
+    d = R(2) * (hx * ox + hy * oy + hz * oz)
+    return d * hx - ox, d * hy - oy, d * hz - oz
+
+
+@njit(**LEAN)
+def shade_preview(surfaces, hits, tags, first, last):
+    """Evaluate and sample the surface of hits first..last: rows F, F_PDF, GO, WEIGHT, GO_PDF."""
+    for k in range(first, last):
+        material = tags[MATERIAL, k]
+        row = surfaces.table[material]
+        u, v = hits[PLACE, k], hits[PLACE + 1, k]
+        red, green, blue = row[DIFFUSE], row[DIFFUSE + 1], row[DIFFUSE + 2]
+        metallic, roughness = row[METALLIC], row[ROUGHNESS]
+        if row[DIFFUSE_MAP] >= R(0):
+            red, green, blue = texture_at(surfaces, int(row[DIFFUSE_MAP]), u, v)
+        if row[METALLIC_MAP] >= R(0):
+            metallic, _, _ = texture_at(surfaces, int(row[METALLIC_MAP]), u, v)
+        if row[ROUGHNESS_MAP] >= R(0):
+            roughness, _, _ = texture_at(surfaces, int(row[ROUGHNESS_MAP]), u, v)
+        # Below 0.02 a lobe is a mirror, which light sampling would turn into sparks.
+        alpha = max(roughness * roughness, R(4e-4))
+        f0 = (row[IOR] - R(1)) / (row[IOR] + R(1))
+        f0 = f0 * f0
+        ox, oy, oz = hits[WO, k], hits[WO + 1, k], hits[WO + 2, k]
+        gloss = metallic + (R(1) - metallic) * _fresnel(f0, min(R(50) * f0, R(1)), oz)
+        base = max(red, max(green, blue)) * (R(1) - metallic)
+        share = gloss / max(gloss + base, R(1e-6))
+        share = R(0) if gloss <= R(0) else min(max(share, R(0.1)), R(1))
+        opacity = opacity_at(surfaces, material, u, v)
+        fr, fg, fb, pdf = _evaluate(
+            red, green, blue, metallic, alpha, f0, share,
+            ox, oy, oz, hits[WI, k], hits[WI + 1, k], hits[WI + 2, k],
+        )  # fmt: skip
+        hits[F, k], hits[F + 1, k], hits[F + 2, k] = opacity * fr, opacity * fg, opacity * fb
+        hits[F_PDF, k] = opacity * pdf
+        hits[KEEP, k] = opacity
+        hits[THREAD, k] = R(-1)
+        if hits[CHANCE + 3, k] >= opacity:
+            hits[GO_PDF, k] = R(-1)
+            continue
+        hits[CHANCE + 3, k] = hits[CHANCE + 3, k] / opacity
+        gx, gy, gz = _sample(
+            alpha, share, ox, oy, oz, hits[CHANCE, k], hits[CHANCE + 1, k], hits[CHANCE + 2, k]
+        )
+        wr, wg, wb, pdf = _evaluate(
+            red, green, blue, metallic, alpha, f0, share, ox, oy, oz, gx, gy, gz
+        )
+        hits[GO, k], hits[GO + 1, k], hits[GO + 2, k] = gx, gy, gz
+        inverse = R(1) / pdf if pdf > R(0) else R(0)
+        hits[WEIGHT, k], hits[WEIGHT + 1, k] = wr * inverse, wg * inverse
+        hits[WEIGHT + 2, k] = wb * inverse
+        hits[GO_PDF, k] = opacity * pdf

@@ -1,0 +1,50 @@
+"""A scene from any file that can be rendered, by its suffix."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Binding, Fabric
+from fabricusd.files import readable_file
+from fabricusd.reference.scene import Scene
+
+USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+MESH_SUFFIXES = (".obj", ".glb", ".gltf", ".ply")
+
+
+def read_scene(
+    source: str | os.PathLike[str],
+    *,
+    fabric: str | Fabric | Binding | None = None,
+    camera: str | None = None,
+    time_code: float | None = None,
+) -> Scene:
+    """The scene of a USD or mesh file, in metres. Raises `FabricError` where it has none."""
+    path = Path(source)
+    suffix = path.suffix.lower()
+    if suffix not in USD_SUFFIXES + MESH_SUFFIXES:
+        raise FabricError(
+            str(path), f"is no scene; it must end in {', '.join(USD_SUFFIXES + MESH_SUFFIXES)}"
+        )
+    readable_file(path)
+    binding = as_binding(fabric)
+    if suffix in MESH_SUFFIXES:
+        from fabricusd.reference.mesh_file import read_mesh_file
+
+        return read_mesh_file(path, binding)
+    from fabricusd.reference.usd_scene import read_usd_scene
+
+    return read_usd_scene(path, binding=binding, camera=camera, time_code=time_code)
+
+
+def as_binding(fabric: str | Fabric | Binding | None) -> Binding | None:
+    """A binding of a fabric, or of a fabric's file or preset name, at its measured scale."""
+    if fabric is None or isinstance(fabric, Binding):
+        return fabric
+    if isinstance(fabric, Fabric):
+        return Binding(fabric=fabric)
+    from fabricusd.schema import load
+
+    return Binding(fabric=load(fabric))

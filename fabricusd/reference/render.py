@@ -1,0 +1,283 @@
+"""Rendering a scene to a picture: the one public entrance of the path tracer."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import fabricusd
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Binding, Fabric
+from fabricusd.reference.camera import build_lens, default_camera
+from fabricusd.reference.defaults import default_lights
+from fabricusd.reference.film import AOVS, Film, require_aovs
+from fabricusd.reference.images import write_exr, write_png
+from fabricusd.reference.integrator import Tracer
+from fabricusd.reference.read import read_scene
+from fabricusd.reference.scene import Scene
+from fabricusd.reference.view_transform import view
+from fabricusd.reference.wave import Wave
+from fabricusd.reference.workers import Batches, pixels_along_z_curve, worker_count
+
+BATCH = 1 << 15
+"""Paths in a batch: enough that starting a stage costs little, few enough to stay in cache."""
+
+PASS = 16
+"""Samples of every pixel before any pixel gets more."""
+
+MOST_SAMPLES = 4096
+"""Where adaptive sampling ends if no number is given."""
+
+Progress = Callable[[float, float], None]
+"""Called with the share done, 0 to 1, and the seconds since the start."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RenderResult:
+    """What was rendered.
+
+    layers : AOV name -> (h, w, c) float32; of the last frame, if there were several
+    paths : the files written; notes : what was left out or assumed, one line each
+    rays : rays traced, shadow rays included; seconds : of sampling, without reading the scene
+    not_finite : values that were left out because they were not finite
+    noise : the largest relative error of a pixel's mean, estimated; complete : False after Ctrl-C
+    """
+
+    layers: dict[str, NDArray[np.float32]]
+    paths: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    rays: int = 0
+    seconds: float = 0.0
+    not_finite: int = 0
+    samples: float = 0.0
+    noise: float = 0.0
+    complete: bool = True
+    metadata: dict[str, Any] = field(default_factory=dict)
+
+
+def render(
+    scene: str | os.PathLike[str] | Scene,
+    out: str | os.PathLike[str] | None = None,
+    *,
+    fabric: str | Fabric | Binding | None = None,
+    camera: str | None = None,
+    width: int = 960,
+    height: int = 540,
+    spp: int | None = None,
+    noise: float | None = None,
+    max_bounces: int = 4,
+    level: str = "auto",
+    shadow: str = "horizon",
+    aovs: tuple[str, ...] = (),
+    frames: tuple[float, ...] | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    pixel_filter: str = "tent",
+    exposure: float = 0.0,
+    estimator: str = "mis",
+    progress: Progress | None = None,
+) -> RenderResult:
+    """Path-trace `scene` (a USD, OBJ, GLB or PLY file, or a `Scene`) and write `out`.
+
+    out : `.exr` with all layers and a `.png` beside it, `.png` alone, or None to write nothing;
+        of several frames, each gets its number before the suffix
+    fabric : on what every surface without a material of its own, and every mesh file, is made of
+    spp : samples per pixel; with `noise` the most a pixel gets. Without either, 64
+    noise : stop a pixel when its relative error is below this
+    frames : time codes; None for the stage's default time
+    exposure : of the PNG, in stops, added to the camera's own
+
+    Raises `FabricError` for what cannot be rendered at all; what had to be left out is in the
+    result's `notes`. On Ctrl-C what is done is written, and `complete` is False.
+    """
+    _require_settings(width, height, spp, noise)
+    layers = tuple(dict.fromkeys(("beauty", *aovs)))
+    require_aovs(layers)
+    targets = _targets(out, frames)
+    result: RenderResult | None = None
+    paths: tuple[str, ...] = ()
+    for time_code, target in targets:
+        loaded = (
+            scene
+            if isinstance(scene, Scene)
+            else read_scene(scene, fabric=fabric, camera=camera, time_code=time_code)
+        )
+        result = render_scene(
+            loaded, width=width, height=height, spp=spp, noise=noise, max_bounces=max_bounces,
+            level=level, shadow=shadow, aovs=layers, seed=seed, workers=workers,
+            pixel_filter=pixel_filter, estimator=estimator, progress=progress,
+        )  # fmt: skip
+        if target is not None:
+            own = loaded.camera.exposure if loaded.camera else 0.0
+            paths += _write(target, result, exposure + own)
+        if not result.complete:
+            break
+    assert result is not None
+    return replace(result, paths=paths)
+
+
+def _require_settings(width: int, height: int, spp: int | None, noise: float | None) -> None:
+    for name, value in (("width", width), ("height", height), ("spp", spp)):
+        if value is not None and not 1 <= value <= 65536:
+            raise FabricError(name, f"is {value}; it must be from 1 to 65536")
+    if noise is not None and not 0 < noise < 10:
+        raise FabricError("noise", f"is {noise}; it must be above 0 and below 10")
+
+
+def _targets(
+    out: str | os.PathLike[str] | None, frames: tuple[float, ...] | None
+) -> list[tuple[float | None, Path | None]]:
+    """(time code, file) of each picture; refuses what could not be written in the end."""
+    if out is None:
+        return [(code, None) for code in frames or (None,)]
+    path = Path(out)
+    if path.suffix.lower() not in (".exr", ".png"):
+        raise FabricError(str(path), "is no picture format; it must end in .exr or .png")
+    if not path.parent.is_dir():
+        raise FabricError(str(path), f"is in '{path.parent}', which is no directory; make it first")
+    if not os.access(path.parent, os.W_OK):
+        raise FabricError(str(path), f"cannot be written: '{path.parent}' is read-only")
+    if not frames:
+        return [(None, path)]
+    return [
+        (code, path.with_name(f"{path.stem}.{code:04.10g}{path.suffix}"))
+        if code != int(code)
+        else (code, path.with_name(f"{path.stem}.{int(code):04d}{path.suffix}"))
+        for code in frames
+    ]
+
+
+def _write(target: Path, result: RenderResult, exposure: float) -> tuple[str, ...]:
+    """The picture's files; returns their names."""
+    picture = view(result.layers["beauty"][..., :3], exposure)
+    png = target.with_suffix(".png")
+    if target.suffix.lower() == ".exr":
+        write_exr(target, result.layers, AOVS, result.metadata)
+    write_png(png, picture)
+    return (str(target),) if target == png else (str(target), str(png))
+
+
+def render_scene(
+    scene: Scene,
+    *,
+    width: int,
+    height: int,
+    spp: int | None = None,
+    noise: float | None = None,
+    max_bounces: int = 4,
+    level: str = "auto",
+    shadow: str = "horizon",
+    aovs: tuple[str, ...] = ("beauty",),
+    seed: int = 0,
+    workers: int | None = None,
+    pixel_filter: str = "tent",
+    estimator: str = "mis",
+    progress: Progress | None = None,
+) -> RenderResult:
+    """As `render`, for a `Scene` in memory, without files."""
+    begun = time.perf_counter()
+    most = spp or (MOST_SAMPLES if noise else 64)
+    if not scene.lights:
+        scene.lights = default_lights(scene)
+    camera = scene.camera or default_camera(scene, width, height)
+    tracer = Tracer(
+        scene, max_bounces=max_bounces, level=level, shadow=shadow, seed=seed, estimator=estimator
+    )
+    if not len(tracer.tables.triangles):
+        scene.note("the scene", "has no triangles to render; only its lights are seen")
+    lens = build_lens(camera, width, height, tracer.tables.centre, pixel_filter)
+    film = Film(width, height, aovs)
+    count = worker_count(workers)
+    counters = np.zeros((count, 3), np.int64)
+    built = time.perf_counter()
+    complete = _sample(tracer, lens, film, count, counters, most, noise, progress, built)
+    seconds = time.perf_counter() - built
+    rays, shadow_rays, not_finite = (int(x) for x in counters.sum(axis=0))
+    if not_finite:
+        scene.note("the picture", f"lost {not_finite} values that were not finite")
+    error = film.relative_error()
+    metadata = {
+        "Software": f"fabricusd {fabricusd.__version__}",
+        "fabricusd:embree": tracer.accelerator.version,
+        "fabricusd:python": platform.python_version(),
+        "fabricusd:numpy": np.__version__,
+        "fabricusd:samples": most, "fabricusd:noise": noise or 0.0,
+        "fabricusd:maxBounces": max_bounces, "fabricusd:level": level, "fabricusd:shadow": shadow,
+        "fabricusd:seed": seed, "fabricusd:workers": count, "fabricusd:pixelFilter": pixel_filter,
+        "fabricusd:camera": camera.path, "fabricusd:triangles": len(tracer.tables.triangles),
+        "fabricusd:rays": str(rays + shadow_rays), "fabricusd:seconds": round(seconds, 3),
+        "fabricusd:preparationSeconds": round(built - begun, 3),
+        "fabricusd:notFinite": not_finite, "fabricusd:complete": int(complete),
+        "fabricusd:notes": "\n".join(scene.notes),
+    }  # fmt: skip
+    return RenderResult(
+        layers=film.layers(),
+        notes=tuple(scene.notes),
+        rays=rays + shadow_rays,
+        seconds=seconds,
+        not_finite=not_finite,
+        samples=float(film.samples.mean()),
+        noise=float(np.quantile(error[np.isfinite(error)], 0.99)) if error.size else 0.0,
+        complete=complete,
+        metadata=metadata,
+    )
+
+
+def _sample(
+    tracer: Tracer,
+    lens: Any,
+    film: Film,
+    workers: int,
+    counters: NDArray[np.int64],
+    most: int,
+    noise: float | None,
+    progress: Progress | None,
+    begun: float,
+) -> bool:
+    """Passes over the picture until every pixel has `most` samples or is quiet enough."""
+    order = pixels_along_z_curve(film.width, film.height)
+    size = BATCH
+    # A small picture still makes work for every worker.
+    while size > 2048 and len(order) * min(PASS, most) < 4 * workers * size:
+        size //= 2
+    waves = [Wave(size, aovs=film.extra) for _ in range(workers)]
+    done = 0
+    active = order
+    while done < most and len(active):
+        samples = min(PASS, most - done)
+        per_batch = max(size // samples, 1)
+        starts = range(0, len(active), per_batch)
+
+        def task(
+            worker: int, batch: int, active: Any = active, samples: int = samples, done: int = done,
+            per_batch: int = per_batch,
+        ) -> None:  # fmt: skip
+            pixels = active[batch * per_batch : (batch + 1) * per_batch]
+            wave = waves[worker]
+            tracer.trace(wave, lens, film.width, pixels, done, samples, counters[worker])
+            film.add(pixels, samples, wave.film)
+
+        def report(
+            batches: int, total: int = len(starts), samples: int = samples, done: int = done,
+            share: float = len(active) / len(order),
+        ) -> None:  # fmt: skip
+            if progress is not None:
+                part = (done + samples * batches / max(total, 1)) / most
+                progress(
+                    min(part, 1.0) if noise is None else 1 - share, time.perf_counter() - begun
+                )
+
+        if not Batches(workers, task).run(len(starts), report):
+            return False
+        done += samples
+        if noise is not None:
+            active = order[film.relative_error()[order] > noise]
+    return True

@@ -1,0 +1,156 @@
+"""What the path tracer renders: triangles in metres, what they are made of, lights, a camera.
+
+Plain values without USD. `usd_scene` and `mesh_file` make them, `render` compiles them into the
+arrays that kernels read. World space is right-handed; lengths are metres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.fabric import Binding
+
+DISTANT, DOME, RECT, DISK, SPHERE, CYLINDER = range(6)
+"""Kinds of light."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Texture:
+    """An image looked up by UV.
+
+    pixels : (h, w, c) float32, linear, row 0 at the top; c is 1 or 3
+    wrap : (2,) str - `repeat`, `clamp`, `mirror` or `black`, along u and v
+    """
+
+    pixels: NDArray[np.float32]
+    wrap: tuple[str, str] = ("repeat", "repeat")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PreviewSurface:
+    """A material of the UsdPreviewSurface kind: Lambert below GGX, metallic workflow.
+
+    diffuse, emissive : (3,) float - linear Rec. 709
+    ior 1 removes the specular layer. Each texture multiplies nothing: it replaces its constant.
+    """
+
+    name: str = ""
+    diffuse: tuple[float, float, float] = (0.18, 0.18, 0.18)
+    emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    metallic: float = 0.0
+    roughness: float = 0.5
+    ior: float = 1.5
+    opacity: float = 1.0
+    opacity_threshold: float = 0.0
+    textures: dict[str, Texture] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FabricSurface:
+    """A woven fabric laid on a mesh by its UVs."""
+
+    name: str = ""
+    binding: Binding
+
+
+Material = PreviewSurface | FabricSurface
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mesh:
+    """Triangles of one prim, in world space, counter-clockwise seen from the front.
+
+    points : (n, 3) float64 [m]
+    triangles : (m, 3) int
+    normals : (m, 3, 3) float or None - at each corner; None to smooth over shared points
+    smooth : bool - False to render facets where `normals` is None
+    uv : (m, 3, 2) float64 or None - at each corner
+    material : (m,) int - index into `Scene.materials`
+    """
+
+    path: str
+    points: NDArray[np.float64]
+    triangles: NDArray[Any]
+    normals: NDArray[Any] | None = None
+    smooth: bool = True
+    uv: NDArray[np.float64] | None = None
+    material: NDArray[Any]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Light:
+    """One light. Radiance is constant over its surface and over the directions it emits to.
+
+    radiance : (3,) float [W/m2/sr]; for a distant light without angle, irradiance [W/m2]
+    frame : (4, 4) float64 - columns: x, y, z axes (their lengths scale the light) and position [m];
+        rect, disk and distant lights shine along -z, a cylinder lies along x, a dome's pole is +y
+    width, height : float - of a rect; height is a cylinder's length
+    radius : float - of a disk, sphere or cylinder
+    angle : float - diameter of a distant light [rad]
+    image : (h, w, 3) float32 or None - a dome's latitude-longitude picture, times `radiance`
+    camera_visible : bool - whether the camera sees it; indirect rays always do
+    """
+
+    path: str
+    kind: int
+    radiance: tuple[float, float, float]
+    frame: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+    width: float = 1.0
+    height: float = 1.0
+    radius: float = 0.5
+    angle: float = 0.0
+    image: NDArray[np.float32] | None = None
+    camera_visible: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Camera:
+    """A thin-lens camera that looks along its frame's -z, +y up.
+
+    frame : (4, 4) float64 - orthonormal columns x, y, z and position [m]
+    focal_length, aperture (width, height), aperture_offset : float [m]; for an orthographic camera
+        the aperture is the width of what it sees
+    f_stop : float - 0 for a pinhole; focus_distance : float [m]
+    clipping : (2,) float [m]
+    """
+
+    path: str = ""
+    frame: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+    focal_length: float = 0.05
+    aperture: tuple[float, float] = (0.036, 0.024)
+    aperture_offset: tuple[float, float] = (0.0, 0.0)
+    f_stop: float = 0.0
+    focus_distance: float = 0.0
+    orthographic: bool = False
+    clipping: tuple[float, float] = (0.0, 1e30)
+    exposure: float = 0.0
+
+
+@dataclass(kw_only=True, eq=False)
+class Scene:
+    """Everything to render, and what had to be left out or assumed on the way (`notes`)."""
+
+    meshes: list[Mesh] = field(default_factory=list)
+    materials: list[Material] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
+    camera: Camera | None = None
+    notes: list[str] = field(default_factory=list)
+    up_axis: str = "Y"
+
+    def note(self, where: str, problem: str) -> None:
+        """Keep one clear line about `where`, once."""
+        line = f"{where} {problem}"
+        if line not in self.notes:
+            self.notes.append(line)
+
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The box around the used points, (low, high) [m]; zeros where there are no triangles."""
+        used = [m.points[np.unique(m.triangles)] for m in self.meshes if len(m.triangles)]
+        if not used:
+            return np.zeros(3), np.zeros(3)
+        low = np.min([p.min(axis=0) for p in used], axis=0)
+        return low, np.max([p.max(axis=0) for p in used], axis=0)

@@ -1,0 +1,255 @@
+"""Triangles as one record each: what a hit needs, gathered from two or three cache lines.
+
+Smooth normals and smooth grain directions at the corners, as [Bisker2011] section 5.3 asks; weave
+coordinates kept as a base inside one repeat plus differences, so that float32 does not lose the
+place inside a thread however large the UVs are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.appearance.compiled import true_repeat
+from fabricusd.reference.scene import FabricSurface, Mesh, Scene
+
+# Columns of a record. P0 is a corner, E1 and E2 go from it to the others, N and T are the normals
+# and the directions of growing u at the three corners, ST the coordinates at the first corner and
+# D1, D2 their differences along E1 and E2. RATE is both coordinates' steepness [1/m].
+P0, E1, E2, N, T, ST, D1, D2, HAND, RATE = 0, 3, 6, 9, 18, 27, 29, 31, 33, 34
+RECORD = 36
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TriangleTables:
+    """All triangles of a scene, around `centre`.
+
+    centre : (3,) float64 [m] - subtracted from every point, so that float32 is spent on the shape
+    points : (n, 3) float32 [m], triangles : (m, 3) uint32 - what rays are traced against
+    records : (m, RECORD) float32
+    uv : (m, 6) float32 - the mesh's own UV at the corners
+    material : (m,) int32
+    radius : float [m] - of the scene around `centre`
+    """
+
+    centre: NDArray[np.float64]
+    points: NDArray[np.float32]
+    triangles: NDArray[np.uint32]
+    records: NDArray[np.float32]
+    uv: NDArray[np.float32]
+    material: NDArray[np.int32]
+    radius: float
+
+
+def build_tables(scene: Scene) -> TriangleTables:
+    """Gather the scene's meshes; triangles that cannot be traced are dropped and noted."""
+    low, high = scene.bounds()
+    if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        finite = [m.points[np.isfinite(m.points).all(axis=1)] for m in scene.meshes]
+        every = np.concatenate([p for p in finite if len(p)] or [np.zeros((1, 3))])
+        low, high = every.min(axis=0), every.max(axis=0)
+    centre = 0.5 * (low + high)
+    parts = [_mesh_tables(scene, mesh, centre) for mesh in scene.meshes]
+    parts = [p for p in parts if len(p[1])]
+    counts = np.cumsum([0] + [len(p[0]) for p in parts])
+    return TriangleTables(
+        centre=centre,
+        points=_stack([p[0] for p in parts], (0, 3), np.float32),
+        triangles=_stack(
+            [p[1] + c for p, c in zip(parts, counts, strict=False)], (0, 3), np.uint32
+        ),
+        records=_stack([p[2] for p in parts], (0, RECORD), np.float32),
+        uv=_stack([p[3] for p in parts], (0, 6), np.float32),
+        material=_stack([p[4] for p in parts], (0,), np.int32),
+        radius=float(np.linalg.norm(high - low) / 2),
+    )
+
+
+def _stack(parts: list[NDArray[Any]], empty: tuple[int, ...], kind: Any) -> NDArray[Any]:
+    if not parts:
+        return np.zeros(empty, kind)
+    return np.ascontiguousarray(np.concatenate(parts), kind)
+
+
+def _mesh_tables(scene: Scene, mesh: Mesh, centre: NDArray[np.float64]) -> tuple[Any, ...]:
+    """Points, triangles, records, UV and materials of one mesh."""
+    keep = _sound_triangles(scene, mesh)
+    tri = np.asarray(mesh.triangles)[keep]
+    material = np.asarray(mesh.material, np.int32)[keep]
+    points = np.where(np.isfinite(mesh.points), mesh.points, 0.0) - centre
+    corners = points[tri]
+    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area2 = np.cross(e1, e2)
+    if mesh.normals is not None:
+        normals = _unit(np.asarray(mesh.normals, np.float64)[keep], area2[:, None])
+    elif mesh.smooth:
+        normals = smooth_normals(points, tri)
+    else:
+        normals = np.repeat(_unit(area2, area2)[:, None], 3, axis=1)
+    uv = np.zeros((len(tri), 3, 2)) if mesh.uv is None else np.asarray(mesh.uv, np.float64)[keep]
+    uv = np.where(np.isfinite(uv), uv, 0.0)
+    st = weave_coordinates(scene, mesh, uv, corners, material)
+    tangents, hand = _grain(points, tri, e1, e2, st, normals)
+    d1, d2 = st[:, 1] - st[:, 0], st[:, 2] - st[:, 0]
+    records = np.empty((len(tri), RECORD), np.float32)
+    records[:, P0 : P0 + 3], records[:, E1 : E1 + 3] = corners[:, 0], e1
+    records[:, E2 : E2 + 3] = e2
+    records[:, N : N + 9] = normals.reshape(-1, 9)
+    records[:, T : T + 9] = tangents.reshape(-1, 9)
+    records[:, ST : ST + 2] = _inside_repeat(scene, st[:, 0], material)
+    records[:, D1 : D1 + 2], records[:, D2 : D2 + 2] = d1, d2
+    records[:, HAND] = hand
+    # Gradients of both coordinates over the surface: coordinates per metre.
+    square = np.maximum(np.einsum("ij,ij->i", area2, area2), 1e-300)[:, None]
+    along, up = np.cross(e2, area2) / square, np.cross(area2, e1) / square
+    for axis in range(2):
+        gradient = d1[:, axis, None] * along + d2[:, axis, None] * up
+        records[:, RATE + axis] = np.linalg.norm(gradient, axis=1)
+    return points, tri, records, uv.reshape(-1, 6), material
+
+
+def _sound_triangles(scene: Scene, mesh: Mesh) -> NDArray[np.bool_]:
+    """Which triangles have finite corners and an area; the others are noted."""
+    tri = np.asarray(mesh.triangles)
+    if not len(tri):
+        return np.zeros(0, bool)
+    finite = np.isfinite(mesh.points).all(axis=1)
+    whole = finite[tri].all(axis=1)
+    if not whole.all():
+        scene.note(
+            mesh.path,
+            f"has {int((~finite).sum())} points that are not finite; "
+            f"{int((~whole).sum())} triangles are left out",
+        )
+    p = np.where(finite[:, None], mesh.points, 0.0)[tri]
+    longest = np.max(np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2), axis=1)
+    area2 = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    solid = area2 > 1e-10 * longest**2
+    if (whole & ~solid).any():
+        scene.note(mesh.path, f"has {int((whole & ~solid).sum())} triangles without area, left out")
+    return np.asarray(whole & solid)
+
+
+def _unit(v: NDArray[Any], instead: NDArray[Any]) -> NDArray[Any]:
+    """`v` at length 1, and `instead` at length 1 where `v` has none or is not finite."""
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    good = np.isfinite(length) & (length > 1e-12)
+    other = instead / np.maximum(np.linalg.norm(instead, axis=-1, keepdims=True), 1e-300)
+    return np.where(good, v / np.where(good, length, 1.0), other)
+
+
+def smooth_normals(points: NDArray[np.float64], tri: NDArray[Any]) -> NDArray[np.float64]:
+    """(m, 3, 3) unit normals at the corners: faces around a point, weighted by their angle there.
+
+    Points at one place are one point, so a seam of the UVs is no crease.
+    """
+    shared = _same_places(points)[tri]
+    corners = points[tri]
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    face = _unit(face, face + 1e-300)
+    total = np.zeros((int(shared.max(initial=0)) + 1, 3))
+    for k in range(3):
+        a = corners[:, (k + 1) % 3] - corners[:, k]
+        b = corners[:, (k + 2) % 3] - corners[:, k]
+        sine = np.linalg.norm(np.cross(a, b), axis=1)
+        angle = np.arctan2(sine, np.einsum("ij,ij->i", a, b))
+        for axis in range(3):
+            total[:, axis] += np.bincount(
+                shared[:, k], weights=angle * face[:, axis], minlength=len(total)
+            )
+    return _unit(total[shared], face[:, None])
+
+
+def _same_places(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(n,) number of each point's place, equal for points that coincide to 1e-6 of the extent."""
+    extent = float(np.ptp(points, axis=0).max()) if len(points) else 1.0
+    cells = np.round(points / max(extent * 1e-6, 1e-12)).astype(np.int64)
+    mixed = cells[:, 0] * 73856093 ^ cells[:, 1] * 19349663 ^ cells[:, 2] * 83492791
+    return np.unique(mixed, return_inverse=True)[1].reshape(-1)
+
+
+def weave_coordinates(
+    scene: Scene,
+    mesh: Mesh,
+    uv: NDArray[np.float64],
+    corners: NDArray[np.float64],
+    material: NDArray[np.int32],
+) -> NDArray[np.float64]:
+    """(m, 3, 2) coordinates for the surface: threads where it is a fabric, UV elsewhere."""
+    st = uv.copy()
+    for index in np.unique(material):
+        surface = scene.materials[index]
+        if not isinstance(surface, FabricSurface):
+            continue
+        mine = material == index
+        metres = measured_scale(uv[mine], corners[mine])
+        if not metres > 0:
+            scene.note(mesh.path, "has no UVs with an area; its fabric lies without a grain")
+        st[mine] = surface.binding.weave_coordinates(uv[mine], metres or 1.0)
+    return st
+
+
+def measured_scale(uv: NDArray[np.float64], corners: NDArray[np.float64]) -> float:
+    """Metres of cloth per UV unit, by area; 0 where the UVs have none."""
+    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    flat = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()
+    solid = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    ).sum()
+    return float(np.sqrt(solid / flat)) if flat > 0 else 0.0
+
+
+def _inside_repeat(
+    scene: Scene, st: NDArray[np.float64], material: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    """`st` reduced modulo each fabric's repeat, in float64."""
+    base = st.copy()
+    for index in np.unique(material):
+        surface = scene.materials[index]
+        if isinstance(surface, FabricSurface):
+            mine = material == index
+            base[mine] = np.mod(st[mine], np.array(true_repeat(surface.binding.fabric), np.float64))
+    return base
+
+
+def _grain(
+    points: NDArray[np.float64],
+    tri: NDArray[Any],
+    e1: NDArray[np.float64],
+    e2: NDArray[np.float64],
+    st: NDArray[np.float64],
+    normals: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(m, 3, 3) unit directions of growing u at the corners, and (m,) handedness of (u, v, N).
+
+    Averaged over the triangles that share a point, its u direction and its handedness; a seam of
+    the UVs with another grain stays a seam. Any direction where the coordinates have no area.
+    """
+    d1, d2 = st[:, 1] - st[:, 0], st[:, 2] - st[:, 0]
+    det = d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]
+    along = (e1 * d2[:, 1:] - e2 * d1[:, 1:]) * np.sign(det)[:, None]
+    face = np.cross(e1, e2)
+    helper = np.where(np.abs(face[:, :1]) < 0.7 * np.linalg.norm(face, axis=1)[:, None],
+                      [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])  # fmt: skip
+    along = _unit(along, np.cross(np.cross(face, helper), face))
+    hand = np.where(det < 0, -1.0, 1.0)
+    weight = np.linalg.norm(face, axis=1)[:, None]
+    # Corners share a grain when place, handedness and the coordinates there agree.
+    place = _same_places(points)[tri].astype(np.int64)
+    scale = max(float(np.ptp(st)) * 1e-6, 1e-12)
+    cells = np.round(st / scale).astype(np.int64)
+    key = place * 6364136223846793005 ^ cells[..., 0] * 1442695040888963407
+    key = key ^ cells[..., 1] * 3935559000370003845 ^ (det < 0)[:, None].astype(np.int64)
+    group = np.unique(key, return_inverse=True)[1].reshape(key.shape)
+    total = np.zeros((int(group.max(initial=0)) + 1, 3))
+    for k in range(3):
+        for axis in range(3):
+            total[:, axis] += np.bincount(
+                group[:, k], weights=(weight * along)[:, axis], minlength=len(total)
+            )
+    mean = _unit(total[group], along[:, None])
+    flat = mean - normals * np.einsum("mij,mij->mi", mean, normals)[..., None]
+    return _unit(flat, along[:, None]), hand

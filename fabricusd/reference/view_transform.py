@@ -1,0 +1,50 @@
+"""From scene-linear radiance to what a screen shows.
+
+The curve is [Narkowicz2015]'s fit of the ACES reference rendering, which rolls highlights off to
+white, scaled so that middle grey stays middle grey; after it the sRGB encoding. It needs no
+configuration file and no OpenColorIO.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_A, _B, _C, _D, _E = 2.51, 0.03, 2.43, 0.59, 0.14
+GREY = 0.18
+
+
+def _grey_scale() -> float:
+    """The exposure at which the curve maps GREY to GREY: the root of its quadratic."""
+    a, b, c = _A - GREY * _C, _B - GREY * _D, -GREY * _E
+    return float((-b + np.sqrt(b * b - 4 * a * c)) / (2 * a) / GREY)
+
+
+_SCALE = _grey_scale()
+
+
+def tone_curve(radiance: NDArray[Any]) -> NDArray[np.float64]:
+    """Linear to linear display light, [0, 1]; rising, and 0.18 stays 0.18."""
+    x = _SCALE * np.maximum(np.nan_to_num(radiance, nan=0.0, posinf=1e6), 0.0)
+    x = np.minimum(x, 1e6)
+    return np.clip(x * (_A * x + _B) / (x * (_C * x + _D) + _E), 0.0, 1.0)
+
+
+def srgb_encode(linear: NDArray[Any]) -> NDArray[np.float64]:
+    """Linear display light to sRGB code values, [0, 1] [IEC61966-2-1]."""
+    x = np.clip(np.asarray(linear, np.float64), 0.0, 1.0)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
+
+
+def srgb_decode(code: NDArray[Any]) -> NDArray[np.float64]:
+    """sRGB code values to linear light, the inverse of `srgb_encode`."""
+    x = np.asarray(code, np.float64)
+    return np.where(x <= 0.04045, x / 12.92, np.power((np.maximum(x, 0) + 0.055) / 1.055, 2.4))
+
+
+def view(radiance: NDArray[Any], exposure: float = 0.0) -> NDArray[np.uint8]:
+    """(..., 3) radiance to 8-bit sRGB, `exposure` in stops."""
+    code = srgb_encode(tone_curve(np.asarray(radiance, np.float64) * 2.0**exposure))
+    return np.asarray(np.round(code * 255.0), np.uint8)

@@ -1,0 +1,93 @@
+"""Handing batches of pixels to workers, so that all stay busy and stopping loses nothing."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.errors import FabricError
+
+
+def worker_count(workers: int | None) -> int:
+    """`workers`, or as many as this process may use."""
+    if workers is None:
+        try:
+            return len(os.sched_getaffinity(0))
+        except AttributeError:
+            return os.cpu_count() or 1
+    if workers < 1:
+        raise FabricError("workers", f"is {workers}; it must be at least 1")
+    return workers
+
+
+def pixels_along_z_curve(width: int, height: int) -> NDArray[np.int32]:
+    """(pixels,) int32 all pixels, neighbours close to one another, so that batches are compact."""
+    x, y = np.arange(width, dtype=np.uint64), np.arange(height, dtype=np.uint64)
+    key = _spread(x)[None, :] | (_spread(y)[:, None] << np.uint64(1))
+    return np.argsort(key.ravel(), kind="stable").astype(np.int32)
+
+
+def _spread(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """A zero bit after each of the lower 16 bits."""
+    for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
+        x = (x | (x << np.uint64(shift))) & np.uint64(mask)
+    return x
+
+
+class Batches:
+    """Work on numbered batches by several workers, in any order.
+
+    The calling thread waits; on Ctrl-C no further batch is begun, those begun are finished, and
+    `run` returns False. An error in a worker stops the others likewise and is raised here.
+    """
+
+    def __init__(self, workers: int, task: Callable[[int, int], None]) -> None:
+        self.workers = workers
+        self.task = task
+        self.stopped = False
+
+    def run(self, count: int, progress: Callable[[int], Any] | None = None) -> bool:
+        """Call `task(worker, batch)` for every batch below `count`; False where interrupted."""
+        lock = threading.Lock()
+        state: dict[str, Any] = {"next": 0, "done": 0, "error": None}
+
+        def work(worker: int) -> None:
+            while True:
+                with lock:
+                    batch = state["next"]
+                    if batch >= count or state["error"] is not None or self.stopped:
+                        return
+                    state["next"] += 1
+                try:
+                    self.task(worker, batch)
+                except BaseException as error:
+                    with lock:
+                        state["error"] = error
+                    return
+                with lock:
+                    state["done"] += 1
+
+        threads = [
+            threading.Thread(target=work, args=(k,), daemon=True)
+            for k in range(min(self.workers, count))
+        ]
+        for thread in threads:
+            thread.start()
+        while any(thread.is_alive() for thread in threads):
+            try:
+                for thread in threads:
+                    thread.join(0.1)
+                    if thread.is_alive():
+                        break
+                if progress is not None:
+                    progress(state["done"])
+            except KeyboardInterrupt:
+                self.stopped = True
+        if state["error"] is not None:
+            raise state["error"]
+        return not self.stopped
