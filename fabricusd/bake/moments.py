@@ -1,0 +1,292 @@
+"""What every map is made of: means over a texel of what the weave shows there.
+
+A plane of moments is linear: the mean of four texels' planes is the plane of the texel that holds
+them. So mip levels are means of planes, and each map is computed from the planes of its own level;
+that is why a slope, a variance or a direction is right at every level. Tangent angles and slopes
+carry second moments, after [Olano2010]; horizons the mean of the squared sine, which is the share
+of a cosine-weighted sky that they hide.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabricusd.appearance.compiled import CompiledFabric, compile_fabric, true_repeat
+from fabricusd.appearance.coverage import GAP, WARP, WEFT
+from fabricusd.appearance.real import KERNEL
+from fabricusd.appearance.shadow import Shadow, compile_shadow, lit
+from fabricusd.appearance.weave import crown_on, find, height_on, wrap
+from fabricusd.bake.reflectance import ANGLES, COLUMNS, reflectance_table
+from fabricusd.fabric import PILE_ANGLE, Fabric
+
+AZIMUTHS = 16
+
+# Planes. Those of a set come twice, weft first. All but COVER are means over the whole texel, gaps
+# counting as 0, so that they stay linear; maps divide by the cover where they mean "of the thread".
+COVER = 0
+SHARE = 1  # 2: cover of each set
+ANGLE, ANGLE_2 = 3, 5  # 2 each: tangent angle [rad] and its square, times the share
+TINT = 7  # 6: the thread's `A`, three channels for each set, times the share
+SLOPE = 13  # 2: of the height along U and V
+SLOPE_2 = 15  # 3: UU, VV, UV
+HEIGHT, HEIGHT_2 = 18, 19  # [m], [m2]
+LOBE_2 = 20  # 4: squared slope width of the surface lobe: along U, along V; of the volume lobe too
+SURFACE, VOLUME, FUZZ = 24, 25, 28  # reflectances, see `reflectance`; VOLUME has three channels
+FRESNEL = 29
+LIT = 30  # share of the chosen light that arrives
+HORIZON = 31  # AZIMUTHS: squared sine of the horizon
+PLANES = HORIZON + AZIMUTHS
+
+STEEPEST = math.tan(PILE_ANGLE)
+"""Slope at which a tangent counts as upright: pile has 90 degrees, whose tangent is no number."""
+
+ROUNDEST = 0.95
+"""Place across a thread beyond which its round gets no steeper: at its edge the slope is infinite,
+and its square has no mean."""
+
+WHOLE = 2.0
+"""Repeats that a texel must span along both axes before it takes the repeat's mean. What it would
+show besides is how the repeat beats against the texel, which is moire."""
+
+MOST_SAMPLES = 8
+"""Along each side of a texel."""
+
+
+class Recipe(NamedTuple):
+    """What a fabric's texels are computed from.
+
+    cloth, shadow : compiled for float32; `shadow` answers for the chosen light, by `light`
+    table : horizon table of `compile_shadow(..., "horizon")`
+    reflectance : (2, k, ANGLES, COLUMNS) float32
+    threads : (k, 4) float32 - gamma_surface, gamma_volume [rad], F0, unused
+    rounded : int - 1 where threads are round across their width
+    light : (3,) float32 - unit vector to the light in the weave's frame; zero for none
+    mean : (PLANES,) float32 - of the whole repeat
+    """
+
+    cloth: CompiledFabric
+    shadow: Shadow
+    table: NDArray[np.uint8]
+    reflectance: NDArray[np.float32]
+    threads: NDArray[np.float32]
+    rounded: int
+    light: NDArray[np.float32]
+    mean: NDArray[np.float32]
+
+
+def recipe(
+    fabric: Fabric,
+    *,
+    level: str = "weave",
+    light: tuple[float, float, float] | None = None,
+    method: str = "peak",
+) -> Recipe:
+    """Tables of `fabric` for the kernels.
+
+    level : "weave" or "thread", whether threads are flat or round across their width
+    light : direction to the light in the surface frame, for the shadow mask by `method`
+    """
+    cloth = compile_fabric(fabric, precision=np.float32)
+    horizon = compile_shadow(fabric, "horizon", level=level)
+    shadow = compile_shadow(fabric, method, level=level) if light is not None else horizon
+    towards = np.zeros(3) if light is None else np.asarray(light, np.float64)
+    towards = towards / max(float(np.linalg.norm(towards)), 1e-30)
+    threads = np.array(
+        [
+            (t.gamma_surface, t.gamma_volume, ((t.ior - 1.0) / (t.ior + 1.0)) ** 2, 0.0)
+            for t in fabric.thread_list
+        ],
+        np.float32,
+    )
+    made = Recipe(
+        cloth=cloth,
+        shadow=shadow,
+        table=horizon.table,
+        reflectance=reflectance_table(fabric).astype(np.float32),
+        threads=threads,
+        rounded=int(level == "thread"),
+        light=towards.astype(np.float32),
+        mean=np.zeros(PLANES, np.float32),
+    )
+    return made._replace(mean=repeat_mean(fabric, made))
+
+
+def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:
+    """(PLANES,) over one repeat, from about 16 samples a thread each way."""
+    repeat = true_repeat(fabric)
+    count = [min(max(16 * n, 256), 2048) for n in repeat]
+    planes = np.empty((PLANES, count[1], 1), np.float32)
+    nobody = np.zeros((count[1], 1), np.int32)
+    total = np.zeros(PLANES)
+    across = np.array([[repeat[0] / count[0], 0.0], [0.0, repeat[1] / count[1]]])
+    for column in range(count[0]):
+        start = np.array([across[0, 0] * column, 0.0])
+        texels(made, across, start, nobody, 0, 1, planes)
+        total += planes[:, :, 0].mean(axis=1, dtype=np.float64)
+    return (total / count[0]).astype(np.float32)
+
+
+def samples_for(made: Recipe, step: NDArray[np.float64], repeat: tuple[int, int]) -> int:
+    """Samples along each side of a texel that spans `step` (2, 2) threads; 0 to take the mean.
+
+    Four to a thread, at least three: the edge of a thread inside a texel is then placed to a sixth.
+    """
+    span = np.abs(step).sum(axis=1)
+    if (span >= WHOLE * np.array(repeat)).all():
+        return 0
+    return int(min(max(math.ceil(4.0 * float(span.max())), 3), MOST_SAMPLES))
+
+
+@njit(**KERNEL)
+def texels(made, step, start, owner, mine, side, out):  # type: ignore[no-untyped-def]
+    """Planes of the texels that are owned by `mine`, into out (PLANES, h, w); others stay.
+
+    step : (2, 2) float64 - threads per texel: columns for one texel right and one texel down
+    start : (2,) float64 - weave coordinates of the first texel's outer corner
+    side : samples along each side of a texel, 0 to take the repeat's mean
+    """
+    R = np.float32
+    height, width = owner.shape
+    for j in range(height):
+        for i in range(width):
+            if owner[j, i] != mine:
+                continue
+            if side == 0:
+                for p in range(PLANES):
+                    out[p, j, i] = made.mean[p]
+                continue
+            for p in range(PLANES):
+                out[p, j, i] = R(0)
+            for b in range(side):
+                for a in range(side):
+                    x, y = i + (a + 0.5) / side, j + (b + 0.5) / side
+                    u = start[0] + step[0, 0] * x + step[0, 1] * y
+                    v = start[1] + step[1, 0] * x + step[1, 1] * y
+                    _add(made, u, v, out, j, i)
+            share = R(1.0 / (side * side))
+            for p in range(PLANES):
+                out[p, j, i] *= share
+
+
+@njit(**KERNEL)
+def _add(made, u, v, out, j, i):  # type: ignore[no-untyped-def]
+    """Add what is seen at weave coordinates (u, v) to a texel's planes."""
+    R = np.float32
+    which, thread, s, w, angle, length = find(R, made.cloth, u, v)
+    if which == GAP:
+        if made.light[2] > R(0):
+            out[LIT, j, i] += R(1)
+        return
+    out[COVER, j, i] += R(1)
+    out[SHARE + which, j, i] += R(1)
+    out[ANGLE + which, j, i] += angle
+    out[ANGLE_2 + which, j, i] += angle * angle
+    upright = R(PILE_ANGLE)
+    along = -R(math.tan(min(max(angle, -upright), upright)))
+    across = R(0)
+    lift = made.cloth.half_thickness[which, thread]
+    if made.rounded != 0:
+        lift = crown_on(R, made.cloth, which, thread, w)
+        edge = min(max(w, R(-ROUNDEST)), R(ROUNDEST))
+        share = made.cloth.width[which] if made.cloth.width[which] > R(0) else R(1)
+        reach = R(0.5) * share * made.cloth.pitch[which]
+        across = (
+            -edge / R(math.sqrt(R(1) - edge * edge))
+            * made.cloth.half_thickness[which, thread] / reach
+        )  # fmt: skip
+        # w grows along -U on the warp, along +V on the weft
+        across = -across if which == WARP else across
+    h = height_on(R, made.cloth, thread, s, length) + lift
+    su, sv = (across, along) if which == WARP else (along, across)
+    out[SLOPE, j, i] += su
+    out[SLOPE + 1, j, i] += sv
+    out[SLOPE_2, j, i] += su * su
+    out[SLOPE_2 + 1, j, i] += sv * sv
+    out[SLOPE_2 + 2, j, i] += su * sv
+    out[HEIGHT, j, i] += h
+    out[HEIGHT_2, j, i] += h * h
+    # A thread is a cylinder: across it every normal is there, along it the lobe's width.
+    narrow, soft = made.threads[thread, 0], made.threads[thread, 1]
+    k = 1 if which == WARP else 0
+    out[LOBE_2 + k, j, i] += min(narrow * narrow, R(1))
+    out[LOBE_2 + 1 - k, j, i] += R(1)
+    out[LOBE_2 + 2 + k, j, i] += min(soft * soft, R(1))
+    out[LOBE_2 + 3 - k, j, i] += R(1)
+    out[FRESNEL, j, i] += made.threads[thread, 2]
+    place = (angle / R(0.5 * math.pi) + R(1)) * R(0.5 * (ANGLES - 1))
+    low = min(max(int(place), 0), ANGLES - 2)
+    f = place - R(low)
+    table = made.reflectance[which, thread]
+    surface = table[low, 0] + (table[low + 1, 0] - table[low, 0]) * f
+    volume = table[low, 1] + (table[low + 1, 1] - table[low, 1]) * f
+    fuzz = table[low, 2] + (table[low + 1, 2] - table[low, 2]) * f
+    out[SURFACE, j, i] += surface
+    out[FUZZ, j, i] += fuzz
+    for c in range(3):
+        tint = made.cloth.threads[thread, c]
+        out[TINT + 3 * which + c, j, i] += tint
+        out[VOLUME + c, j, i] += volume * tint
+    if made.light[2] > R(0):
+        out[LIT, j, i] += lit(
+            R, made.cloth, made.shadow, u, v, which, thread, s, w, length,
+            made.light[0], made.light[1], made.light[2],
+        )  # fmt: skip
+    _add_horizon(made, u, v, which, out, j, i)
+
+
+@njit(**KERNEL)
+def _add_horizon(made, u, v, which, out, j, i):  # type: ignore[no-untyped-def]
+    """The nearest texel of the horizon table: the mean over a texel's samples interpolates."""
+    R = np.float32
+    table = made.table
+    if table.shape[5] != AZIMUTHS:
+        return
+    end, pick = math.floor(u), math.floor(v)
+    a, b = wrap(end, table.shape[0]), wrap(pick, table.shape[1])
+    p, q = R(u - end), R(v - pick)
+    cloth = made.cloth
+    top = int(cloth.grid[wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])])
+    if top == WARP:
+        p, q = q, p
+    width = cloth.width[top]
+    slot = 0
+    if which == top:
+        along, across = p, (q - R(0.5)) / width + R(0.5)
+    else:
+        slot = 1
+        seen = q if q < R(0.5) else q - width
+        along, across = seen / (R(1) - width), (p - R(0.5)) / cloth.under_width + R(0.5)
+    row = min(max(int(along * table.shape[3]), 0), table.shape[3] - 1)
+    column = min(max(int(across * table.shape[4]), 0), table.shape[4] - 1)
+    for k in range(AZIMUTHS):
+        sine = R(table[a, b, slot, row, column, k]) * R(1.0 / 255.0)
+        out[HORIZON + k, j, i] += sine * sine
+
+
+def halve(
+    planes: NDArray[np.float32], owned: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """The next mip level: means of 2 by 2 texels over what of them is owned.
+
+    planes : (p, h, w), owned : (h, w) share of each texel that belongs to the layout
+    """
+    p, h, w = planes.shape
+    weight = owned.reshape(h // 2, 2, w // 2, 2)
+    total = weight.sum(axis=(1, 3))
+    if bool((owned == 1.0).all()):
+        return planes.reshape(p, h // 2, 2, w // 2, 2).mean(axis=(2, 4), dtype=np.float32), (
+            total * np.float32(0.25)
+        )
+    summed = np.einsum("phiwj,hiwj->phw", planes.reshape(p, h // 2, 2, w // 2, 2), weight)
+    means = summed / np.maximum(total, np.float32(1e-20))
+    return means.astype(np.float32), (total * np.float32(0.25)).astype(np.float32)
+
+
+def sets_of(planes: NDArray[Any]) -> range:
+    """Numbers of the thread sets."""
+    return range(WEFT, WARP + 1)
