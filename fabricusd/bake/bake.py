@@ -298,31 +298,42 @@ def _assemble(
         ]
         if not todo:
             continue
-        upper = upper_levels(scratch, sheet, maps)
-        places = b.sizes(sheet, maps)
-
-        def one_map(_: int, job: int, sheet: b.Sheet = sheet, todo: list[int] = todo) -> None:
-            k = todo[job]
-            one = maps[k]
-            path = folder / file_name(sheet, one, udim)
-            levels: list[Any] = [
-                partial(bands, scratch, sheet, one, level, places[k])
-                for level in range(sheet.levels)
-            ]
-            levels += [partial(_whole, level) for level in upper[k]]
-            write_mip_exr(
-                path, levels, sheet.resolution, one.channels, one.kind,
-                {"fabricusd:map": one.name, "fabricusd:meaning": one.meaning,
-                 "oiio:ColorSpace": "lin_rec709" if one.color else "Raw",
-                 "Software": f"fabricusd {__version__}"},
-            )  # fmt: skip
-            scratch.mark_done(path)
-
+        task = partial(_write_texture, scratch, sheet, maps, folder, udim, todo)
+        task = partial(task, upper_levels(scratch, sheet, maps))
         report = partial(progress, "textures", len(todo)) if progress else None
-        if not Batches(workers, one_map).run(len(todo), report):
+        if not Batches(workers, task).run(len(todo), report):
             return False
         scratch.drop(sheet)
     return True
+
+
+def _write_texture(
+    scratch: Scratch,
+    sheet: b.Sheet,
+    maps: Sequence[TextureMap],
+    folder: Path,
+    udim: bool,
+    todo: Sequence[int],
+    upper: list[list[Any]],
+    _worker: int,
+    job: int,
+) -> None:
+    """One texture, from the blocks and the levels above them."""
+    k = todo[job]
+    one, places = maps[k], b.sizes(sheet, maps)[k]
+    levels: list[Any] = [
+        partial(bands, scratch, sheet, one, level, places) for level in range(sheet.levels)
+    ]
+    levels += [partial(_whole, level) for level in upper[k]]
+    metadata = {
+        "fabricusd:map": one.name,
+        "fabricusd:meaning": one.meaning,
+        "oiio:ColorSpace": "lin_rec709" if one.color else "Raw",
+        "Software": f"fabricusd {__version__}",
+    }
+    path = folder / file_name(sheet, one, udim)
+    write_mip_exr(path, levels, sheet.resolution, one.channels, one.kind, metadata)
+    scratch.mark_done(path)
 
 
 def _whole(level: np.ndarray[Any, Any]) -> Any:

@@ -131,7 +131,8 @@ def _planes(
     step = texel_step(sheet, lay)
     made = sheet.recipes[lay]
     side = m.samples_for(made, step, true_repeat(sheet.garment.lays[lay].fabric))
-    m.texels(made, step, texel_start(sheet, lay, window[0], window[1]), owner, lay, side, planes)
+    start = texel_start(sheet, lay, window[0], window[1])
+    m.texels(made, step, start, (window[0], window[1]), owner, lay, side, planes)
     return planes, (owner == lay).astype(np.float32)
 
 
@@ -185,6 +186,7 @@ def compose(
             weave=pick(np.moveaxis(weave, -1, 0)).T,
             hit=(pick(which), pick(thread)),
             types=len(lay.fabric.threads),
+            lay=k,
         )
         values = one.function(texels)
         if whole:

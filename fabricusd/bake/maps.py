@@ -21,8 +21,8 @@ from fabricusd.errors import FabricError
 
 Planes = NDArray[np.float32]
 
-GAP_ID = 255
-"""Thread id of a texel whose centre shows no thread."""
+GAP_ID = NO_LAY = 255
+"""Thread id of a texel whose centre shows no thread, and lay of one outside the layout."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,6 +34,7 @@ class Texels:
     weave : (n, 2) float64 - weave coordinates of the centres, modulo the repeat
     hit : (set, thread) (n,) each - of the thread under the centre, GAP where none is
     types : thread types of the fabric
+    lay : number of the lay
     """
 
     planes: Planes
@@ -41,6 +42,7 @@ class Texels:
     weave: NDArray[np.float64]
     hit: tuple[NDArray[Any], NDArray[Any]]
     types: int
+    lay: int
 
     @property
     def cover(self) -> Planes:
@@ -87,7 +89,7 @@ REGISTRY: dict[str, TextureMap] = {}
 def texture_map(
     name: str, channels: str, empty: Sequence[float] = (0.0,), **flags: bool
 ) -> Callable[[Function], Function]:
-    """Register a function (n texels) -> (n, channels) under `name`; its docstring is the meaning."""
+    """Register a function (n texels) -> (n, channels); its docstring is the meaning."""
     names = tuple(channels.split())
 
     def keep(function: Function) -> Function:
@@ -125,6 +127,12 @@ def thread_id(t: Texels) -> NDArray[Any]:
     which, thread = t.hit
     number = np.where(which == WARP, thread + t.types, thread)
     return np.where(which == GAP, GAP_ID, number)[:, None]
+
+
+@texture_map("lay", "Y", (NO_LAY,), exact=True)
+def lay(t: Texels) -> NDArray[Any]:
+    """Which of the manifest's lays, a fabric and how it lies, a texel belongs to; 255 for none"""
+    return np.full((len(t.weave), 1), t.lay)
 
 
 @texture_map("weave_coordinate", "R G", exact=True)
@@ -216,7 +224,7 @@ def normal(t: Texels) -> NDArray[Any]:
 @texture_map("slope_variance", "R G B")
 def slope_variance(t: Texels) -> NDArray[Any]:
     """Variance of the slopes inside the texel along u, along v, and their covariance"""
-    mean, uu, vv, uv = _slope_widths(t)
+    _, uu, vv, uv = _slope_widths(t)
     lobes = t.planes[m.LOBE_2 : m.LOBE_2 + 2] / t.cover
     block = np.array([[uu - lobes[0], uv], [uv, vv - lobes[1]]])
     turned = np.einsum("ai,ijn,bj->abn", t.along, block, t.along)
@@ -281,28 +289,36 @@ def shadow(t: Texels) -> NDArray[Any]:
 
 
 def _of_set(which: int, noun: str) -> None:
-    """The two maps that the loader re-lights a thread set from."""
+    """The maps that the loader re-lights a thread set from."""
+    least = np.float32(1e-6)
+    first = m.TINT + 3 * which
 
-    @texture_map(f"{noun}_thread", "R G B A")
+    def parts(t: Texels, plane: int) -> Planes:
+        return t.planes[plane + m.PARTS * which : plane + m.PARTS * (which + 1)]
+
     def thread(t: Texels) -> NDArray[Any]:
-        share = np.maximum(t.planes[m.SHARE + which], np.float32(1e-6))
-        first = m.TINT + 3 * which
-        tint = t.planes[first : first + 3] / share
-        return np.concatenate((tint, t.planes[None, m.SHARE + which])).T
+        share = parts(t, m.SHARE).sum(axis=0)
+        tint = t.planes[first : first + 3] / np.maximum(share, least)
+        return np.concatenate((tint, share[None])).T
 
-    @texture_map(f"{noun}_angle", "R G")
+    def share(t: Texels) -> NDArray[Any]:
+        return parts(t, m.SHARE).T
+
     def angle(t: Texels) -> NDArray[Any]:
-        share = np.maximum(t.planes[m.SHARE + which], np.float32(1e-6))
-        mean = t.planes[m.ANGLE + which] / share
-        square = t.planes[m.ANGLE_2 + which] / share
-        return np.stack((mean, np.sqrt(np.maximum(square - mean * mean, 0.0)))).T
+        return np.asarray(parts(t, m.ANGLE) / np.maximum(parts(t, m.SHARE), least)).T
 
-    meanings = {
-        f"{noun}_thread": f"`A` of the {noun} in the texel, and in alpha the share it covers",
-        f"{noun}_angle": f"Mean and standard deviation of the {noun}'s tangent angle [rad]",
-    }
-    for name, words in meanings.items():
-        REGISTRY[name] = TextureMap(**{**vars(REGISTRY[name]), "meaning": words})
+    def spread(t: Texels) -> NDArray[Any]:
+        weight = np.maximum(parts(t, m.SHARE), least)
+        mean, square = parts(t, m.ANGLE) / weight, parts(t, m.ANGLE_2) / weight
+        return np.sqrt(np.maximum(square - mean * mean, 0.0)).T
+
+    by_part = "where it falls gently, falls steeply, rises gently, rises steeply along its axis"
+    thread.__doc__ = f"`A` of the {noun} in the texel, and in alpha the share that it covers"
+    share.__doc__ = f"Share of the texel that the {noun} covers {by_part}"
+    angle.__doc__ = f"Mean tangent angle [rad] of the {noun} {by_part}"
+    spread.__doc__ = f"Standard deviation of the {noun}'s tangent angle [rad] {by_part}"
+    for function in (thread, share, angle, spread):
+        texture_map(f"{noun}_{function.__name__}", "R G B A")(function)
 
 
 for _which, _noun in ((WEFT, "weft"), (WARP, "warp")):

@@ -10,36 +10,39 @@ of a cosine-weighted sky that they hide.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric, true_repeat
-from fabricusd.appearance.coverage import GAP, WARP, WEFT
+from fabricusd.appearance.coverage import GAP, WARP
+from fabricusd.appearance.quadrature import curve_nodes
 from fabricusd.appearance.real import KERNEL
 from fabricusd.appearance.shadow import Shadow, compile_shadow, lit
 from fabricusd.appearance.weave import crown_on, find, height_on, wrap
-from fabricusd.bake.reflectance import ANGLES, COLUMNS, reflectance_table
+from fabricusd.bake.reflectance import ANGLES, reflectance_table
 from fabricusd.fabric import PILE_ANGLE, Fabric
 
 AZIMUTHS = 16
+PARTS = 4
 
 # Planes. Those of a set come twice, weft first. All but COVER are means over the whole texel, gaps
 # counting as 0, so that they stay linear; maps divide by the cover where they mean "of the thread".
 COVER = 0
-SHARE = 1  # 2: cover of each set
-ANGLE, ANGLE_2 = 3, 5  # 2 each: tangent angle [rad] and its square, times the share
-TINT = 7  # 6: the thread's `A`, three channels for each set, times the share
-SLOPE = 13  # 2: of the height along U and V
-SLOPE_2 = 15  # 3: UU, VV, UV
-HEIGHT, HEIGHT_2 = 18, 19  # [m], [m2]
-LOBE_2 = 20  # 4: squared slope width of the surface lobe: along U, along V; of the volume lobe too
-SURFACE, VOLUME, FUZZ = 24, 25, 28  # reflectances, see `reflectance`; VOLUME has three channels
-FRESNEL = 29
-LIT = 30  # share of the chosen light that arrives
-HORIZON = 31  # AZIMUTHS: squared sine of the horizon
+SHARE = 1  # 8: cover of each set in PARTS by its tangent angle: falling gently or steeply along its
+#            axis, rising gently or steeply. A hump has all four; their mean angle is none of them.
+ANGLE, ANGLE_2 = 9, 17  # 8 each, as SHARE: tangent angle [rad] and its square, times the share
+TINT = 25  # 6: the thread's `A`, three channels for each set, times the set's share
+SLOPE = 31  # 2: of the height along U and V
+SLOPE_2 = 33  # 3: UU, VV, UV
+HEIGHT = 36  # [m]
+LOBE_2 = 37  # 2: squared slope width of the surface lobe along U, along V
+SURFACE, VOLUME, FUZZ = 39, 40, 43  # reflectances, see `reflectance`; VOLUME has three channels
+FRESNEL = 44
+LIT = 45  # share of the chosen light that arrives
+HORIZON = 46  # AZIMUTHS: squared sine of the horizon
 PLANES = HORIZON + AZIMUTHS
 
 STEEPEST = math.tan(PILE_ANGLE)
@@ -63,7 +66,8 @@ class Recipe(NamedTuple):
     cloth, shadow : compiled for float32; `shadow` answers for the chosen light, by `light`
     table : horizon table of `compile_shadow(..., "horizon")`
     reflectance : (2, k, ANGLES, COLUMNS) float32
-    threads : (k, 4) float32 - gamma_surface, gamma_volume [rad], F0, unused
+    threads : (k, 2) float32 - gamma_surface [rad], Fresnel reflectance at normal incidence
+    split : (2,) float32 - |tangent angle| [rad] of each set beyond which it counts as steep
     rounded : int - 1 where threads are round across their width
     light : (3,) float32 - unit vector to the light in the weave's frame; zero for none
     mean : (PLANES,) float32 - of the whole repeat
@@ -74,6 +78,7 @@ class Recipe(NamedTuple):
     table: NDArray[np.uint8]
     reflectance: NDArray[np.float32]
     threads: NDArray[np.float32]
+    split: NDArray[np.float32]
     rounded: int
     light: NDArray[np.float32]
     mean: NDArray[np.float32]
@@ -97,10 +102,7 @@ def recipe(
     towards = np.zeros(3) if light is None else np.asarray(light, np.float64)
     towards = towards / max(float(np.linalg.norm(towards)), 1e-30)
     threads = np.array(
-        [
-            (t.gamma_surface, t.gamma_volume, ((t.ior - 1.0) / (t.ior + 1.0)) ** 2, 0.0)
-            for t in fabric.thread_list
-        ],
+        [(t.gamma_surface, ((t.ior - 1.0) / (t.ior + 1.0)) ** 2) for t in fabric.thread_list],
         np.float32,
     )
     made = Recipe(
@@ -109,11 +111,36 @@ def recipe(
         table=horizon.table,
         reflectance=reflectance_table(fabric).astype(np.float32),
         threads=threads,
+        split=steepness(fabric).astype(np.float32),
         rounded=int(level == "thread"),
         light=towards.astype(np.float32),
         mean=np.zeros(PLANES, np.float32),
     )
     return made._replace(mean=repeat_mean(fabric, made))
+
+
+def steepness(fabric: Fabric) -> NDArray[np.float64]:
+    """(2,) |tangent angle| [rad] that parts each set's angles into a gentle and a steep half.
+
+    Where the angles on either side vary least about their mean: spreads are then narrow against
+    the lobes, and it matters little how the angles lie inside them.
+    """
+    nodes = curve_nodes(fabric)
+    found = np.zeros(2)
+    for which in range(2):
+        mine = slice(0, nodes.warp_start) if which != WARP else slice(nodes.warp_start, None)
+        angle, weight = np.abs(nodes.psi0[mine]), nodes.weight[mine]
+        best = math.inf
+        for border in np.linspace(0.0, 0.5 * math.pi, 91):
+            total = 0.0
+            for side in (angle <= border, angle > border):
+                w = weight[side]
+                if w.sum() > 0:
+                    mean = (w @ angle[side]) / w.sum()
+                    total += float(w @ (angle[side] - mean) ** 2)
+            if total < best - 1e-12:
+                best, found[which] = total, border
+    return found
 
 
 def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:
@@ -126,7 +153,7 @@ def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:
     across = np.array([[repeat[0] / count[0], 0.0], [0.0, repeat[1] / count[1]]])
     for column in range(count[0]):
         start = np.array([across[0, 0] * column, 0.0])
-        texels(made, across, start, nobody, 0, 1, planes)
+        texels(made, across, start, (column, 0), nobody, 0, 1, planes)
         total += planes[:, :, 0].mean(axis=1, dtype=np.float64)
     return (total / count[0]).astype(np.float32)
 
@@ -134,21 +161,25 @@ def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:
 def samples_for(made: Recipe, step: NDArray[np.float64], repeat: tuple[int, int]) -> int:
     """Samples along each side of a texel that spans `step` (2, 2) threads; 0 to take the mean.
 
-    Four to a thread, at least three: the edge of a thread inside a texel is then placed to a sixth.
+    Six to a thread, from four to MOST_SAMPLES.
     """
     span = np.abs(step).sum(axis=1)
     if (span >= WHOLE * np.array(repeat)).all():
         return 0
-    return int(min(max(math.ceil(4.0 * float(span.max())), 3), MOST_SAMPLES))
+    return int(min(max(math.ceil(6.0 * float(span.max())), 4), MOST_SAMPLES))
 
 
 @njit(**KERNEL)
-def texels(made, step, start, owner, mine, side, out):  # type: ignore[no-untyped-def]
+def texels(made, step, start, corner, owner, mine, side, out):  # type: ignore[no-untyped-def]
     """Planes of the texels that are owned by `mine`, into out (PLANES, h, w); others stay.
 
     step : (2, 2) float64 - threads per texel: columns for one texel right and one texel down
     start : (2,) float64 - weave coordinates of the first texel's outer corner
+    corner : (x, y) of the first texel on its sheet
     side : samples along each side of a texel, 0 to take the repeat's mean
+
+    A sample lies anywhere in its square of a texel, by a hash of the texel's place on the sheet:
+    a regular raster would see a weave of the same pitch wrongly, and alike in all texels.
     """
     R = np.float32
     height, width = owner.shape
@@ -162,15 +193,26 @@ def texels(made, step, start, owner, mine, side, out):  # type: ignore[no-untype
                 continue
             for p in range(PLANES):
                 out[p, j, i] = R(0)
+            seed = _mixed(np.uint64(corner[0] + i) << np.uint64(32) | np.uint64(corner[1] + j))
             for b in range(side):
                 for a in range(side):
-                    x, y = i + (a + 0.5) / side, j + (b + 0.5) / side
+                    seed = _mixed(seed + np.uint64(0x9E3779B97F4A7C15))
+                    x = i + (a + (seed >> np.uint64(32)) * 2.0**-32) / side
+                    y = j + (b + (seed & np.uint64(0xFFFFFFFF)) * 2.0**-32) / side
                     u = start[0] + step[0, 0] * x + step[0, 1] * y
                     v = start[1] + step[1, 0] * x + step[1, 1] * y
                     _add(made, u, v, out, j, i)
             share = R(1.0 / (side * side))
             for p in range(PLANES):
                 out[p, j, i] *= share
+
+
+@njit(**KERNEL)
+def _mixed(x):  # type: ignore[no-untyped-def]
+    """A hash of 64 bits to 64 bits, [Steele2014]."""
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
 
 
 @njit(**KERNEL)
@@ -183,9 +225,10 @@ def _add(made, u, v, out, j, i):  # type: ignore[no-untyped-def]
             out[LIT, j, i] += R(1)
         return
     out[COVER, j, i] += R(1)
-    out[SHARE + which, j, i] += R(1)
-    out[ANGLE + which, j, i] += angle
-    out[ANGLE_2 + which, j, i] += angle * angle
+    part = PARTS * which + (2 if angle < R(0) else 0) + (1 if abs(angle) > made.split[which] else 0)
+    out[SHARE + part, j, i] += R(1)
+    out[ANGLE + part, j, i] += angle
+    out[ANGLE_2 + part, j, i] += angle * angle
     upright = R(PILE_ANGLE)
     along = -R(math.tan(min(max(angle, -upright), upright)))
     across = R(0)
@@ -209,15 +252,12 @@ def _add(made, u, v, out, j, i):  # type: ignore[no-untyped-def]
     out[SLOPE_2 + 1, j, i] += sv * sv
     out[SLOPE_2 + 2, j, i] += su * sv
     out[HEIGHT, j, i] += h
-    out[HEIGHT_2, j, i] += h * h
     # A thread is a cylinder: across it every normal is there, along it the lobe's width.
-    narrow, soft = made.threads[thread, 0], made.threads[thread, 1]
+    narrow = made.threads[thread, 0]
     k = 1 if which == WARP else 0
     out[LOBE_2 + k, j, i] += min(narrow * narrow, R(1))
     out[LOBE_2 + 1 - k, j, i] += R(1)
-    out[LOBE_2 + 2 + k, j, i] += min(soft * soft, R(1))
-    out[LOBE_2 + 3 - k, j, i] += R(1)
-    out[FRESNEL, j, i] += made.threads[thread, 2]
+    out[FRESNEL, j, i] += made.threads[thread, 1]
     place = (angle / R(0.5 * math.pi) + R(1)) * R(0.5 * (ANGLES - 1))
     low = min(max(int(place), 0), ANGLES - 2)
     f = place - R(low)
@@ -285,8 +325,3 @@ def halve(
     summed = np.einsum("phiwj,hiwj->phw", planes.reshape(p, h // 2, 2, w // 2, 2), weight)
     means = summed / np.maximum(total, np.float32(1e-20))
     return means.astype(np.float32), (total * np.float32(0.25)).astype(np.float32)
-
-
-def sets_of(planes: NDArray[Any]) -> range:
-    """Numbers of the thread sets."""
-    return range(WEFT, WARP + 1)
