@@ -17,6 +17,8 @@ import numpy as np
 from fabricusd import __version__
 from fabricusd.bake import blocks as b
 from fabricusd.bake import moments as m
+from fabricusd.bake.accuracy import SwatchError, swatch_error
+from fabricusd.bake.btf.write import MAX_ERROR, write_btf
 from fabricusd.bake.garment import (
     Garment,
     fitted,
@@ -28,6 +30,7 @@ from fabricusd.bake.garment import (
 from fabricusd.bake.manifest import manifest_of, write_json
 from fabricusd.bake.maps import TextureMap, chosen_maps
 from fabricusd.bake.overlaps import refuse_overlaps
+from fabricusd.bake.report import write_report
 from fabricusd.bake.scratch import Scratch, bands, bytes_needed, upper_levels
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
@@ -58,6 +61,8 @@ class Settings:
     level : "weave" or "thread", whether threads are flat or round across their width
     udim : bake each UDIM tile that the UVs reach into
     fit : move and scale each garment's UVs into the unit square first
+    max_error : mean delta E 2000 of re-lit texels against level `weave` to reach; 0 to ask nothing
+    btf : forms of the BTF to write, see `btf.write.FORMS`
     """
 
     resolution: int = 1024
@@ -68,6 +73,8 @@ class Settings:
     level: str = "weave"
     udim: bool = False
     fit: bool = False
+    max_error: float = 0.0
+    btf: tuple[str, ...] = ()
     margin: int = MARGIN
 
 
@@ -76,6 +83,8 @@ class Baked:
     """What a bake has made.
 
     files : names of the textures, by garment, map and UDIM number
+    errors : of each garment, measured as `accuracy.swatch_error` does
+    btf : records of the BTFs that were written, by fabric
     notes : what had to be assumed or left out
     """
 
@@ -85,8 +94,17 @@ class Baked:
     maps: list[TextureMap]
     files: dict[str, dict[str, dict[int, str]]]
     notes: list[str] = field(default_factory=list)
+    errors: dict[str, SwatchError] = field(default_factory=dict)
+    btf: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     seconds: float = 0.0
     finished: bool = True
+
+    def reached(self, max_error: float) -> bool:
+        """Whether every garment, and every BTF, is within `max_error`."""
+        records = [r["delta_e"] for rows in self.btf.values() for r in rows]
+        return all(e.point <= max_error for e in self.errors.values()) and all(
+            e <= max_error for e in records
+        )
 
 
 def bake(
@@ -120,6 +138,8 @@ def bake(
     for one, places in zip(found, tiles, strict=True):
         refuse_overlaps(one, places, min(resolution, 2048), folder)
     recipes = _recipes(found, settings)
+    if settings.max_error:
+        resolution = resolution_within(settings.max_error, found, tiles, recipes, resolution)
     sheets = [
         b.sheet_of(
             one, tuple(recipes[lay.fabric] for lay in one.lays), number, place, resolution,
@@ -150,10 +170,53 @@ def bake(
         for one in maps:
             name = file_name(sheet, one, settings.udim).name
             per_map.setdefault(one.name, {})[sheet.number] = name
+    _measure(result, sheets, settings)
     result.seconds = time.perf_counter() - began
     write_json(folder / "manifest.json", manifest_of(result, settings, Path(scene)))
+    write_report(result, settings)
     scratch.close()
     return result
+
+
+def _measure(result: Baked, sheets: Sequence[b.Sheet], settings: Settings) -> None:
+    """The error of each garment's first sheet, and the BTFs of its fabrics."""
+    for sheet in sheets:
+        if sheet.garment.name not in result.errors:
+            result.errors[sheet.garment.name] = swatch_error(sheet)
+        for lay in sheet.garment.lays:
+            if settings.btf and lay.fabric.name not in result.btf:
+                result.btf[lay.fabric.name] = write_btf(
+                    lay.fabric, result.folder, settings.btf,
+                    max_error=settings.max_error or MAX_ERROR,
+                )  # fmt: skip
+
+
+def resolution_within(
+    max_error: float,
+    found: Sequence[Garment],
+    tiles: Sequence[dict[int, tuple[int, int]]],
+    recipes: dict[Fabric, m.Recipe],
+    largest: int,
+) -> int:
+    """The least power of two up to `largest` at which every garment meets `max_error`.
+
+    `largest` itself where none does: the report then says what was reached.
+    """
+    resolution = 64
+    while resolution < largest:
+        if all(
+            swatch_error(
+                b.sheet_of(
+                    one, tuple(recipes[lay.fabric] for lay in one.lays),
+                    *next(iter(places.items())), resolution, MARGIN,
+                )
+            ).point
+            <= max_error
+            for one, places in zip(found, tiles, strict=True)
+        ):  # fmt: skip
+            return resolution
+        resolution *= 2
+    return largest
 
 
 def plan(

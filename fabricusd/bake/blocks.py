@@ -182,6 +182,7 @@ def compose(
         lay = sheet.garment.lays[k]
         texels = Texels(
             planes=pick(planes),
+            usual=sheet.recipes[k].mean,
             along=lay.along,
             weave=pick(np.moveaxis(weave, -1, 0)).T,
             hit=(pick(which), pick(thread)),

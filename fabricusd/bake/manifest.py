@@ -56,6 +56,7 @@ def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any
                 "fingerprint": one.fingerprint,
                 "triangles": len(one.triangles),
                 "mirrored_triangles": int(one.mirrored.sum()),
+                "error": result.errors[one.name].as_dict(),
                 "lays": [
                     {
                         "fabric": lay.fabric.name,
@@ -74,5 +75,6 @@ def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any
             }
             for one in result.garments
         },
+        "btf": result.btf,
         "notes": result.notes,
     }

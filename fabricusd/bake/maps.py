@@ -30,6 +30,8 @@ class Texels:
     """A block of texels at one mip level, owned by one lay of a fabric.
 
     planes : (PLANES, n) float32
+    usual : (PLANES,) float32 - of the whole repeat; stands in where a texel shows no thread at all,
+        so that a lookup between a thread and a gap finds the thread's values on both sides
     along : (2, 2) float64 - unit directions in UV of growing U and V, as columns
     weave : (n, 2) float64 - weave coordinates of the centres, modulo the repeat
     hit : (set, thread) (n,) each - of the thread under the centre, GAP where none is
@@ -38,20 +40,20 @@ class Texels:
     """
 
     planes: Planes
+    usual: Planes
     along: NDArray[np.float64]
     weave: NDArray[np.float64]
     hit: tuple[NDArray[Any], NDArray[Any]]
     types: int
     lay: int
 
-    @property
-    def cover(self) -> Planes:
-        """(n,) share of each texel that threads cover, at least 1e-6."""
-        return np.maximum(self.planes[m.COVER], np.float32(1e-6))
-
     def mean(self, plane: int, count: int = 1) -> Planes:
         """(n, count) planes of what the threads show, gaps left out."""
-        return np.asarray((self.planes[plane : plane + count] / self.cover).T)
+        chosen = slice(plane, plane + count)
+        cover, least = self.planes[m.COVER], np.float32(1e-6)
+        usual = self.usual[chosen] / np.maximum(self.usual[m.COVER], least)
+        shown = self.planes[chosen] / np.maximum(cover, least)
+        return np.asarray(np.where(cover > least, shown, usual[:, None]).T)
 
 
 Function = Callable[[Texels], NDArray[Any]]
@@ -160,21 +162,25 @@ def specular_color(t: Texels) -> NDArray[Any]:
 
 
 def _slope_widths(t: Texels) -> tuple[NDArray[np.float64], ...]:
-    """Mean slopes, and mean squares about them plus the lobe's own, in UV axes."""
-    planes = t.planes.astype(np.float64) / t.cover
-    mean = planes[m.SLOPE : m.SLOPE + 2]
-    uu, vv, uv = planes[m.SLOPE_2 : m.SLOPE_2 + 3]
-    uu = np.maximum(uu - mean[0] ** 2, 0.0) + planes[m.LOBE_2]
-    vv = np.maximum(vv - mean[1] ** 2, 0.0) + planes[m.LOBE_2 + 1]
-    return mean, uu, vv, uv - mean[0] * mean[1]
+    """Mean slopes along U and V (2, n), their variances and covariance (n,)."""
+    mean = t.mean(m.SLOPE, 2).T.astype(np.float64)
+    uu, vv, uv = t.mean(m.SLOPE_2, 3).T.astype(np.float64)
+    return (
+        mean,
+        np.maximum(uu - mean[0] ** 2, 0.0),
+        np.maximum(vv - mean[1] ** 2, 0.0),
+        uv - mean[0] * mean[1],
+    )
 
 
 def _principal(t: Texels) -> tuple[NDArray[np.float64], ...]:
     """Narrow and wide variance of the slopes, and the angle of the narrow axis from U [rad]."""
     _, uu, vv, uv = _slope_widths(t)
+    lobes = t.mean(m.LOBE_2, 2).T
+    uu, vv = uu + lobes[0], vv + lobes[1]
     middle, half = 0.5 * (uu + vv), np.hypot(0.5 * (uu - vv), uv)
     wide = 0.5 * np.arctan2(2.0 * uv, uu - vv)
-    return np.maximum(middle - half, 1e-8), middle + half, wide + 0.5 * math.pi
+    return np.maximum(middle - half, 1e-8), np.maximum(middle + half, 1e-8), wide + 0.5 * math.pi
 
 
 def _alpha(variance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -225,8 +231,7 @@ def normal(t: Texels) -> NDArray[Any]:
 def slope_variance(t: Texels) -> NDArray[Any]:
     """Variance of the slopes inside the texel along u, along v, and their covariance"""
     _, uu, vv, uv = _slope_widths(t)
-    lobes = t.planes[m.LOBE_2 : m.LOBE_2 + 2] / t.cover
-    block = np.array([[uu - lobes[0], uv], [uv, vv - lobes[1]]])
+    block = np.array([[uu, uv], [uv, vv]])
     turned = np.einsum("ai,ijn,bj->abn", t.along, block, t.along)
     limit = 6e4
     return np.clip(np.stack((turned[0, 0], turned[1, 1], turned[0, 1]), axis=1), -limit, limit)
@@ -247,8 +252,8 @@ def opacity(t: Texels) -> NDArray[Any]:
 @texture_map("visibility", "Y", (1.0,))
 def visibility(t: Texels) -> NDArray[Any]:
     """Share of a cosine-weighted sky that neighbouring threads leave visible"""
-    hidden = t.planes[m.HORIZON : m.HORIZON + m.AZIMUTHS] * _sector()[:, None]
-    return np.clip(1.0 - hidden.sum(axis=0) / t.cover, 0.0, 1.0)[:, None]
+    hidden = t.mean(m.HORIZON, m.AZIMUTHS) @ _sector()
+    return np.clip(1.0 - hidden, 0.0, 1.0)[:, None]
 
 
 def _sector() -> NDArray[np.float32]:

@@ -34,6 +34,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--level", default="weave", choices=("weave", "thread"), help="threads flat or round"
     )
+    parser.add_argument(
+        "--max-error",
+        type=float,
+        metavar="DE",
+        help="mean delta E 2000 to reach; --resolution is then the most (default 4096)",
+    )
+    parser.add_argument(
+        "--btf",
+        nargs="+",
+        metavar="FORM",
+        help="also the fabrics' BTF: ubo, ubo-joint, factored, atlas",
+    )
     parser.add_argument("--resume", action="store_true", help="go on with a bake that was stopped")
     parser.add_argument("--workers", type=int, metavar="N", help="default: all processors")
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
@@ -57,7 +69,8 @@ def run(options: argparse.Namespace) -> int:
     if options.no_clobber and (out / "manifest.json").exists():
         raise FabricError(str(out), "holds a bake; it must be a new folder with --no-clobber")
     settings = Settings(
-        resolution=options.resolution or (0 if options.texels_per_thread else 1024),
+        resolution=options.resolution
+        or (0 if options.texels_per_thread else 4096 if options.max_error else 1024),
         texels_per_thread=options.texels_per_thread or 0.0,
         maps=tuple(options.maps) if options.maps else None,
         light=_light(options.light),
@@ -65,6 +78,8 @@ def run(options: argparse.Namespace) -> int:
         level=options.level,
         udim=options.udim,
         fit=options.fit,
+        max_error=_positive(options.max_error),
+        btf=tuple(options.btf or ()),
     )
     if options.dry_run:
         for line in plan(options.scene, settings, fabric=options.fabric, mesh=options.mesh):
@@ -85,9 +100,26 @@ def run(options: argparse.Namespace) -> int:
             for name in files.values():
                 print(out / name)
     print(out / "manifest.json")
+    print(out / "report.html")
     if options.verbose:
         print(f"fabricusd: baked in {result.seconds:.1f} s", file=sys.stderr)
+    if settings.max_error and not result.reached(settings.max_error):
+        worst = max(e.point for e in result.errors.values())
+        print(
+            f"fabricusd: reaches delta E {worst:.3g} at {result.resolution} texels; "
+            f"{settings.max_error:g} was asked for",
+            file=sys.stderr,
+        )
+        return 1
     return 0
+
+
+def _positive(value: float | None) -> float:
+    if value is None:
+        return 0.0
+    if not value > 0:
+        raise FabricError("--max-error", f"is {value:g}; it must be above 0")
+    return value
 
 
 def _light(text: str | None) -> tuple[float, float, float] | None:
