@@ -132,7 +132,8 @@ def _planes(
     made = sheet.recipes[lay]
     side = m.samples_for(made, step, true_repeat(sheet.garment.lays[lay].fabric))
     start = texel_start(sheet, lay, window[0], window[1])
-    m.texels(made, step, start, (window[0], window[1]), owner, lay, side, planes)
+    sums = np.empty(m.PLANES, np.float32)
+    m.texels(made, step, start, (window[0], window[1]), owner, lay, side, sums, planes)
     return planes, (owner == lay).astype(np.float32)
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric, true_repeat
 from fabricusd.appearance.coverage import GAP, WARP
 from fabricusd.appearance.quadrature import curve_nodes
-from fabricusd.appearance.real import KERNEL
+from fabricusd.appearance.real import INLINE, LEAN
 from fabricusd.appearance.shadow import Shadow, compile_shadow, lit
 from fabricusd.appearance.weave import crown_on, find, height_on, wrap
 from fabricusd.bake.reflectance import ANGLES, reflectance_table
@@ -148,12 +148,13 @@ def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:
     repeat = true_repeat(fabric)
     count = [min(max(16 * n, 256), 2048) for n in repeat]
     planes = np.empty((PLANES, count[1], 1), np.float32)
+    sums = np.empty(PLANES, np.float32)
     nobody = np.zeros((count[1], 1), np.int32)
     total = np.zeros(PLANES)
     across = np.array([[repeat[0] / count[0], 0.0], [0.0, repeat[1] / count[1]]])
     for column in range(count[0]):
         start = np.array([across[0, 0] * column, 0.0])
-        texels(made, across, start, (column, 0), nobody, 0, 1, planes)
+        texels(made, across, start, (column, 0), nobody, 0, 1, sums, planes)
         total += planes[:, :, 0].mean(axis=1, dtype=np.float64)
     return (total / count[0]).astype(np.float32)
 
@@ -169,14 +170,15 @@ def samples_for(made: Recipe, step: NDArray[np.float64], repeat: tuple[int, int]
     return int(min(max(math.ceil(6.0 * float(span.max())), 4), MOST_SAMPLES))
 
 
-@njit(**KERNEL)
-def texels(made, step, start, corner, owner, mine, side, out):  # type: ignore[no-untyped-def]
+@njit(**LEAN)
+def texels(made, step, start, corner, owner, mine, side, sums, out):  # type: ignore[no-untyped-def]
     """Planes of the texels that are owned by `mine`, into out (PLANES, h, w); others stay.
 
     step : (2, 2) float64 - threads per texel: columns for one texel right and one texel down
     start : (2,) float64 - weave coordinates of the first texel's outer corner
     corner : (x, y) of the first texel on its sheet
     side : samples along each side of a texel, 0 to take the repeat's mean
+    sums : (PLANES,) float32 - room to add samples up in
 
     A sample lies anywhere in its square of a texel, by a hash of the texel's place on the sheet:
     a regular raster would see a weave of the same pitch wrongly, and alike in all texels.
@@ -192,7 +194,7 @@ def texels(made, step, start, corner, owner, mine, side, out):  # type: ignore[n
                     out[p, j, i] = made.mean[p]
                 continue
             for p in range(PLANES):
-                out[p, j, i] = R(0)
+                sums[p] = R(0)
             seed = _mixed(np.uint64(corner[0] + i) << np.uint64(32) | np.uint64(corner[1] + j))
             for b in range(side):
                 for a in range(side):
@@ -201,13 +203,13 @@ def texels(made, step, start, corner, owner, mine, side, out):  # type: ignore[n
                     y = j + (b + (seed & np.uint64(0xFFFFFFFF)) * 2.0**-32) / side
                     u = start[0] + step[0, 0] * x + step[0, 1] * y
                     v = start[1] + step[1, 0] * x + step[1, 1] * y
-                    _add(made, u, v, out, j, i)
+                    _add(made, u, v, sums)
             share = R(1.0 / (side * side))
             for p in range(PLANES):
-                out[p, j, i] *= share
+                out[p, j, i] = sums[p] * share
 
 
-@njit(**KERNEL)
+@njit(**INLINE)
 def _mixed(x):  # type: ignore[no-untyped-def]
     """A hash of 64 bits to 64 bits, [Steele2014]."""
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -215,20 +217,20 @@ def _mixed(x):  # type: ignore[no-untyped-def]
     return x ^ (x >> np.uint64(31))
 
 
-@njit(**KERNEL)
-def _add(made, u, v, out, j, i):  # type: ignore[no-untyped-def]
-    """Add what is seen at weave coordinates (u, v) to a texel's planes."""
+@njit(**INLINE)
+def _add(made, u, v, out):  # type: ignore[no-untyped-def]
+    """Add what is seen at weave coordinates (u, v) to a texel's sums."""
     R = np.float32
     which, thread, s, w, angle, length = find(R, made.cloth, u, v)
     if which == GAP:
         if made.light[2] > R(0):
-            out[LIT, j, i] += R(1)
+            out[LIT] += R(1)
         return
-    out[COVER, j, i] += R(1)
+    out[COVER] += R(1)
     part = PARTS * which + (2 if angle < R(0) else 0) + (1 if abs(angle) > made.split[which] else 0)
-    out[SHARE + part, j, i] += R(1)
-    out[ANGLE + part, j, i] += angle
-    out[ANGLE_2 + part, j, i] += angle * angle
+    out[SHARE + part] += R(1)
+    out[ANGLE + part] += angle
+    out[ANGLE_2 + part] += angle * angle
     upright = R(PILE_ANGLE)
     along = -R(math.tan(min(max(angle, -upright), upright)))
     across = R(0)
@@ -246,18 +248,18 @@ def _add(made, u, v, out, j, i):  # type: ignore[no-untyped-def]
         across = -across if which == WARP else across
     h = height_on(R, made.cloth, thread, s, length) + lift
     su, sv = (across, along) if which == WARP else (along, across)
-    out[SLOPE, j, i] += su
-    out[SLOPE + 1, j, i] += sv
-    out[SLOPE_2, j, i] += su * su
-    out[SLOPE_2 + 1, j, i] += sv * sv
-    out[SLOPE_2 + 2, j, i] += su * sv
-    out[HEIGHT, j, i] += h
+    out[SLOPE] += su
+    out[SLOPE + 1] += sv
+    out[SLOPE_2] += su * su
+    out[SLOPE_2 + 1] += sv * sv
+    out[SLOPE_2 + 2] += su * sv
+    out[HEIGHT] += h
     # A thread is a cylinder: across it every normal is there, along it the lobe's width.
     narrow = made.threads[thread, 0]
     k = 1 if which == WARP else 0
-    out[LOBE_2 + k, j, i] += min(narrow * narrow, R(1))
-    out[LOBE_2 + 1 - k, j, i] += R(1)
-    out[FRESNEL, j, i] += made.threads[thread, 1]
+    out[LOBE_2 + k] += min(narrow * narrow, R(1))
+    out[LOBE_2 + 1 - k] += R(1)
+    out[FRESNEL] += made.threads[thread, 1]
     place = (angle / R(0.5 * math.pi) + R(1)) * R(0.5 * (ANGLES - 1))
     low = min(max(int(place), 0), ANGLES - 2)
     f = place - R(low)
@@ -265,22 +267,22 @@ def _add(made, u, v, out, j, i):  # type: ignore[no-untyped-def]
     surface = table[low, 0] + (table[low + 1, 0] - table[low, 0]) * f
     volume = table[low, 1] + (table[low + 1, 1] - table[low, 1]) * f
     fuzz = table[low, 2] + (table[low + 1, 2] - table[low, 2]) * f
-    out[SURFACE, j, i] += surface
-    out[FUZZ, j, i] += fuzz
+    out[SURFACE] += surface
+    out[FUZZ] += fuzz
     for c in range(3):
         tint = made.cloth.threads[thread, c]
-        out[TINT + 3 * which + c, j, i] += tint
-        out[VOLUME + c, j, i] += volume * tint
+        out[TINT + 3 * which + c] += tint
+        out[VOLUME + c] += volume * tint
     if made.light[2] > R(0):
-        out[LIT, j, i] += lit(
+        out[LIT] += lit(
             R, made.cloth, made.shadow, u, v, which, thread, s, w, length,
             made.light[0], made.light[1], made.light[2],
         )  # fmt: skip
-    _add_horizon(made, u, v, which, out, j, i)
+    _add_horizon(made, u, v, which, out)
 
 
-@njit(**KERNEL)
-def _add_horizon(made, u, v, which, out, j, i):  # type: ignore[no-untyped-def]
+@njit(**INLINE)
+def _add_horizon(made, u, v, which, out):  # type: ignore[no-untyped-def]
     """The nearest texel of the horizon table: the mean over a texel's samples interpolates."""
     R = np.float32
     table = made.table
@@ -305,7 +307,7 @@ def _add_horizon(made, u, v, which, out, j, i):  # type: ignore[no-untyped-def]
     column = min(max(int(across * table.shape[4]), 0), table.shape[4] - 1)
     for k in range(AZIMUTHS):
         sine = R(table[a, b, slot, row, column, k]) * R(1.0 / 255.0)
-        out[HORIZON + k, j, i] += sine * sine
+        out[HORIZON + k] += sine * sine
 
 
 def halve(
