@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.compiled import true_repeat
-from fabricusd.appearance.weave import lookup
 from fabricusd.bake import moments as m
 from fabricusd.bake.garment import Garment
 from fabricusd.bake.maps import Texels, TextureMap
@@ -153,8 +152,9 @@ def centres(
     for axis in range(2):
         line = start[axis] + step[axis, 0] * place[None, :] + step[axis, 1] * place[:, None]
         weave[..., axis] = np.mod(line, repeat[axis])
-    hit = lookup(sheet.recipes[lay].cloth, weave.reshape(-1, 2))
-    return weave, hit.set.reshape(count, count), hit.thread.reshape(count, count)
+    sets, threads = np.empty(count * count, np.uint8), np.empty(count * count, np.int32)
+    m.threads_under(sheet.recipes[lay].cloth, weave.reshape(-1, 2), sets, threads)
+    return weave, sets.reshape(count, count), threads.reshape(count, count)
 
 
 def compose(

@@ -162,12 +162,12 @@ def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:
 def samples_for(made: Recipe, step: NDArray[np.float64], repeat: tuple[int, int]) -> int:
     """Samples along each side of a texel that spans `step` (2, 2) threads; 0 to take the mean.
 
-    Six to a thread, from four to MOST_SAMPLES.
+    Three to a thread, from four to MOST_SAMPLES.
     """
     span = np.abs(step).sum(axis=1)
     if (span >= WHOLE * np.array(repeat)).all():
         return 0
-    return int(min(max(math.ceil(6.0 * float(span.max())), 4), MOST_SAMPLES))
+    return int(min(max(math.ceil(3.0 * float(span.max())), 4), MOST_SAMPLES))
 
 
 @njit(**LEAN)
@@ -207,6 +207,13 @@ def texels(made, step, start, corner, owner, mine, side, sums, out):  # type: ig
             share = R(1.0 / (side * side))
             for p in range(PLANES):
                 out[p, j, i] = sums[p] * share
+
+
+@njit(**LEAN)
+def threads_under(cloth, weave, sets, threads):  # type: ignore[no-untyped-def]
+    """Set and thread type under weave coordinates (n, 2) float64, into sets (n,), threads (n,)."""
+    for k in range(weave.shape[0]):
+        sets[k], threads[k], _, _, _, _ = find(np.float32, cloth, weave[k, 0], weave[k, 1])
 
 
 @njit(**INLINE)

@@ -129,6 +129,8 @@ def write_mip_exr(
             spec.attribute("openexr:levelmode", 1)
             spec.attribute("textureformat", "Plain Texture")
             spec.attribute("wrapmodes", "clamp,clamp")
+            # The time of writing would make two files of the same pixels differ.
+            spec.attribute("DateTime", "1970:01:01 00:00:00")
             for key, value in metadata.items():
                 spec.attribute(key, value if isinstance(value, int | float | str) else str(value))
             mode = "Create" if level == 0 else "AppendMIPLevel"
