@@ -27,15 +27,17 @@ from fabricusd.bake.garment import (
     threads_per_uv,
     tiles_of,
 )
+from fabricusd.bake.layer import write_mesh_layer
 from fabricusd.bake.manifest import manifest_of, write_json
 from fabricusd.bake.maps import TextureMap, chosen_maps
 from fabricusd.bake.overlaps import refuse_overlaps
 from fabricusd.bake.report import write_report
 from fabricusd.bake.scratch import Scratch, bands, bytes_needed, upper_levels
+from fabricusd.bake.unwrap import unwrapped
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.reference.images import write_mip_exr
-from fabricusd.reference.read import read_scene
+from fabricusd.reference.read import as_binding, read_scene
 from fabricusd.reference.scene import Scene
 from fabricusd.reference.workers import Batches, worker_count
 
@@ -61,6 +63,7 @@ class Settings:
     level : "weave" or "thread", whether threads are flat or round across their width
     udim : bake each UDIM tile that the UVs reach into
     fit : move and scale each garment's UVs into the unit square first
+    unwrap : "x", "y" or "z": new UVs by xatlas, with the warp along that axis of the world
     max_error : mean delta E 2000 of re-lit texels against level `weave` to reach; 0 to ask nothing
     btf : forms of the BTF to write, see `btf.write.FORMS`
     """
@@ -73,6 +76,7 @@ class Settings:
     level: str = "weave"
     udim: bool = False
     fit: bool = False
+    unwrap: str = ""
     max_error: float = 0.0
     btf: tuple[str, ...] = ()
     margin: int = MARGIN
@@ -130,7 +134,7 @@ def bake(
     began = time.perf_counter()
     settings = settings or Settings()
     read = read_scene(scene, fabric=fabric)
-    found = _garments(read, settings, mesh)
+    found = _garments(read, settings, mesh, fabric)
     maps = chosen_maps(settings.maps, light=settings.light is not None)
     resolution = _resolution(settings, found)
     tiles = [tiles_of(one, settings.udim) for one in found]
@@ -170,6 +174,8 @@ def bake(
         for one in maps:
             name = file_name(sheet, one, settings.udim).name
             per_map.setdefault(one.name, {})[sheet.number] = name
+    for one in found:
+        write_mesh_layer(folder / f"{one.name}.usdc", one, read.up_axis)
     _measure(result, sheets, settings)
     result.seconds = time.perf_counter() - began
     write_json(folder / "manifest.json", manifest_of(result, settings, Path(scene)))
@@ -227,7 +233,7 @@ def plan(
     mesh: str | None = None,
 ) -> list[str]:
     """One line for each texture set that `bake` would make; the same errors, nothing written."""
-    found = _garments(read_scene(scene, fabric=fabric), settings, mesh)
+    found = _garments(read_scene(scene, fabric=fabric), settings, mesh, fabric)
     maps = chosen_maps(settings.maps, light=settings.light is not None)
     resolution = _resolution(settings, found)
     return [
@@ -237,7 +243,14 @@ def plan(
     ]
 
 
-def _garments(scene: Scene, settings: Settings, mesh: str | None) -> list[Garment]:
+def _garments(
+    scene: Scene,
+    settings: Settings,
+    mesh: str | None,
+    fabric: str | Fabric | Binding | None,
+) -> list[Garment]:
+    if settings.unwrap:
+        return garments(scene, mesh, partial(unwrapped, settings.unwrap, as_binding(fabric)))
     found = garments(scene, mesh)
     return [fitted(one) for one in found] if settings.fit else found
 

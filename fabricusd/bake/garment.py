@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -90,8 +90,14 @@ def lay_of(binding: Binding, metres_per_uv: float) -> Lay:
     return Lay(fabric=binding.fabric, matrix=np.stack((u - base, v - base), axis=1), offset=base)
 
 
-def garments(scene: Scene, mesh: str | None = None) -> list[Garment]:
+def garments(
+    scene: Scene,
+    mesh: str | None = None,
+    make: Callable[[Scene, Mesh], Garment | None] | None = None,
+) -> list[Garment]:
     """One garment for each different mesh of `scene` that wears a fabric, or for `mesh` alone.
+
+    make : what turns a mesh into a garment, None where it wears no fabric; `garment_of` by default
 
     Raises FabricError where a mesh has points or UVs that are not finite, UVs without area, no UVs,
     or where nothing wears a fabric.
@@ -103,7 +109,7 @@ def garments(scene: Scene, mesh: str | None = None) -> list[Garment]:
     for one in scene.meshes:
         if mesh is not None and one.path != mesh:
             continue
-        made = _garment(scene, one)
+        made = (make or garment_of)(scene, one)
         if made is None:
             continue
         key = _shape_key(one)
@@ -142,9 +148,12 @@ def _with_names(found: list[Garment]) -> list[Garment]:
     return named
 
 
-def _garment(scene: Scene, mesh: Mesh) -> Garment | None:
+def garment_of(scene: Scene, mesh: Mesh) -> Garment | None:
+    """A mesh in its own UVs, None where it wears no fabric; errors as for `garments`."""
     material = np.asarray(mesh.material)
     fabrics = [int(k) for k in np.unique(material) if isinstance(scene.materials[k], FabricSurface)]
+    if not fabrics and any(n.startswith(f"{mesh.path} has no UVs") for n in scene.notes):
+        raise missing_uv(mesh.path)
     if not fabrics:
         return None
     if mesh.uv is None:

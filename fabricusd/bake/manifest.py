@@ -52,6 +52,8 @@ def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any
         },
         "garments": {
             one.name: {
+                "mesh": f"{one.name}.usdc",
+                "uv_of_the_scene": one.own_uv,
                 "prims": list(one.copies),
                 "fingerprint": one.fingerprint,
                 "triangles": len(one.triangles),

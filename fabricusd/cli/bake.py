@@ -26,7 +26,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--maps", nargs="+", metavar="MAP", help="these alone (default: all)")
     parser.add_argument("--list-maps", action="store_true", help="print their names and stop")
     parser.add_argument("--udim", action="store_true", help="UVs lie in tiles 1001 to 1109")
-    parser.add_argument("--fit", action="store_true", help="scale the UVs into the unit square")
+    layout = parser.add_mutually_exclusive_group()
+    layout.add_argument("--fit", action="store_true", help="scale the UVs into the unit square")
+    layout.add_argument(
+        "--unwrap", choices=("x", "y", "z"), help="make new UVs, the warp along this world axis"
+    )
     parser.add_argument("--light", metavar="X,Y,Z", help="direction to a light, for map 'shadow'")
     parser.add_argument(
         "--shadow", default="peak", choices=("peak", "horizon", "traced"), help="of that light"
@@ -78,6 +82,7 @@ def run(options: argparse.Namespace) -> int:
         level=options.level,
         udim=options.udim,
         fit=options.fit,
+        unwrap=options.unwrap or "",
         max_error=_positive(options.max_error),
         btf=tuple(options.btf or ()),
     )

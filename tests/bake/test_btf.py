@@ -146,7 +146,9 @@ def test_the_factored_form_repeats_with_the_weave(small):
     one = factored(small, factors(small, joint=True, rank=8))
     weave = np.random.default_rng(0).random((50, 2)) * 5
     wi = wo = np.array([0.0, 0.0, 1.0])
-    assert np.allclose(one.evaluate(weave, wi, wo), one.evaluate(weave + (10, -15), wi, wo))
+    assert np.allclose(
+        one.evaluate(weave, wi, wo), one.evaluate(weave + np.array([10, -15]), wi, wo)
+    )
 
 
 def test_every_form_is_written_with_its_record(tmp_path):

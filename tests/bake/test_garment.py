@@ -51,7 +51,7 @@ def test_instances_of_a_mesh_are_baked_once():
 
 
 def test_mirrored_triangles_are_counted():
-    mirrored = UNIT * (-1, 1) + (1, 0)
+    mirrored = UNIT * (-1, 1) + [1, 0]
     assert not garments(quad_scene(Fabric()))[0].mirrored.any()
     assert garments(quad_scene(Fabric(), uv=mirrored))[0].mirrored.all()
 
@@ -60,9 +60,9 @@ def test_mirrored_triangles_are_counted():
     ("uv", "numbers"),
     [
         (UNIT, [1001]),
-        (UNIT + (1, 0), [1002]),
-        (UNIT * 0.5 + (9.5, 10.5), None),
-        (UNIT + (8, 10), [1109]),
+        (UNIT + np.array([1, 0]), [1002]),
+        (UNIT * 0.5 + [9.5, 10.5], None),
+        (UNIT + np.array([8, 10]), [1109]),
         (UNIT * 2, [1001, 1002, 1011, 1012]),
         (UNIT - (0.5, 0), None),
     ],
@@ -104,7 +104,7 @@ def test_a_hundred_subsets_keep_their_fabrics():
     tri, uv, points = [], [], []
     for k in range(grid * grid):
         x, y = k % grid, k // grid
-        base = (UNIT + (x, y)) / grid
+        base = (UNIT + np.array([x, y])) / grid
         points += [(*p, 0.0) for p in base]
         for a in ((0, 1, 2), (0, 2, 3)):
             tri.append([4 * k + c for c in a])

@@ -60,7 +60,7 @@ def test_every_map_is_finite_and_has_a_meaning():
 @pytest.mark.parametrize("name", PRESETS)
 def test_the_coarsest_level_holds_the_fabrics_own_shares(name):
     fabric = load(name)
-    maps, sheet = baked(fabric, threads=float(np.lcm.reduce(true_repeat(fabric)) * 2))
+    maps, _ = baked(fabric, threads=float(np.lcm.reduce(true_repeat(fabric)) * 2))
     share = coverage(fabric)
     top = maps["opacity"][-1][0, 0, 0]
     assert top == pytest.approx(1.0 - share.gap, abs=0.01)
@@ -85,7 +85,7 @@ def test_mean_albedo_is_the_reflectance_of_level_far():
 def test_normals_are_those_of_the_height_map():
     # Long floats without gaps: no step of the height between neighbours along a thread.
     fabric = load("linen_plain")
-    maps, sheet = baked(fabric, threads=4.0, resolution=256)
+    maps, _ = baked(fabric, threads=4.0, resolution=256)
     # Quarter of a mm a texel in reality: slopes need the cloth's own scale.
     step = fabric.warp.pitch * 4.0 / 256 * 1e3
     height = maps["height"][0][..., 0].astype(np.float64)

@@ -46,7 +46,7 @@ def test_nothing_far_from_the_triangle_is_covered():
 def test_a_margin_continues_the_owner_and_stops():
     tri = np.array([[10.0, 10.0], [20.0, 10.0], [10.0, 20.0]])
     owner, touched = owners(tri[None], np.full(1, 3, np.int32), (0, 0, 64, 64), 5, 64)
-    y, x = np.nonzero(owner != NOBODY)
+    _, x = np.nonzero(owner != NOBODY)
     assert set(np.unique(owner)) == {NOBODY, 3}
     assert (owner == 3).sum() > touched.sum()
     assert x.min() == 9 - 5 or x.min() == 10 - 5

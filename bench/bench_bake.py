@@ -1,0 +1,174 @@
+"""How long a bake takes: against plain NumPy in one run, and by the number of texels.
+
+    python bench/bench_bake.py [--full SCENE]
+
+Ratios in one run, so that a busy machine does not matter. `--full` bakes the whole map set of SCENE
+at 4K and prints seconds and peak memory.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import tempfile
+import time
+
+import numpy as np
+
+from fabricusd.appearance.coverage import WARP
+from fabricusd.bake import blocks as b
+from fabricusd.bake import moments as m
+from fabricusd.bake.bake import Settings, bake
+from fabricusd.bake.garment import garments
+from fabricusd.fabric import Binding, Fabric
+from fabricusd.reference.scene import FabricSurface, Mesh, Scene
+from fabricusd.schema import load
+
+SIDE = 6
+"""Samples along a texel's side, of both."""
+
+
+def square(fabric: Fabric, threads: float) -> Scene:
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
+    tri = np.array([[0, 1, 2], [0, 2, 3]])
+    points = np.concatenate((corners, np.zeros((4, 1))), axis=1) * 0.01
+    surface = FabricSurface(binding=Binding(fabric=fabric, threads_per_uv=(threads, threads)))
+    mesh = Mesh(
+        path="/Square", points=points, triangles=tri, uv=corners[tri],
+        material=np.zeros(2, np.int32),
+    )  # fmt: skip
+    return Scene(meshes=[mesh], materials=[surface])
+
+
+def plain_planes(
+    made: m.Recipe, fabric: Fabric, step: np.ndarray, size: int
+) -> dict[str, np.ndarray]:
+    """The same planes with NumPy's own functions: the weave by masks, tables by fancy indices."""
+    cells = fabric.weave.cells
+    ends, picks = cells.shape
+    psi0 = _angles(fabric)
+    total = {k: np.zeros((size, size)) for k in ("cover", "height", "albedo", "su", "sv", "su2")}
+    horizon = np.zeros((m.AZIMUTHS, size, size))
+    table = made.table.astype(np.float32) ** 2 / 255.0**2
+    y, x = np.mgrid[0:size, 0:size].astype(np.float64)
+    rng = np.random.default_rng(0)
+    for a in range(SIDE):
+        for c in range(SIDE):
+            u = step[0, 0] * (x + (a + rng.random(x.shape)) / SIDE)
+            v = step[1, 1] * (y + (c + rng.random(x.shape)) / SIDE)
+            i, j = np.floor(u).astype(int) % ends, np.floor(v).astype(int) % picks
+            p, q = u - np.floor(u), v - np.floor(v)
+            top = cells[i, j]
+            along, over = np.where(top, q, p), np.where(top, p, q)
+            width = np.where(top, made.cloth.width[WARP], made.cloth.width[0])
+            seen = np.abs(over - 0.5) <= 0.5 * width
+            place = np.where(top, made.cloth.runs[i, j, 0, 0], made.cloth.runs[i, j, 0, 0])
+            s = (place + along) / made.cloth.runs[i, j, 0, 1]
+            angle = psi0(s)
+            slope = -np.tan(angle) * seen
+            total["cover"] += seen
+            total["su"] += np.where(top, 0.0, slope)
+            total["sv"] += np.where(top, slope, 0.0)
+            total["su2"] += np.where(top, 0.0, slope * slope)
+            total["height"] += np.interp(s, *_heights(fabric)) * seen
+            at = np.degrees(angle) + 90.0
+            low = np.clip(at.astype(int), 0, 179)
+            values = made.reflectance[top.astype(int), 0, low]
+            total["albedo"] += (values[..., 0] + values[..., 1]) * seen
+            rows = np.clip((along * table.shape[3]).astype(int), 0, table.shape[3] - 1)
+            columns = np.clip(((over - 0.5) / width + 0.5) * table.shape[4], 0, table.shape[4] - 1)
+            found = table[i, j, 0, rows, columns.astype(int)] * seen[..., None]
+            horizon += np.moveaxis(found, -1, 0)
+    return {k: value / SIDE**2 for k, value in total.items()} | {"horizon": horizon / SIDE**2}
+
+
+def _angles(fabric: Fabric):  # type: ignore[no-untyped-def]
+    curve = fabric.thread_list[0].curve
+    x = np.asarray(curve.positions) / curve.positions[-1]
+    return lambda s: np.interp(s, x, curve.angles)
+
+
+def _heights(fabric: Fabric) -> tuple[np.ndarray, np.ndarray]:
+    s = np.linspace(0, 1, 257)
+    slope = -np.tan(_angles(fabric)(s))
+    return s, np.concatenate(([0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) / 256)))
+
+
+def against_numpy() -> None:
+    fabric = load("linen_plain")
+    size, threads = 256, 448.0
+    one = garments(square(fabric, threads))[0]
+    made = m.recipe(fabric)
+    sheet = b.sheet_of(one, (made,), 1001, (0, 0), size, 0)
+    step = np.abs(b.texel_step(sheet, 0))
+    owner = np.zeros((size, size), np.int32)
+    out = np.empty((m.PLANES, size, size), np.float32)
+    sums = np.empty(m.PLANES, np.float32)
+
+    def ours() -> None:
+        m.texels(made, step, np.zeros(2), (0, 0), owner, 0, SIDE, sums, out)
+
+    ours()
+    seconds = [_timed(f) for f in (ours, lambda: plain_planes(made, fabric, step, size))]
+    plain = plain_planes(made, fabric, step, size)
+    close = abs(float(out[m.COVER].mean() - plain["cover"].mean()))
+    print(
+        f"planes of {size} x {size} texels, {SIDE}x{SIDE} samples, 1 worker: {seconds[0]:.3f} s "
+        f"with {m.PLANES} planes; plain NumPy {seconds[1]:.3f} s with 22 of them; "
+        f"ratio {seconds[1] / seconds[0]:.1f} (mean cover differs by {close:.4f})"
+    )
+
+
+def _timed(function) -> float:  # type: ignore[no-untyped-def]
+    best = np.inf
+    for _ in range(3):
+        began = time.process_time()
+        function()
+        best = min(best, time.process_time() - began)
+    return best
+
+
+def by_texels() -> None:
+    fabric = load("linen_plain")
+    binding = Binding(fabric=fabric, threads_per_uv=(300.0, 300.0))
+    with tempfile.TemporaryDirectory() as folder:
+        path = f"{folder}/square.obj"
+        with open(path, "w") as stream:
+            stream.write(
+                "v 0 0 0\nv .1 0 0\nv .1 .1 0\nv 0 .1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+                "f 1/1 2/2 3/3 4/4\n"
+            )
+        bake(path, f"{folder}/warm", Settings(resolution=64), fabric=binding)
+        for resolution in (512, 1024, 2048):
+            began = time.process_time()
+            bake(path, f"{folder}/{resolution}", Settings(resolution=resolution), fabric=binding)
+            seconds = time.process_time() - began
+            print(
+                f"{resolution:5} x {resolution:<5} {seconds:7.2f} processor seconds, "
+                f"{seconds / resolution**2 * 1e6:.2f} microseconds a texel, "
+                f"peak {_peak():.2f} GB"
+            )
+
+
+def _peak() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+
+
+def full(scene: str) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        began, busy = time.perf_counter(), time.process_time()
+        bake(scene, folder, Settings(resolution=4096, fit=True), fabric="linen_plain", workers=2)
+        print(
+            f"{scene} at 4096, every map, 2 workers: {time.perf_counter() - began:.1f} s, "
+            f"{time.process_time() - busy:.1f} processor seconds, peak {_peak():.2f} GB"
+        )
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--full", metavar="SCENE")
+    options = parser.parse_args()
+    against_numpy()
+    by_texels()
+    if options.full:
+        full(options.full)
