@@ -66,7 +66,7 @@ def pairs_between(count: int, skip: int = 0) -> tuple[Floats, Floats]:
 
 def display(radiance: Floats, wi: Floats) -> Floats:
     """Colours of (n, 3) values, cosine included, under light wi (3,)."""
-    return np.clip(radiance * (math.pi / wi[2]), 0.0, 1.0)
+    return np.asarray(np.clip(radiance * (math.pi / wi[2]), 0.0, 1.0))
 
 
 def delta_e(a: Floats, reference: Floats) -> Floats:

@@ -171,9 +171,9 @@ def bake(
         return result
     for sheet in sheets:
         per_map = result.files.setdefault(sheet.garment.name, {})
-        for one in maps:
-            name = file_name(sheet, one, settings.udim).name
-            per_map.setdefault(one.name, {})[sheet.number] = name
+        for texture in maps:
+            name = file_name(sheet, texture, settings.udim).name
+            per_map.setdefault(texture.name, {})[sheet.number] = name
     for one in found:
         write_mesh_layer(folder / f"{one.name}.usdc", one, read.up_axis)
     _measure(result, sheets, settings)

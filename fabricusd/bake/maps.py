@@ -234,13 +234,14 @@ def slope_variance(t: Texels) -> NDArray[Any]:
     block = np.array([[uu, uv], [uv, vv]])
     turned = np.einsum("ai,ijn,bj->abn", t.along, block, t.along)
     limit = 6e4
-    return np.clip(np.stack((turned[0, 0], turned[1, 1], turned[0, 1]), axis=1), -limit, limit)
+    found = np.stack((turned[0, 0], turned[1, 1], turned[0, 1]), axis=1)
+    return np.asarray(np.clip(found, -limit, limit))
 
 
 @texture_map("height", "Y")
 def height(t: Texels) -> NDArray[Any]:
     """Mean height of the threads above their ends [mm], gaps left out"""
-    return t.mean(m.HEIGHT) * np.float32(1e3)
+    return np.asarray(t.mean(m.HEIGHT) * np.float32(1e3))
 
 
 @texture_map("opacity", "Y")
@@ -253,7 +254,7 @@ def opacity(t: Texels) -> NDArray[Any]:
 def visibility(t: Texels) -> NDArray[Any]:
     """Share of a cosine-weighted sky that neighbouring threads leave visible"""
     hidden = t.mean(m.HORIZON, m.AZIMUTHS) @ _sector()
-    return np.clip(1.0 - hidden, 0.0, 1.0)[:, None]
+    return np.asarray(np.clip(1.0 - hidden, 0.0, 1.0))[:, None]
 
 
 def _sector() -> NDArray[np.float32]:

@@ -22,7 +22,7 @@ from fabricusd.appearance.coverage import coverage
 from fabricusd.appearance.far import NOTHING, normalization
 from fabricusd.appearance.real import KERNEL
 from fabricusd.appearance.segment import along_set, seen_along, segment
-from fabricusd.appearance.surface_tables import SurfaceTables, surface_tables
+from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.thread_terms import GAMMA_SURFACE, MODEL, THESIS
 from fabricusd.bake.maps import GAP_ID
 from fabricusd.bake.moments import PARTS
@@ -133,7 +133,7 @@ def relight(
 
 @njit(parallel=True, **KERNEL)
 def _relight(  # type: ignore[no-untyped-def]
-    tables: SurfaceTables, share, types, sets, kinds, wi, wo, out
+    tables, share, types, sets, kinds, wi, wo, out
 ):
     """sets (n, 2, 16): `A` and share; shares, angles and deviations of the parts.
 

@@ -34,7 +34,7 @@ class Factors:
     @property
     def rank(self) -> int:
         """Components of the channel with the most."""
-        return max(c.shape[1] for c in self.columns)
+        return max(int(c.shape[1]) for c in self.columns)
 
 
 def factors(btf: Btf, *, joint: bool, max_error: float | None = None, rank: int = 0) -> Factors:
@@ -82,9 +82,8 @@ def factors(btf: Btf, *, joint: bool, max_error: float | None = None, rank: int 
 def entries(made: Factors, rows: NDArray[np.int64], texels: NDArray[np.int64]) -> Floats:
     """(n, 3) entries of the factors' product."""
     if len(made.rows) == 1:
-        return np.einsum(
-            "ncr,nr->nc", made.rows[0][rows].astype(np.float64), made.columns[0][texels]
-        )
+        joint = made.rows[0][rows].astype(np.float64)
+        return np.asarray(np.einsum("ncr,nr->nc", joint, made.columns[0][texels]))
     return np.stack(
         [
             np.einsum("nr,nr->n", u[rows, 0].astype(np.float64), c[texels])

@@ -76,4 +76,4 @@ def evaluate(
         column = np.einsum("nk,nkr->nr", weights, c[texels].astype(np.float64))
         channels.append(column @ mixed.T)
     values = channels[0] if len(channels) == 1 else np.concatenate(channels, axis=1)
-    return np.maximum(values, 0.0) * float(np.asarray(wi)[2])
+    return np.asarray(np.maximum(values, 0.0) * float(np.asarray(wi)[2]))
