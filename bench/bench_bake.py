@@ -20,6 +20,8 @@ from fabricusd.bake import blocks as b
 from fabricusd.bake import moments as m
 from fabricusd.bake.bake import Settings, bake
 from fabricusd.bake.garment import garments
+from fabricusd.bake.planes import COVER
+from fabricusd.bake.reflectance import reflectance_table
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.reference.scene import FabricSurface, Mesh, Scene
 from fabricusd.schema import load
@@ -49,6 +51,7 @@ def plain_planes(
     psi0 = _angles(fabric)
     total = {k: np.zeros((size, size)) for k in ("cover", "height", "albedo", "su", "sv", "su2")}
     horizon = np.zeros((m.AZIMUTHS, size, size))
+    reflected = reflectance_table(fabric)
     table = made.table.astype(np.float32) ** 2 / 255.0**2
     y, x = np.mgrid[0:size, 0:size].astype(np.float64)
     rng = np.random.default_rng(0)
@@ -73,7 +76,7 @@ def plain_planes(
             total["height"] += np.interp(s, *_heights(fabric)) * seen
             at = np.degrees(angle) + 90.0
             low = np.clip(at.astype(int), 0, 179)
-            values = made.reflectance[top.astype(int), 0, low]
+            values = reflected[top.astype(int), 0, low]
             total["albedo"] += (values[..., 0] + values[..., 1]) * seen
             rows = np.clip((along * table.shape[3]).astype(int), 0, table.shape[3] - 1)
             columns = np.clip(((over - 0.5) / width + 0.5) * table.shape[4], 0, table.shape[4] - 1)
@@ -111,7 +114,7 @@ def against_numpy() -> None:
     ours()
     seconds = [_timed(f) for f in (ours, lambda: plain_planes(made, fabric, step, size))]
     plain = plain_planes(made, fabric, step, size)
-    close = abs(float(out[m.COVER].mean() - plain["cover"].mean()))
+    close = abs(float(out[COVER].mean() - plain["cover"].mean()))
     print(
         f"planes of {size} x {size} texels, {SIDE}x{SIDE} samples, 1 worker: {seconds[0]:.3f} s "
         f"with {m.PLANES} planes; plain NumPy {seconds[1]:.3f} s with 22 of them; "

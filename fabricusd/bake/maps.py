@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.coverage import GAP, WARP, WEFT
-from fabricusd.bake import moments as m
+from fabricusd.bake import planes as m
 from fabricusd.errors import FabricError
 
 Planes = NDArray[np.float32]
@@ -247,7 +247,7 @@ def height(t: Texels) -> NDArray[Any]:
 @texture_map("opacity", "Y")
 def opacity(t: Texels) -> NDArray[Any]:
     """Share of the texel that threads cover; the rest is gap"""
-    return t.planes[m.COVER][:, None]
+    return np.asarray(t.planes[m.COVER][:, None])
 
 
 @texture_map("visibility", "Y", (1.0,))
@@ -291,7 +291,7 @@ def fuzz(t: Texels) -> NDArray[Any]:
 @texture_map("shadow", "Y", (1.0,), needs_light=True)
 def shadow(t: Texels) -> NDArray[Any]:
     """Share of the named light that arrives, gaps lit"""
-    return t.planes[m.LIT][:, None]
+    return np.asarray(t.planes[m.LIT][:, None])
 
 
 def _of_set(which: int, noun: str) -> None:

@@ -18,35 +18,12 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric, true_repeat
 from fabricusd.appearance.coverage import GAP, WARP
-from fabricusd.appearance.quadrature import curve_nodes
 from fabricusd.appearance.real import INLINE, LEAN
 from fabricusd.appearance.shadow import Shadow, compile_shadow, lit
-from fabricusd.appearance.weave import crown_on, find, height_on, wrap
-from fabricusd.bake.reflectance import ANGLES, reflectance_table
-from fabricusd.fabric import PILE_ANGLE, Fabric
-
-AZIMUTHS = 16
-PARTS = 4
-
-# Planes. Those of a set come twice, weft first. All but COVER are means over the whole texel, gaps
-# counting as 0, so that they stay linear; maps divide by the cover where they mean "of the thread".
-COVER = 0
-SHARE = 1  # 8: cover of each set in PARTS by its tangent angle: falling gently or steeply along its
-#            axis, rising gently or steeply. A hump has all four; their mean angle is none of them.
-ANGLE, ANGLE_2 = 9, 17  # 8 each, as SHARE: tangent angle [rad] and its square, times the share
-TINT = 25  # 6: the thread's `A`, three channels for each set, times the set's share
-SLOPE = 31  # 2: of the height along U and V
-SLOPE_2 = 33  # 3: UU, VV, UV
-HEIGHT = 36  # [m]
-LOBE_2 = 37  # 2: squared slope width of the surface lobe along U, along V
-SURFACE, VOLUME, FUZZ = 39, 40, 43  # reflectances, see `reflectance`; VOLUME has three channels
-FRESNEL = 44
-LIT = 45  # share of the chosen light that arrives
-HORIZON = 46  # AZIMUTHS: squared sine of the horizon
-PLANES = HORIZON + AZIMUTHS
-
-STEEPEST = math.tan(PILE_ANGLE)
-"""Slope at which a tangent counts as upright: pile has 90 degrees, whose tangent is no number."""
+from fabricusd.appearance.weave import crown_on, find, wrap
+from fabricusd.bake.angle_rows import HEIGHTS, STEPS, angle_rows, height_rows
+from fabricusd.bake.planes import AZIMUTHS, HEIGHT, HORIZON, LIT, PLANES, SLOPE, SLOPE_2
+from fabricusd.fabric import Fabric
 
 ROUNDEST = 0.95
 """Place across a thread beyond which its round gets no steeper: at its edge the slope is infinite,
@@ -65,9 +42,7 @@ class Recipe(NamedTuple):
 
     cloth, shadow : compiled for float32; `shadow` answers for the chosen light, by `light`
     table : horizon table of `compile_shadow(..., "horizon")`
-    reflectance : (2, k, ANGLES, COLUMNS) float32
-    threads : (k, 2) float32 - gamma_surface [rad], Fresnel reflectance at normal incidence
-    split : (2,) float32 - |tangent angle| [rad] of each set beyond which it counts as steep
+    rows, heights : see `angle_rows`
     rounded : int - 1 where threads are round across their width
     light : (3,) float32 - unit vector to the light in the weave's frame; zero for none
     mean : (PLANES,) float32 - of the whole repeat
@@ -76,9 +51,8 @@ class Recipe(NamedTuple):
     cloth: CompiledFabric
     shadow: Shadow
     table: NDArray[np.uint8]
-    reflectance: NDArray[np.float32]
-    threads: NDArray[np.float32]
-    split: NDArray[np.float32]
+    rows: NDArray[np.float32]
+    heights: NDArray[np.float32]
     rounded: int
     light: NDArray[np.float32]
     mean: NDArray[np.float32]
@@ -101,46 +75,17 @@ def recipe(
     shadow = compile_shadow(fabric, method, level=level) if light is not None else horizon
     towards = np.zeros(3) if light is None else np.asarray(light, np.float64)
     towards = towards / max(float(np.linalg.norm(towards)), 1e-30)
-    threads = np.array(
-        [(t.gamma_surface, ((t.ior - 1.0) / (t.ior + 1.0)) ** 2) for t in fabric.thread_list],
-        np.float32,
-    )
     made = Recipe(
         cloth=cloth,
         shadow=shadow,
         table=horizon.table,
-        reflectance=reflectance_table(fabric).astype(np.float32),
-        threads=threads,
-        split=steepness(fabric).astype(np.float32),
+        rows=angle_rows(fabric),
+        heights=height_rows(fabric),
         rounded=int(level == "thread"),
         light=towards.astype(np.float32),
         mean=np.zeros(PLANES, np.float32),
     )
     return made._replace(mean=repeat_mean(fabric, made))
-
-
-def steepness(fabric: Fabric) -> NDArray[np.float64]:
-    """(2,) |tangent angle| [rad] that parts each set's angles into a gentle and a steep half.
-
-    Where the angles on either side vary least about their mean: spreads are then narrow against
-    the lobes, and it matters little how the angles lie inside them.
-    """
-    nodes = curve_nodes(fabric)
-    found = np.zeros(2)
-    for which in range(2):
-        mine = slice(0, nodes.warp_start) if which != WARP else slice(nodes.warp_start, None)
-        angle, weight = np.abs(nodes.psi0[mine]), nodes.weight[mine]
-        best = math.inf
-        for border in np.linspace(0.0, 0.5 * math.pi, 91):
-            total = 0.0
-            for side in (angle <= border, angle > border):
-                w = weight[side]
-                if w.sum() > 0:
-                    mean = (w @ angle[side]) / w.sum()
-                    total += float(w @ (angle[side] - mean) ** 2)
-            if total < best - 1e-12:
-                best, found[which] = total, border
-    return found
 
 
 def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:
@@ -233,59 +178,42 @@ def _add(made, u, v, out):  # type: ignore[no-untyped-def]
         if made.light[2] > R(0):
             out[LIT] += R(1)
         return
-    out[COVER] += R(1)
-    part = PARTS * which + (2 if angle < R(0) else 0) + (1 if abs(angle) > made.split[which] else 0)
-    out[SHARE + part] += R(1)
-    out[ANGLE + part] += angle
-    out[ANGLE_2 + part] += angle * angle
-    upright = R(PILE_ANGLE)
-    along = -R(math.tan(min(max(angle, -upright), upright)))
-    across = R(0)
+    step = int((angle * R(1.0 / math.pi) + R(0.5)) * R(STEPS - 1) + R(0.5))
+    step = min(max(step, 0), STEPS - 1)
+    for p in range(LIT):
+        out[p] += made.rows[which, thread, step, p]
+    place = s * R(HEIGHTS - 1)
+    low = min(int(place), HEIGHTS - 2)
+    rise = made.heights[thread, low]
+    rise += (made.heights[thread, low + 1] - rise) * (place - R(low))
     lift = made.cloth.half_thickness[which, thread]
     if made.rounded != 0:
         lift = crown_on(R, made.cloth, which, thread, w)
-        edge = min(max(w, R(-ROUNDEST)), R(ROUNDEST))
-        share = made.cloth.width[which] if made.cloth.width[which] > R(0) else R(1)
-        reach = R(0.5) * share * made.cloth.pitch[which]
-        across = (
-            -edge / R(math.sqrt(R(1) - edge * edge))
-            * made.cloth.half_thickness[which, thread] / reach
-        )  # fmt: skip
-        # w grows along -U on the warp, along +V on the weft
-        across = -across if which == WARP else across
-    h = height_on(R, made.cloth, thread, s, length) + lift
-    su, sv = (across, along) if which == WARP else (along, across)
-    out[SLOPE] += su
-    out[SLOPE + 1] += sv
-    out[SLOPE_2] += su * su
-    out[SLOPE_2 + 1] += sv * sv
-    out[SLOPE_2 + 2] += su * sv
-    out[HEIGHT] += h
-    # A thread is a cylinder: across it every normal is there, along it the lobe's width.
-    narrow = made.threads[thread, 0]
-    k = 1 if which == WARP else 0
-    out[LOBE_2 + k] += min(narrow * narrow, R(1))
-    out[LOBE_2 + 1 - k] += R(1)
-    out[FRESNEL] += made.threads[thread, 1]
-    place = (angle / R(0.5 * math.pi) + R(1)) * R(0.5 * (ANGLES - 1))
-    low = min(max(int(place), 0), ANGLES - 2)
-    f = place - R(low)
-    table = made.reflectance[which, thread]
-    surface = table[low, 0] + (table[low + 1, 0] - table[low, 0]) * f
-    volume = table[low, 1] + (table[low + 1, 1] - table[low, 1]) * f
-    fuzz = table[low, 2] + (table[low + 1, 2] - table[low, 2]) * f
-    out[SURFACE] += surface
-    out[FUZZ] += fuzz
-    for c in range(3):
-        tint = made.cloth.threads[thread, c]
-        out[TINT + 3 * which + c] += tint
-        out[VOLUME + c] += volume * tint
+        _add_round(made, which, thread, w, step, out)
+    out[HEIGHT] += length * rise + lift
     if made.light[2] > R(0):
         out[LIT] += lit(
             R, made.cloth, made.shadow, u, v, which, thread, s, w, length,
             made.light[0], made.light[1], made.light[2],
         )  # fmt: skip
     _add_horizon(made, u, v, which, out)
+
+
+@njit(**INLINE)
+def _add_round(made, which, thread, w, step, out):  # type: ignore[no-untyped-def]
+    """Add the slope across a round thread, at `w` in [-1, 1] across its width."""
+    R = np.float32
+    edge = min(max(w, R(-ROUNDEST)), R(ROUNDEST))
+    share = made.cloth.width[which] if made.cloth.width[which] > R(0) else R(1)
+    reach = R(0.5) * share * made.cloth.pitch[which]
+    steep = made.cloth.half_thickness[which, thread] / reach
+    across = -edge / R(math.sqrt(R(1) - edge * edge)) * steep
+    along = 1 if which == WARP else 0
+    # w grows along -U on the warp, along +V on the weft.
+    across = -across if which == WARP else across
+    out[SLOPE + 1 - along] += across
+    out[SLOPE_2 + 1 - along] += across * across
+    out[SLOPE_2 + 2] += across * made.rows[which, thread, step, SLOPE + along]
 
 
 @njit(**INLINE)

@@ -25,7 +25,7 @@ from fabricusd.appearance.segment import along_set, seen_along, segment
 from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.thread_terms import GAMMA_SURFACE, MODEL, THESIS
 from fabricusd.bake.maps import GAP_ID
-from fabricusd.bake.moments import PARTS
+from fabricusd.bake.planes import PARTS
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.files import readable_file
