@@ -28,7 +28,7 @@ COLUMNS = 3
 GRAZING = math.radians(75.0)
 """View that the fuzz is measured at: farther out the published models have hardly any light."""
 
-_POLAR, _AZIMUTHAL, _VIEWS = 24, 48, 8
+_POLAR, _AZIMUTHAL, _VIEWS = 24, 48, 4
 
 
 @lru_cache(maxsize=16)
@@ -51,9 +51,9 @@ def reflectance_table(fabric: Fabric) -> NDArray[np.float64]:
         for thread_set in range(2):
             for thread in range(len(fabric.threads)):
                 above = _reflected(tables, thread_set, thread, 0.0)
-                grazing = _reflected(tables, thread_set, thread, GRAZING)
                 table[thread_set, thread, :, column] = above
                 if column == 1:
+                    grazing = _reflected(tables, thread_set, thread, GRAZING)
                     table[thread_set, thread, :, 2] = np.maximum(grazing - above, 0.0)
     # With A = 1 both terms are there; the volume's own share is the difference.
     table[..., 1] = np.maximum(table[..., 1] - table[..., 0], 0.0)
