@@ -25,6 +25,11 @@ Reals = NDArray[Any]
 """float32 or float64, by the precision that the fabric was compiled for."""
 
 
+CLOSEST_NODES = math.radians(0.1)
+"""Nodes are no closer than this [rad]: a lobe may be as narrow as a mirror's, and nodes as close as
+it is wide would fill the memory."""
+
+
 class CompiledFabric(NamedTuple):
     """Arrays and scalars of one fabric; `real` below is the precision asked for.
 
@@ -164,7 +169,7 @@ def _run_table(cells: NDArray[np.bool_], under: int) -> NDArray[Any]:
 
 
 @njit(cache=True)
-def _share_out(cells, by_end, by_pick, out):  # type: ignore[no-untyped-def]
+def _share_out(cells, by_end, by_pick, out):
     """Runs along the warp (m, n, 2) and along the weft (n, m, 2) -> out (m, n, slots, 2)."""
     block = 64
     for i0 in range(0, cells.shape[0], block):
@@ -183,7 +188,7 @@ def _share_out(cells, by_end, by_pick, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fill_runs(lines, out):  # type: ignore[no-untyped-def]
+def _fill_runs(lines, out):
     """(r, n) cells along r threads -> out (r, n, 2): place in its run, length of the run.
 
     Runs wrap round the repeat; a run without end is one repeat, counted from its border.
@@ -243,7 +248,7 @@ def _nodes(fabric: Fabric, share: Coverage, error: float | None) -> tuple[Any, .
             area = share.type_area[j, k]
             if not area > 0:
                 continue
-            q = nodes(thread.curve, thread.gamma_surface, error=error)
+            q = nodes(thread.curve, max(thread.gamma_surface, CLOSEST_NODES), error=error)
             one = np.ones(len(q.angle), np.int32)
             for column, values in zip(
                 columns, (q.angle, q.weight * area, q.position, one * k, one * j), strict=True

@@ -79,7 +79,7 @@ def evaluate(
 ) -> Floats:
     """(n, 3) radiance per unit `L_i dwi` towards wo, cosine included.
 
-    wi, wo : (n, 3) unit vectors in the surface frame, or (3,) for all
+    wi, wo : (n, 3) unit vectors in the surface frame, or one (3,) for all
     uv : (n, 2) weave coordinates in threads (ends along U, picks along V), or (2,) for all; asked
         for at levels `weave` and `thread`
     level : one of LEVELS
@@ -92,7 +92,7 @@ def evaluate(
     Raises FabricError for directions that are not finite unit vectors, an unknown level or
     shadowing, a place that is missing or not finite, a bound that cannot be met.
     """
-    i, o = _pairs(wi, wo)
+    i, o = _pairs(wi, wo, uv if level != "far" else None)
     hit, places = _places(fabric, uv, level, i.shape[1])
     _check_shadow(shadow)
     out = _evaluate(_law(fabric, max_error, multiple), level, hit, i, o)
@@ -113,7 +113,7 @@ def pdf(
 
     Arguments and errors as for `evaluate`.
     """
-    i, o = _pairs(wi, wo)
+    i, o = _pairs(wi, wo, uv if level != "far" else None)
     hit, _ = _places(fabric, uv, level, i.shape[1])
     _check_shadow(shadow)
     return _density(_law(fabric), level, hit, i, o)
@@ -181,7 +181,7 @@ def _lit(fabric: Fabric, method: str, level: str, uv: Floats, wi: Floats) -> Flo
     cloth, shadow = _shadowed(fabric, method, level)
     out = np.empty(len(uv))
     real: Any = np.float64
-    lit_all(real, cloth, shadow, uv, np.ascontiguousarray(wi.T), out)
+    lit_all(real, cloth, shadow, uv, wi, out)
     return out
 
 
@@ -193,7 +193,7 @@ def _check_shadow(method: str) -> None:
 def _places(
     fabric: Fabric, uv: ArrayLike | None, level: str, count: int
 ) -> tuple[WeaveHit, Floats]:
-    """What lies under each of `count` places, and the places, (count, 2); one of each for `far`."""
+    """What lies under each of `count` places, and the places, (count, 2); for `far` any one."""
     if level not in LEVELS:
         raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
     if level == "far":
@@ -241,10 +241,11 @@ def _repeated(w: Floats, count: int, name: str) -> Floats:
     return np.repeat(w, count, axis=1)
 
 
-def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Floats, Floats]:
-    """Both directions as (3, n), one of them repeated if it is single."""
+def _pairs(wi: ArrayLike, wo: ArrayLike, uv: ArrayLike | None) -> tuple[Floats, Floats]:
+    """Both directions as (3, n), a single one repeated for all of the other's or of the places."""
     i, o = _directions("wi", wi), _directions("wo", wo)
-    n = i.shape[1] if o.shape[1] == 1 else o.shape[1]
+    places = 1 if uv is None else len(np.atleast_2d(np.asarray(uv)))
+    n = next((k for k in (i.shape[1], o.shape[1], places) if k != 1), 1)
     return _repeated(i, n, "wi"), _repeated(o, n, "wo")
 
 

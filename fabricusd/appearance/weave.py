@@ -26,7 +26,7 @@ FARTHEST = 2.0**52
 """Weave coordinates beyond this have no fraction left in float64."""
 
 
-BLOCK = 1024
+BLOCK = 512
 """Places that a worker looks up at a time: what it notes about them stays in its nearest cache."""
 
 
@@ -55,7 +55,7 @@ class WeaveHit(NamedTuple):
 
 
 @njit(**INLINE)
-def wrap(x, period):  # type: ignore[no-untyped-def]
+def wrap(x, period):
     """Whole number `x` (float64) modulo `period`, non-negative, as an integer."""
     p = float(period)
     r = x - p * np.floor(x / p)
@@ -66,7 +66,7 @@ def wrap(x, period):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def split(R, cloth, u, v):  # type: ignore[no-untyped-def]
+def split(R, cloth, u, v):
     """Weave coordinates, float64, as what `thread_at` asks for: (i, j, end, pick, x, y).
 
     i, j : cell of the grid; end, pick : places in the sequences of threads; x, y : in the cell, of
@@ -85,7 +85,7 @@ def split(R, cloth, u, v):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def piece_of(R, cloth, thread, s):  # type: ignore[no-untyped-def]
+def piece_of(R, cloth, thread, s):
     """Index of the linear piece of the thread's curve at `s`, the later one at a jump.
 
     Counting every start up to `s` beats a search on curves of a few pieces: it has no branches to
@@ -104,7 +104,7 @@ def piece_of(R, cloth, thread, s):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def angle_on(R, cloth, thread, s):  # type: ignore[no-untyped-def]
+def angle_on(R, cloth, thread, s):
     """Tangent angle [rad] of thread type `thread` at `s`."""
     k = piece_of(R, cloth, thread, s)
     return (
@@ -114,7 +114,7 @@ def angle_on(R, cloth, thread, s):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def rise_on(R, cloth, thread, k, s):  # type: ignore[no-untyped-def]
+def rise_on(R, cloth, thread, k, s):
     """Height at `s` on linear piece `k` of the thread's curve, in run lengths.
 
     Minus the integral of tan(angle), in closed form as `curve._rise`.
@@ -134,7 +134,7 @@ def rise_on(R, cloth, thread, k, s):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def height_on(R, cloth, thread, s, length):  # type: ignore[no-untyped-def]
+def height_on(R, cloth, thread, s, length):
     """Height [m] of the thread's axis at `s` on a visible run of `length` [m]; 0 on pile."""
     if cloth.pile[thread] != 0:
         return R(0)
@@ -142,13 +142,13 @@ def height_on(R, cloth, thread, s, length):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def crown_on(R, cloth, thread_set, thread, w):  # type: ignore[no-untyped-def]
+def crown_on(R, cloth, thread_set, thread, w):
     """Height [m] that the round of the thread adds at `w`: half the thickness, sqrt(1 - w^2)."""
     return cloth.half_thickness[thread_set, thread] * math.sqrt(max(R(0), R(1) - w * w))
 
 
 @njit(**INLINE)
-def thread_at(R, cloth, i, j, end, pick, x, y):  # type: ignore[no-untyped-def]
+def thread_at(R, cloth, i, j, end, pick, x, y):
     """The thread at a place that `split` has found; the answer is `find`'s."""
     none = R(0)
     if not x >= none:
@@ -180,7 +180,7 @@ def thread_at(R, cloth, i, j, end, pick, x, y):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def find(R, cloth, u, v):  # type: ignore[no-untyped-def]
+def find(R, cloth, u, v):
     """Thread under weave coordinates (u, v), float64.
 
     Returns (set, thread, s, w, angle, length): `length` is the visible run's own length [m], which
@@ -192,7 +192,7 @@ def find(R, cloth, u, v):  # type: ignore[no-untyped-def]
 
 
 @njit(**LEAN)
-def split_block(R, cloth, uv, begin, cells, x, y):  # type: ignore[no-untyped-def]
+def split_block(R, cloth, uv, begin, cells, x, y):
     """`split` of as many places from `begin` on as cells (4, b) int32, x and y (b,) hold.
 
     A loop of its own, which LLVM vectorises; the lookup behind it is all gathers.
@@ -204,7 +204,7 @@ def split_block(R, cloth, uv, begin, cells, x, y):  # type: ignore[no-untyped-de
 
 
 @njit(parallel=True, **KERNEL)
-def find_all(R, cloth, uv, sets, threads, s, w, angle, length):  # type: ignore[no-untyped-def]
+def find_all(R, cloth, uv, sets, threads, s, w, angle, length):
     """`find` at each of uv (n, 2) float64, into the arrays behind it."""
     n = uv.shape[0]
     for b in prange((n + BLOCK - 1) // BLOCK):
@@ -220,7 +220,7 @@ def find_all(R, cloth, uv, sets, threads, s, w, angle, length):  # type: ignore[
 
 
 @njit(parallel=True, **KERNEL)
-def heights_all(R, cloth, sets, threads, s, w, length, height, crown):  # type: ignore[no-untyped-def]
+def heights_all(R, cloth, sets, threads, s, w, length, height, crown):
     """`height_on` and `crown_on` at each hit, 0 in gaps, into `height` and `crown`."""
     for k in prange(sets.shape[0]):
         if sets[k] == GAP:

@@ -17,12 +17,10 @@ from fabricusd.appearance.law import (
     MIXED,
     THREAD,
     WEAVE,
-    conserving_level_value,
     law_value,
     surface_law,
 )
 from fabricusd.appearance.levels import point_value, point_values
-from fabricusd.appearance.multiple import conserving_value
 from fabricusd.appearance.quadrature import curve_nodes
 from fabricusd.appearance.shadow import METHODS
 from fabricusd.appearance.surface_tables import surface_tables
@@ -54,49 +52,41 @@ def test_the_mean_of_weave_over_shared_nodes_is_far(name, model):
     for wi, wo in zip(WI, WO, strict=True):
         mean = np.zeros(3)
         for k, weight in enumerate(nodes.weight):
-            mean += weight * np.array(
-                point_value(
-                    R,
-                    tables,
-                    False,
-                    set_of(nodes, k),
-                    nodes.thread[k],
-                    nodes.psi0[k],
-                    0.0,
-                    *wi,
-                    *wo,
-                )  # fmt: skip
-            )
+            which, thread = set_of(nodes, k), nodes.thread[k]
+            value = point_value(R, tables, False, which, thread, nodes.psi0[k], 0.0, *wi, *wo)
+            mean += weight * np.array(value)
         assert mean == pytest.approx(far_value(R, tables, *wi, *wo), rel=1e-10, abs=1e-13)
 
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_the_mean_of_conserving_weave_over_shared_nodes_is_far(name):
     fabric = with_model(PRESETS[name], "conserving")
-    tables = surface_law(fabric, precision=np.float64).conserving
+    law = surface_law(fabric, precision=np.float64)
+    tables = law.conserving
     cloth_to_area = np.maximum(tables.nodes[:, C_COS], math.cos(math.radians(85)))
     area = tables.nodes[:, C_WEIGHT] * cloth_to_area
     psi0 = np.arctan2(tables.nodes[:, C_SIN], tables.nodes[:, C_COS])
     for wi, wo in zip(random_directions(12, 3, upper=False), WO, strict=True):
         mean = np.zeros(3)
         for k in range(len(area)):
-            value = conserving_level_value(
-                R, tables, False, set_of(tables, k), tables.node_thread[k], psi0[k], 0.0, *wi, *wo
-            )
+            which, thread = set_of(tables, k), tables.node_thread[k]
+            value = law_value(R, law, WEAVE, which, thread, psi0[k], 0.0, *wi, *wo)
             mean += area[k] * np.array(value)
-        whole = conserving_value(R, tables, *wi, *wo)
+        whole = law_value(R, law, FAR, 0, 0, 0.0, 0.0, *wi, *wo)
         assert mean == pytest.approx(whole, rel=1e-10, abs=1e-13)
 
 
 @pytest.mark.parametrize(("name", "model"), [(n, m) for n in PRESETS for m in MODELS])
 def test_the_mean_of_weave_over_places_is_far(name, model):
     fabric = with_model(PRESETS[name], model)
-    places = spread_places(60_000)
-    for wi, wo in ((direction(25, 40), VIEWS["along the weft"]), (WI[3], WO[5])):
-        mean = surface.evaluate(fabric, wi, wo, uv=places, level="weave").mean(axis=0)
-        far = surface.evaluate(fabric, wi, wo, max_error=1e-4)[0]
-        # Values differ by a factor over the repeat; 6e4 even places leave a thousandth.
-        assert mean == pytest.approx(far, rel=1e-3, abs=1e-9)
+    # Steep pile seen edge on: few places carry much of the value.
+    places = spread_places(300_000 if name == "velvet" else 60_000)
+    over_places, far = np.zeros(3), np.zeros(3)
+    for wi, wo in zip(WI[:4], WO[:4], strict=True):
+        value = surface.evaluate(fabric, wi, wo, uv=places, level="weave", multiple=False)
+        over_places += value.mean(axis=0)
+        far += surface.evaluate(fabric, wi, wo, max_error=6e-4, multiple=False)[0]
+    assert over_places == pytest.approx(far, rel=1e-3)
 
 
 @pytest.mark.parametrize(("name", "model"), [(n, m) for n in PRESETS for m in MODELS])
