@@ -186,7 +186,7 @@ def _meet_lights(k, depth, estimator, lights, dome, reach, lanes, lane_tags, fil
 
 @njit(**KERNEL)
 def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, records, lights, dome,
-            surfaces, epsilon, path_pixel, path_sample, seed, film, hits, tags):  # fmt: skip
+            epsilon, path_pixel, path_sample, seed, hits, tags):  # fmt: skip
     """Turn each lane with a key into a hit at the next place of its queue.
 
     offsets : (queues,) int64 - where each queue starts; advanced to where it ends.
@@ -194,23 +194,20 @@ def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, recor
     block = np.empty(BLOCK_ROWS * BLOCK, np.float32)
     counters = np.empty(2 * BLOCK, np.uint32)
     places = np.empty(BLOCK, np.int64)
-    fill = 0
-    for k in range(count):
-        key = keys[k]
-        if key < 0:
-            continue
-        h = offsets[key]
-        offsets[key] = h + 1
-        places[fill] = h
-        _take(k, h, key, fill, rays, lanes, lane_tags, records, path_pixel, path_sample, block,
-              counters, hits, tags)  # fmt: skip
-        fill += 1
-        if fill == BLOCK:
-            _flush(step, estimator, fill, places, block, counters, lights, dome, surfaces, epsilon,
-                   seed, film, hits, tags)  # fmt: skip
-            fill = 0
-    _flush(step, estimator, fill, places, block, counters, lights, dome, surfaces, epsilon, seed,
-           film, hits, tags)  # fmt: skip
+    k = 0
+    while k < count:
+        fill = 0
+        while k < count and fill < BLOCK:
+            key = keys[k]
+            if key >= 0:
+                h = offsets[key]
+                offsets[key] = h + 1
+                places[fill] = h
+                _take(k, h, key, fill, rays, lanes, lane_tags, records, path_pixel, path_sample,
+                      block, counters, hits, tags)  # fmt: skip
+                fill += 1
+            k += 1
+        _flush(step, estimator, fill, places, block, counters, lights, dome, epsilon, seed, hits)
 
 
 @njit(**INLINE)
@@ -240,8 +237,7 @@ def _take(k, h, key, x, rays, lanes, lane_tags, records, path_pixel, path_sample
 
 
 @njit(**INLINE)
-def _flush(step, estimator, fill, places, block, counters, lights, dome, surfaces, epsilon, seed,
-           film, hits, tags):  # fmt: skip
+def _flush(step, estimator, fill, places, block, counters, lights, dome, epsilon, seed, hits):
     """Bring the block's frames and numbers to their hits, and choose a light for each."""
     make_frames(fill, epsilon, block)
     make_numbers(fill, np.uint32(2 + NUMBERS_PER_STEP * step), seed, counters, block)
@@ -254,8 +250,15 @@ def _flush(step, estimator, fill, places, block, counters, lights, dome, surface
         c0, c1 = block[NUMBERS + 4 * BLOCK + x], block[NUMBERS + 5 * BLOCK + x]
         c2, c3 = block[NUMBERS + 6 * BLOCK + x], block[NUMBERS + 7 * BLOCK + x]
         _choose_direction(estimator, lights, dome, c0, c1, c2, c3, hits, h)
-        material = tags[MATERIAL, h]
-        red, green, blue = emission_at(surfaces, material, hits[PLACE, h], hits[PLACE + 1, h])
+
+
+@njit(**LEAN)
+def add_emission(count, surfaces, hits, tags, film):
+    """Add what surfaces that shine by themselves send back along the ray, on their front."""
+    for h in range(count):
+        red, green, blue = emission_at(
+            surfaces, tags[MATERIAL, h], hits[PLACE, h], hits[PLACE + 1, h]
+        )
         if red + green + blue > R(0) and hits[SIDE, h] > R(0):
             row = DIRECT if tags[DEPTH, h] <= 1 else INDIRECT
             path = tags[PATH, h]

@@ -101,7 +101,8 @@ def _draw(R, size, block):
         u1, u2 = block[_U1 + x], block[_U2 + x]
         t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
         theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-        width = block[_ON_SURFACE + x] if lobe == R(SURFACE) else block[_ON_VOLUME + x]
+        on_surface, on_volume = block[_ON_SURFACE + x], block[_ON_VOLUME + x]
+        width = on_surface if lobe == R(SURFACE) else on_volume
         psi0, tangent = block[_PSI0 + x], block[_TAN + x]
         t, b, n = sample_lobe(R, VOLUME, psi0, tangent, width, theta_o, u1, u2)
         ti, bi, ni = sample_lobe(R, ISOTROPIC, psi0, tangent, width, theta_o, u1, u2)
@@ -229,25 +230,37 @@ def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, 
             block[_A + x], block[_B + x], block[_D + x] = a, b, d
             k = _choose(R, _A, 3 if on_thread else 0, u0[h], block, x)
             block[_LOBE + x] = R(_EVEN) if k < 0 else R(k)
-        for x in range(size):
-            c, s = cos(R, block[_PSI0 + x]), sin(R, block[_PSI0 + x])
-            block[_COS + x], block[_SIN + x], block[_TAN + x] = c, s, s / c
+        _turn(R, size, block)
         _draw(R, size, block)
-        for x in range(size):
-            warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
-            t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
-            theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-            a, b, d = block[_A + x], block[_B + x], block[_D + x]
-            angle, tangent = block[_PSI0 + x], block[_TAN + x]
-            surface, volume = block[_ON_SURFACE + x], block[_ON_VOLUME + x]
-            # Without a thread all shares are 0 and the whole is uniform.
-            even = R(UNIFORM / (2 * math.pi)) if a + b + d > R(0) else R(1 / (2 * math.pi))
-            block[_P_LIGHT + x] = even + _lobes_at(
-                R, warp, angle, c, s, tangent, surface, volume, theta_o,
-                block[_IX + x], block[_IY + x], block[_IZ + x], a, b, d,
-            )  # fmt: skip
-            block[_P_GO + x] = even + _lobes_at(
-                R, warp, angle, c, s, tangent, surface, volume, theta_o,
-                block[_GX + x], block[_GY + x], block[_GZ + x], a, b, d,
-            )  # fmt: skip
+        _add_points(R, size, block)
         _store(R, start, size, block, go, p_light, p_go, first)
+
+
+@njit(**LEAN)
+def _turn(R, size, block):
+    """Cosine, sine and tangent of each hit's tangent angle."""
+    for x in range(size):
+        c, s = cos(R, block[_PSI0 + x]), sin(R, block[_PSI0 + x])
+        block[_COS + x], block[_SIN + x], block[_TAN + x] = c, s, s / c
+
+
+@njit(**LEAN)
+def _add_points(R, size, block):
+    """Both densities at each hit's own stretch."""
+    for x in range(size):
+        warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
+        t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
+        theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
+        a, b, d = block[_A + x], block[_B + x], block[_D + x]
+        angle, tangent = block[_PSI0 + x], block[_TAN + x]
+        surface, volume = block[_ON_SURFACE + x], block[_ON_VOLUME + x]
+        # Without a thread all shares are 0 and the whole is uniform.
+        even = R(UNIFORM / (2 * math.pi)) if a + b + d > R(0) else R(1 / (2 * math.pi))
+        block[_P_LIGHT + x] = even + _lobes_at(
+            R, warp, angle, c, s, tangent, surface, volume, theta_o,
+            block[_IX + x], block[_IY + x], block[_IZ + x], a, b, d,
+        )  # fmt: skip
+        block[_P_GO + x] = even + _lobes_at(
+            R, warp, angle, c, s, tangent, surface, volume, theta_o,
+            block[_GX + x], block[_GY + x], block[_GZ + x], a, b, d,
+        )  # fmt: skip

@@ -189,15 +189,19 @@ def _by_law(R, law, level, hits, first, wo, wi, go, towards, onwards, sets, thre
             hits[CHANCE, h], hits[CHANCE + 1, h], hits[CHANCE + 2, h],
         )  # fmt: skip
         go[0, k], go[1, k], go[2, k] = x, y, z
-        hits[GO_PDF, h] = law_density(R, law, level, which, thread, angle, x, y, z, ox, oy, oz)
-        onwards[0, k], onwards[1, k], onwards[2, k] = law_value(
-            R, law, level, which, thread, angle, w, x, y, z, ox, oy, oz
-        )
-        x, y, z = wi[0, k], wi[1, k], wi[2, k]
-        hits[F_PDF, h] = law_density(R, law, level, which, thread, angle, x, y, z, ox, oy, oz)
-        towards[0, k], towards[1, k], towards[2, k] = law_value(
-            R, law, level, which, thread, angle, w, x, y, z, ox, oy, oz
-        )
+        # One call of each function, for both directions: they are large, and compiled in place.
+        for turn in range(2):
+            pdf = law_density(R, law, level, which, thread, angle, x, y, z, ox, oy, oz)
+            red, green, blue = law_value(
+                R, law, level, which, thread, angle, w, x, y, z, ox, oy, oz
+            )
+            if turn == 0:
+                hits[GO_PDF, h] = pdf
+                onwards[0, k], onwards[1, k], onwards[2, k] = red, green, blue
+                x, y, z = wi[0, k], wi[1, k], wi[2, k]
+            else:
+                hits[F_PDF, h] = pdf
+                towards[0, k], towards[1, k], towards[2, k] = red, green, blue
 
 
 @njit(**LEAN)

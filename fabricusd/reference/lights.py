@@ -112,7 +112,7 @@ def _merge_domes(domes: list[Light]) -> Dome:
     pictures = []
     for light in domes:
         image = np.ones((1, 1, 3), np.float32) if light.image is None else light.image
-        pictures.append(np.asarray(image, np.float32) * np.float32(light.radiance))
+        pictures.append(np.asarray(image, np.float32) * np.array(light.radiance, np.float32))
     turns = [_rotation(light.frame) for light in domes]
     if len(domes) == 1:
         return build_dome(pictures[0], turns[0])

@@ -121,7 +121,7 @@ def _sound_triangles(scene: Scene, mesh: Mesh) -> NDArray[np.bool_]:
     tri = np.asarray(mesh.triangles)
     if not len(tri):
         return np.zeros(0, bool)
-    finite = np.isfinite(mesh.points).all(axis=1)
+    finite = np.asarray(np.isfinite(mesh.points).all(axis=1))
     whole = finite[tri].all(axis=1)
     if not whole.all():
         scene.note(

@@ -166,11 +166,62 @@ def _ggx_albedo(alpha: float, eye: np.ndarray) -> float:
     return float(weight.mean())
 
 
+def test_a_surface_that_shines_is_seen_on_its_front_and_lights_others():
+    lamp = PreviewSurface(diffuse=(0, 0, 0), ior=1.0, emissive=(1.0, 2.0, 3.0))
+    r = picture([grid()], [lamp], [], above(), spp=4)
+    assert np.allclose(r.layers["beauty"][..., :3], (1.0, 2.0, 3.0), atol=1e-5)
+    below = replace(above(), frame=looking((0.0, -2.0, 0.0)))
+    r = picture([grid()], [lamp], [Light(path="none", kind=DOME, radiance=(0, 0, 0))], below)
+    assert r.layers["beauty"][..., :3].max() == 0.0
+    ceiling = grid(size=2.0, material=1)
+    ceiling = replace(
+        ceiling, points=ceiling.points + np.array([0, 1.0, 0]), triangles=ceiling.triangles[:, ::-1]
+    )
+    r = picture(
+        [grid(), ceiling], [lambert(math.pi * 0.25), lamp],
+        [Light(path="none", kind=DOME, radiance=(0, 0, 0))], above(height=0.9, width=0.002),
+        spp=1024, max_bounces=1,
+    )  # fmt: skip
+    # [Howell]: a square of side 2 at height 1 over the point.
+    irradiance = 4 * math.sqrt(0.5) * math.atan(math.sqrt(0.5))
+    error = math.sqrt(r.layers["variance"][..., 0].mean() / 256)
+    assert abs(r.layers["beauty"][..., 0].mean() - 0.25 * irradiance) < 4.5 * error + 1e-4
+
+
+def test_an_opacity_of_a_third_lets_two_thirds_of_the_dome_and_the_sun_through():
+    veil = PreviewSurface(diffuse=(0, 0, 0), ior=1.0, opacity=1 / 3)
+    high = replace(grid(material=1), path="veil")
+    high = replace(high, points=high.points + np.array([0, 0.5, 0]))
+    below = above(height=0.4, width=0.01)
+    r = picture([grid(size=4.0), high], [lambert(0.5), veil], [sun((0, 1, 0))], below, spp=16)
+    assert r.layers["beauty"][..., 0].mean() == pytest.approx(0.5 / math.pi * 2 / 3, rel=1e-4)
+    through = replace(below, frame=looking((0.0, 0.2, 0.0), (0.0, 1.0, 0.0)))
+    r = picture([high], [lambert(0.5), veil], [WHITE_DOME], through, spp=256)
+    error = math.sqrt(r.layers["variance"][..., 0].mean() / 256)
+    assert abs(r.layers["beauty"][..., 0].mean() - 2 / 3) < 4.5 * error
+
+
+@pytest.mark.parametrize("level", ["far", "weave", "thread"])
+@pytest.mark.parametrize("preset", ["linen_plain", "polyester_satin_charmeuse"])
+def test_white_conserving_cloth_vanishes_in_a_white_dome(preset, level):
+    fabric = load(preset)
+    threads = {n: replace(t, albedo=(1.0, 1.0, 1.0)) for n, t in fabric.threads.items()}
+    white = replace(fabric, threads=threads, model="conserving", back=None)
+    tilted = replace(above(), frame=looking((1.0, 1.4, 0.3)))
+    r = picture([grid()], [cloth(white, threads=120.0)], [WHITE_DOME], tilted, spp=256,
+                level=level, shadow="none")  # fmt: skip
+    mean = r.layers["beauty"][..., :3].mean(axis=(0, 1))
+    error = np.sqrt(r.layers["variance"].mean(axis=(0, 1)) / 256)
+    assert np.all(np.abs(mean - 1.0) < 4.5 * error + 5e-3)
+
+
 FABRICS = {
     "linen, far": ("linen_plain", "far"),
     "linen, weave": ("linen_plain", "weave"),
     "satin, far": ("polyester_satin_charmeuse", "far"),
     "shot silk, thread": ("silk_shot", "thread"),
+    "conserving linen, far": ("conserving", "far"),
+    "conserving linen, weave": ("conserving", "weave"),
 }
 
 
@@ -191,6 +242,9 @@ def test_the_comparison_of_estimators_would_see_a_light_eight_per_cent_brighter(
 
 
 def _folded_cloth(preset, level, estimator, brightness=1.0):
+    fabric = load("linen_plain" if preset == "conserving" else preset)
+    if preset == "conserving":
+        fabric = replace(fabric, model="conserving")
     folds = grid(lambda x, z: 0.12 * np.sin(9 * x) * np.cos(5 * z), cells=40)
     floor = replace(grid(size=3.0, material=1), path="floor")
     floor = replace(floor, points=floor.points - [0.0, 0.3, 0.0])
@@ -205,7 +259,7 @@ def _folded_cloth(preset, level, estimator, brightness=1.0):
     ]  # fmt: skip
     camera = Camera(frame=looking((0.7, 1.4, 1.0)), aperture=(0.03, 0.03))
     return picture(
-        [folds, floor], [cloth(load(preset)), lambert(0.6)], lights, camera,
+        [folds, floor], [cloth(fabric), lambert(0.6)], lights, camera,
         size=32, spp=64, level=level, estimator=estimator, max_bounces=3, seed=5,
     )  # fmt: skip
 
