@@ -60,14 +60,14 @@ def best(run: Callable[[], object], repeats: int) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pairs", type=int, default=1_000_000)
-    parser.add_argument("--repeats", type=int, default=15)
+    parser.add_argument("--repeats", type=int, default=60)
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
     n, workers = options.pairs, min(options.workers, numba.config.NUMBA_NUM_THREADS)
     generator = np.random.default_rng(0)
     wi, wo = directions(generator, n), directions(generator, n)
     out = np.empty_like(wi)
-    few = max(2, options.repeats // 5)
+    few = max(3, options.repeats // 6)
     numpy_rate = n / best(lambda: microcylinder_in_numpy(LINEN, wi, wo), few)
     m = n // 10
     i, o = wi[:, :m].T.astype(float), wo[:, :m].T.astype(float)

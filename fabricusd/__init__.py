@@ -21,6 +21,7 @@ _WHERE = {
     "load": "fabricusd.schema",
     "save": "fabricusd.schema",
     "check": "fabricusd.schema",
+    "render": "fabricusd.reference",
 }
 
 __all__ = [*_WHERE, "__version__"]

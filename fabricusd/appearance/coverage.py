@@ -14,12 +14,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.fabric import Fabric, ThreadSet
+
+__all__ = ["GAP", "WARP", "WEFT", "Coverage", "coverage", "sets"]
 
 Floats = NDArray[np.float64]
 
-WEFT, WARP, GAP = 0, 1, 2
-"""Thread sets, as the weave grid counts them; GAP is where no thread is seen."""
+GAP = 2
+"""Beside WEFT and WARP: where no thread is seen."""
 
 
 class Coverage(NamedTuple):

@@ -35,7 +35,7 @@ OCTAVES = 1.0
 
 
 @njit(**INLINE)
-def _ramp(R, x):  # type: ignore[no-untyped-def]
+def _ramp(R, x):
     """Smooth step in log2 of `x`, 0.5 at 1 and flat OCTAVES away on both sides; NaN stays."""
     if x <= R(2.0**-OCTAVES):
         return R(0)
@@ -46,7 +46,7 @@ def _ramp(R, x):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def level_weights(R, ends, picks, extent_u, extent_v):  # type: ignore[no-untyped-def]
+def level_weights(R, ends, picks, extent_u, extent_v):
     """(far, weave, thread) probabilities, which sum to 1.
 
     ends, picks : the true repeat, in threads; extent_u, extent_v : of the pixel, in threads, along
@@ -65,7 +65,7 @@ def level_weights(R, ends, picks, extent_u, extent_v):  # type: ignore[no-untype
 
 
 @njit(**INLINE)
-def pick_level(R, far, weave, number):  # type: ignore[no-untyped-def]
+def pick_level(R, far, weave, number):
     """Level for a uniform `number` in [0, 1), and the number stretched to [0, 1) to use again."""
     if number < far:
         return FAR, number / far
@@ -75,7 +75,7 @@ def pick_level(R, far, weave, number):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **KERNEL)
-def _weights_all(R, ends, picks, extents, out):  # type: ignore[no-untyped-def]
+def _weights_all(R, ends, picks, extents, out):
     for k in prange(extents.shape[0]):
         out[k, 0], out[k, 1], out[k, 2] = level_weights(
             R, ends, picks, extents[k, 0], extents[k, 1]

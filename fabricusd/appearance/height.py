@@ -15,8 +15,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.coverage import WARP, WEFT
 from fabricusd.appearance.curve import peak
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.real import INLINE, LEAN
 from fabricusd.appearance.weave import crown_on, lookup, rise_on, wrap
 from fabricusd.errors import FabricError
@@ -34,7 +34,7 @@ _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 @njit(**INLINE)
-def crown_of(R, cloth, rounded, which, thread, w):  # type: ignore[no-untyped-def]
+def crown_of(R, cloth, rounded, which, thread, w):
     """Height [m] of a thread's visible side over its axis at `w`, flat or round."""
     if rounded != 0:
         return crown_on(R, cloth, which, thread, w)
@@ -42,7 +42,7 @@ def crown_of(R, cloth, rounded, which, thread, w):  # type: ignore[no-untyped-de
 
 
 @njit(**LEAN)
-def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first):  # type: ignore[no-untyped-def]
+def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first):
     """Slope of the steepest line from a point at height `h` [m] to the height field, at least `k`.
 
     u, v : weave coordinates of the point; dx, dy : unit direction on the cloth, metres along U, V
@@ -54,7 +54,7 @@ def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first): 
     """
     du, dv = dx / float(cloth.pitch[WARP]), dy / float(cloth.pitch[WEFT])
     nearest = NEAREST * min(float(cloth.pitch[WARP]), float(cloth.pitch[WEFT]))
-    end, pick = math.floor(u), math.floor(v)
+    end, pick = np.floor(u), np.floor(v)
     begin, asked = 0.0, k
     for _ in range(CELLS):
         to_end = ((end + 1.0 if du > 0.0 else end) - u) / du if du != 0.0 else np.inf
@@ -73,14 +73,14 @@ def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first): 
     return k
 
 
-@njit(**LEAN)
-def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h, k):  # type: ignore[no-untyped-def]
+@njit(**INLINE)
+def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h, k):
     """`steepest` over the threads seen in one cell, distances t0 to t1 [m]."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
     warp = int(cloth.sequence[WARP, wrap(end, cloth.sequence_length[WARP])])
     weft = int(cloth.sequence[WEFT, wrap(pick, cloth.sequence_length[WEFT])])
     top = int(cloth.grid[i, j])
-    own = end == math.floor(u) if which == WARP else pick == math.floor(v)
+    own = end == np.floor(u) if which == WARP else pick == np.floor(v)
     if top == WARP:
         over, over_t, along, along_t = u - end, du, v - pick, dv
         above, below, crossing, below_crossing = warp, weft, cloth.pitch[WEFT], cloth.pitch[WARP]
@@ -124,7 +124,7 @@ def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h
 
 
 @njit(**INLINE)
-def _within(x, x_t, low, high, t0, t1):  # type: ignore[no-untyped-def]
+def _within(x, x_t, low, high, t0, t1):
     """The part of [t0, t1] with x + x_t t from `low` to `high`; empty where its end is less."""
     if x_t == 0.0:
         if low <= x <= high:
@@ -134,8 +134,8 @@ def _within(x, x_t, low, high, t0, t1):  # type: ignore[no-untyped-def]
     return max(t0, min(a, b)), min(t1, max(a, b))
 
 
-@njit(**LEAN)
-def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w_t):  # type: ignore[no-untyped-def]
+@njit(**INLINE)
+def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w_t):
     """`steepest` over a stretch of thread: distances a to b [m], position s + s_t t, w + w_t t."""
     if not b > a:
         return k
@@ -175,8 +175,8 @@ def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w
     return k
 
 
-@njit(**LEAN)
-def _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t):  # type: ignore[no-untyped-def]
+@njit(**INLINE)
+def _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t):
     """Slope from the point to the thread at distance `t` [m]."""
     at = max(0.0, min(1.0, s + s_t * t))
     crown = half
@@ -187,7 +187,7 @@ def _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t):  # ty
 
 
 @njit(**LEAN)
-def _summit(cloth, thread, p, half, h, length, s, s_t, w, w_t, t0, t1, k):  # type: ignore[no-untyped-def]
+def _summit(cloth, thread, p, half, h, length, s, s_t, w, w_t, t0, t1, k):
     """Where a round thread stands highest above the line of slope `k`, by golden section.
 
     Crown and hump are both concave, so there is one summit; a valley's highest points are its ends,

@@ -2,8 +2,8 @@
 
 Texels lie on the visible threads, not on a raster over the cloth: a raster would average across
 every edge between a high thread and a low one. A cell has a slot for the thread on top and, where
-the coverage shows the set underneath, one for it. Azimuths are even in the diamond angle
-`y/(|x| + |y|)`, quadrant by quadrant, which needs no arctangent.
+the coverage shows the set underneath, one for it. Azimuths are even in the diamond angle, which
+needs no arctangent. `horizon_lookup` reads the table.
 """
 
 from __future__ import annotations
@@ -16,10 +16,12 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric
-from fabricusd.appearance.coverage import GAP, WARP
+from fabricusd.appearance.coverage import GAP
+from fabricusd.appearance.frame import WARP
 from fabricusd.appearance.height import crown_of, steepest
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN
-from fabricusd.appearance.weave import find, height_on, wrap
+from fabricusd.appearance.horizon_lookup import horizon_at
+from fabricusd.appearance.real import KERNEL, LEAN
+from fabricusd.appearance.weave import find, height_on
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -27,8 +29,8 @@ AZIMUTHS = 16
 TEXELS = (8, 4)
 """Texels along and across a thread in one cell. See docs/shadowing.md for what finer ones bring."""
 
-MOST_BYTES = 2**29
-"""Largest horizon table. A jacquard of a million cells still fits; beyond, `traced` needs none."""
+MOST_BYTES = 2**25
+"""Largest horizon table, 256 x 256 cells at the usual size: half a minute's work to fill."""
 
 LOWEST = math.tan(math.radians(0.25))
 """Slope below which a horizon counts as level: half the sun's disc."""
@@ -41,8 +43,10 @@ def horizon_table(
     highest: float,
     azimuths: int,
     texels: tuple[int, int],
-) -> NDArray[np.uint8]:
+) -> NDArray[np.uint8] | None:
     """(I, J, slots, along, across, azimuths) sine of the horizon's elevation, 255 for 1.
+
+    None for a repeat whose table would be larger than MOST_BYTES.
 
     cloth : `fabric` in float64. The table repeats as the threads' *shapes* do: types that differ in
     colour alone do not lengthen it.
@@ -53,13 +57,8 @@ def horizon_table(
         raise FabricError("texels", f"is {texels}; it must be at least 2 by 2")
     repeat = shape_repeat(fabric)
     slots = 1 if cloth.under == GAP else 2
-    size = math.prod((*repeat, slots, *texels, azimuths))
-    if size > MOST_BYTES:
-        raise FabricError(
-            "shadow",
-            f"horizon would take a table of {size / 1e9:.3g} GB for a repeat of "
-            f"{repeat[0]} x {repeat[1]} cells; use 'traced' or 'peak', which need none",
-        )
+    if math.prod((*repeat, slots, *texels, azimuths)) > MOST_BYTES:
+        return None
     table = np.zeros((*repeat, slots, *texels, azimuths), np.uint8)
     if highest > 0:
         _fill(cloth, rounded, highest, _diamond_directions(azimuths), table)
@@ -96,7 +95,7 @@ def _diamond_directions(azimuths: int) -> NDArray[np.float64]:
 
 
 @njit(parallel=True, **KERNEL)
-def _fill(cloth, rounded, highest, directions, table):  # type: ignore[no-untyped-def]
+def _fill(cloth, rounded, highest, directions, table):
     """The horizon at the centre of every texel, in every direction."""
     ends, picks, slots, rows, columns, azimuths = table.shape
     for cell in prange(ends * picks):
@@ -124,7 +123,7 @@ def _fill(cloth, rounded, highest, directions, table):  # type: ignore[no-untype
 
 
 @njit(**LEAN)
-def _texel_centre(cloth, i, j, slot, along, across):  # type: ignore[no-untyped-def]
+def _texel_centre(cloth, i, j, slot, along, across):
     """Weave coordinates of a place on a slot's thread, and whether that thread is seen at all."""
     top = int(cloth.grid[i % cloth.grid.shape[0], j % cloth.grid.shape[1]])
     width = float(cloth.width[top])
@@ -141,67 +140,8 @@ def _texel_centre(cloth, i, j, slot, along, across):  # type: ignore[no-untyped-
     return i + p, j + q, seen
 
 
-@njit(**INLINE)
-def diamond(R, x, y):  # type: ignore[no-untyped-def]
-    """Azimuth of (x, y) from 0 to 4: one per quadrant, linear in y/(|x| + |y|) inside it."""
-    whole = abs(x) + abs(y)
-    if y >= R(0):
-        return y / whole if x >= R(0) else R(1) - x / whole
-    return R(2) - y / whole if x < R(0) else R(3) + x / whole
-
-
-@njit(**INLINE)
-def _cell_of_texels(R, place, count):  # type: ignore[no-untyped-def]
-    """Lower of the two texels around `place` in [0, 1], and the share of the upper one."""
-    x = max(R(0), min(place * R(count) - R(0.5), R(count - 1)))
-    k = min(int(x), count - 2)
-    return k, x - R(k)
-
-
-@njit(**INLINE)
-def _between(R, table, i, j, slot, row, column, first, second, c):  # type: ignore[no-untyped-def]
-    """A texel's horizon between two azimuths, c of the way from the first."""
-    low = R(table[i, j, slot, row, column, first])
-    return low + (R(table[i, j, slot, row, column, second]) - low) * c
-
-
-@njit(**INLINE)
-def horizon_sine(R, cloth, table, u, v, which, x, y):  # type: ignore[no-untyped-def]
-    """Sine of the horizon's elevation at (u, v) on the thread of set `which` towards (x, y)."""
-    end, pick = math.floor(u), math.floor(v)
-    i, j = wrap(end, table.shape[0]), wrap(pick, table.shape[1])
-    p, q = R(u - end), R(v - pick)
-    top = which
-    if table.shape[2] > 1:
-        top = int(cloth.grid[wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])])
-    if top == WARP:
-        p, q = q, p
-    width = cloth.width[top]
-    slot = 0
-    if which == top:
-        along, across = p, (q - R(0.5)) / width + R(0.5)
-    else:
-        slot = 1
-        seen = q if q < R(0.5) else q - width
-        along, across = seen / (R(1) - width), (p - R(0.5)) / cloth.under_width + R(0.5)
-    row, a = _cell_of_texels(R, along, table.shape[3])
-    column, b = _cell_of_texels(R, across, table.shape[4])
-    azimuths = table.shape[5]
-    turn = diamond(R, x, y) * R(0.25 * azimuths)
-    first = min(int(turn), azimuths - 1)
-    c = turn - R(first)
-    second = first + 1 if first + 1 < azimuths else 0
-    here = _between(R, table, i, j, slot, row, column, first, second, c)
-    beside = _between(R, table, i, j, slot, row, column + 1, first, second, c)
-    ahead = _between(R, table, i, j, slot, row + 1, column, first, second, c)
-    both = _between(R, table, i, j, slot, row + 1, column + 1, first, second, c)
-    near = here + (beside - here) * b
-    far = ahead + (both - ahead) * b
-    return (near + (far - near) * a) * R(1.0 / 255.0)
-
-
 @njit(parallel=True, **KERNEL)
-def _compare(cloth, rounded, highest, table, uv, angle, out):  # type: ignore[no-untyped-def]
+def _compare(cloth, rounded, highest, table, uv, angle, out):
     """Elevation of the table minus that of the march [rad]; NaN where nothing casts shadows."""
     for k in prange(uv.shape[0]):
         which, thread, s, w, _, length = find(np.float64, cloth, uv[k, 0], uv[k, 1])
@@ -213,7 +153,7 @@ def _compare(cloth, rounded, highest, table, uv, angle, out):  # type: ignore[no
             slope = steepest(
                 cloth, rounded, highest, uv[k, 0], uv[k, 1], which, crown, h, x, y, LOWEST, False
             )  # fmt: skip
-            sine = horizon_sine(np.float64, cloth, table, uv[k, 0], uv[k, 1], which, x, y)
+            sine = horizon_at(np.float64, cloth, table, uv[k, 0], uv[k, 1], which, x, y)
             out[k] = math.asin(min(1.0, sine)) - math.atan(slope)
 
 

@@ -11,6 +11,7 @@ Source: `docs/model.md` section 4; both rules are measured by `bench/far_quadrat
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -51,14 +52,17 @@ MOST_NODES = 96
 
 CANDIDATES = (
     *(Rule(CELLS, math.radians(x)) for x in (20.0, 10.0, 5.0, 2.5, 1.25, 0.6, 0.3)),
-    *(Rule(POINTS, x) for x in (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18)),
+    *(Rule(POINTS, x) for x in (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.1, 0.05)),
 )
 """Rules that a bound on the error chooses from, see `accuracy`."""
+
+MOST_POINTS = 16
+"""Points that one Gauss-Legendre panel has at most; making more takes longer than they save."""
 
 MOST_NODES_EVER = 1024
 """Narrow lobes ask for points without end; no rule with more nodes than this is tried."""
 
-REFERENCES = (Rule(POINTS, 0.1), Rule(CELLS, math.radians(0.1)))
+REFERENCES = (Rule(POINTS, 0.03), Rule(CELLS, math.radians(0.1)))
 """Rules that the others are measured against: the points, unless they are too many."""
 
 
@@ -123,8 +127,20 @@ def default_rule(fabric: Fabric) -> Rule:
 def _counts(p: Pieces, width: float, rule: Rule) -> NDArray[np.int64]:
     step = rule.spacing * width if rule.form == POINTS else rule.spacing
     # A piece of exactly `step` takes one node, whatever rounding says.
-    count = np.ceil(np.abs(p.last - p.first) / step - 1e-9)
-    return np.asarray(np.maximum(count, 1), np.int64)
+    count = np.maximum(np.ceil(np.abs(p.last - p.first) / step - 1e-9), 1)
+    if rule.form == POINTS:
+        panels = np.ceil(count / MOST_POINTS)
+        count = panels * np.ceil(count / panels)
+    return np.asarray(count, np.int64)
+
+
+@lru_cache(maxsize=256)
+def _gauss(count: int) -> tuple[Floats, Floats]:
+    """Points and weights over [-1, 1], in panels of equally many points, at most MOST_POINTS."""
+    panels = math.ceil(count / MOST_POINTS)
+    x, w = np.polynomial.legendre.leggauss(count // panels)
+    centre = (2 * np.arange(panels) + 1) / panels - 1
+    return (centre[:, None] + x / panels).ravel(), np.tile(w / panels, panels)
 
 
 def _of_curve(curve: TangentCurve, width: float, rule: Rule) -> tuple[Floats, Floats, Floats]:
@@ -135,7 +151,7 @@ def _of_curve(curve: TangentCurve, width: float, rule: Rule) -> tuple[Floats, Fl
     ):
         middle, change = 0.5 * (first + last), 0.5 * (last - first)
         if rule.form == POINTS:
-            x, w = np.polynomial.legendre.leggauss(int(n))
+            x, w = _gauss(int(n))
             psi0.append(middle + change * x)
             weight.append(0.5 * length * w)
             half.append(np.zeros(n))

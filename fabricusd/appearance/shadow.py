@@ -5,7 +5,8 @@ each is 1 on pile, which has none, and 0 for light at or below the cloth:
 
 none    : 1, the neighbouring threads are left to the masking term
 peak    : the nearest of the highest points is the horizon in every direction, [Bisker2011] 5.2.3
-horizon : a table of the horizon by place on the thread and azimuth, [Max1988]
+horizon : a table of the horizon by place on the thread and azimuth, [Max1988]; marched instead
+          where the repeat is too large for a table
 traced  : the height field is marched along the ray, the answer that the others are measured by
 """
 
@@ -19,18 +20,21 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.coverage import GAP, WARP, WEFT
+from fabricusd.appearance.coverage import GAP
 from fabricusd.appearance.curve import crest, peak
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.height import crown_of, highest_point, level_is_round, steepest
-from fabricusd.appearance.horizon import (
-    AZIMUTHS,
-    TEXELS,
-    horizon_error,
-    horizon_sine,
-    horizon_table,
+from fabricusd.appearance.horizon import AZIMUTHS, TEXELS, horizon_error, horizon_table
+from fabricusd.appearance.horizon_lookup import (
+    above_horizon,
+    choose_texels,
+    horizon_at,
+    mix_texels,
+    soft_edge,
+    split_table,
 )
 from fabricusd.appearance.real import INLINE, KERNEL, LEAN
-from fabricusd.appearance.weave import find, height_on, wrap
+from fabricusd.appearance.weave import BLOCK, find, height_on, split_block, thread_at, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -57,7 +61,8 @@ class Shadow(NamedTuple):
         where the last is less than the first
     crest_height : (k,) real - height there, in run lengths
     table : (I, J, slots, along, across, azimuths) uint8 - sine of the horizon's elevation times
-        255, see `horizon`; empty for the other methods
+        255, see `horizon`; one zero for the other methods
+    texels : the same memory in one row
     """
 
     method: int
@@ -68,6 +73,7 @@ class Shadow(NamedTuple):
     crest_last: NDArray[Any]
     crest_height: NDArray[Any]
     table: NDArray[np.uint8]
+    texels: NDArray[np.uint8]
 
 
 def compile_shadow(
@@ -87,7 +93,8 @@ def compile_shadow(
         the table's own error for `horizon` and PEAK_SOFTNESS for `peak`
     azimuths, texels : size of the horizon table, directions and (along, across) a thread in a cell
 
-    Raises `FabricError` for a repeat whose horizon table would not fit in memory.
+    A repeat too large for a horizon table, a figured cloth of hundreds of ends and picks, is traced
+    instead: the answer's `method` is then TRACED, which is slower and nearer to the truth.
     """
     if method not in METHODS:
         raise FabricError("shadow", f"is '{method}'; it must be one of {', '.join(METHODS)}")
@@ -98,9 +105,12 @@ def compile_shadow(
     highest = highest_point(fabric, cloth)
     table = np.zeros((1, 1, 1, 1, 1, 1), np.uint8)
     if method == "horizon":
-        table = horizon_table(fabric, cloth, rounded, highest, azimuths, texels)
-        if softness is None:
-            softness = horizon_error(cloth, rounded, highest, table)
+        found_table = horizon_table(fabric, cloth, rounded, highest, azimuths, texels)
+        if found_table is None:
+            method = "traced"
+        else:
+            table = found_table
+            softness = softness or horizon_error(cloth, rounded, highest, table)
     found = [crest(t.curve) for t in fabric.thread_list]
     first = np.ones((len(found), max(len(c) for c in found)))
     last = np.zeros_like(first)
@@ -115,11 +125,12 @@ def compile_shadow(
         crest_last=last.astype(precision),
         crest_height=np.array([peak(t.curve) for t in fabric.thread_list], precision),
         table=table,
+        texels=table.reshape(-1),
     )
 
 
 @njit(**INLINE)
-def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: ignore[no-untyped-def]
+def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
     """Share of light from direction (x, y, z) in the surface frame that reaches a point: `g`.
 
     u, v : weave coordinates, float64; the next five are what `weave.find` gave there
@@ -136,9 +147,8 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: 
     if flat <= R(1e-6) * z:
         return R(1)
     if shadow.method == HORIZON:
-        sine = horizon_sine(R, cloth, shadow.table, u, v, which, x, y)
-        cosine = math.sqrt(max(R(0), R(1) - sine * sine))
-        return _soft(R, z * cosine - flat * sine, shadow.softness)
+        sine = horizon_at(R, cloth, shadow.table, u, v, which, x, y)
+        return soft_edge(R, above_horizon(R, sine, flat, z), shadow.softness)
     axis = height_on(R, cloth, thread, s, length)
     if shadow.method == PEAK:
         # [Bisker2011] gives a place on the thread one height, whatever the level: no round here.
@@ -146,10 +156,10 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: 
         if drop <= R(1e-6) * shadow.highest:
             return R(1)
         # No horizon lower than this one can touch the shadow's edge.
-        lowest = max(z / flat - shadow.softness * (R(1) + z * z / (flat * flat)), R(4e-3))
+        lowest = max(z / flat - shadow.softness * (R(1) + z * z / (flat * flat)), R(1e-6))
         distance = R(_to_crest(cloth, shadow, u, v, float(drop / lowest)))
         reach = math.sqrt(drop * drop + distance * distance)
-        return _soft(R, (z * distance - flat * drop) / reach, shadow.softness)
+        return soft_edge(R, (z * distance - flat * drop) / reach, shadow.softness)
     crown = crown_of(R, cloth, shadow.rounded, which, thread, w)
     slope = float(z) / float(flat)
     found = steepest(
@@ -160,17 +170,10 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):  # type: 
     return R(0) if found > slope else R(1)
 
 
-@njit(**INLINE)
-def _soft(R, above, softness):  # type: ignore[no-untyped-def]
-    """A smooth step from 0 to 1 over `softness`, in how far the light stands above the horizon."""
-    t = max(R(0), min(R(1), above / softness + R(0.5)))
-    return t * t * (R(3) - R(2) * t)
-
-
 @njit(**LEAN)
-def _to_crest(cloth, shadow, u, v, most):  # type: ignore[no-untyped-def]
+def _to_crest(cloth, shadow, u, v, most):
     """Distance on the cloth [m] to the nearest of the highest points, at most `most`."""
-    end, pick = math.floor(u), math.floor(v)
+    end, pick = np.floor(u), np.floor(v)
     pitch_u, pitch_v = float(cloth.pitch[WARP]), float(cloth.pitch[WEFT])
     best = most
     for ring in range(SEARCH):
@@ -184,7 +187,7 @@ def _to_crest(cloth, shadow, u, v, most):  # type: ignore[no-untyped-def]
 
 
 @njit(**LEAN)
-def _crest_in_cell(cloth, shadow, u, v, end, pick, best):  # type: ignore[no-untyped-def]
+def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
     """The smaller of `best` and the distance [m] to the highest points in one cell."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
     top = int(cloth.grid[i, j])
@@ -227,17 +230,73 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):  # type: ignore[no-unt
     return best
 
 
+@njit(**LEAN)
+def horizon_block(R, cloth, shadow, cells, p, q, tops, sets, free, wi, begin, base, notes, out):
+    """`lit` by the horizon table at a block of places that `split` and `split_table` have found.
+
+    sets, tops, free : (b,) set of the thread, set on top of the cell, 1 where no light is kept off
+    (gap or pile); wi : (3, n), the block's from `begin` on; base (2, b) int32 and notes (3, b) are
+    written over
+    """
+    table = shadow.table
+    choose_texels(R, cloth, table, cells, p, q, tops, sets, wi, begin, base, notes)
+    mix_texels(R, shadow.texels, table.shape[4], table.shape[5], base, notes, out)
+    for k in range(out.size):
+        x, y, z = wi[0, begin + k], wi[1, begin + k], wi[2, begin + k]
+        flat = math.sqrt(x * x + y * y)
+        g = soft_edge(R, above_horizon(R, out[k], flat, z), shadow.softness)
+        g = R(1) if free[k] != 0 else g
+        g = g if z > R(0) else R(0)
+        sound = p[k] >= R(0) and flat < R(2) and z < R(2)
+        out[k] = g if sound else R(np.nan)
+
+
+@njit(**LEAN)
+def look_up_block(R, cloth, shadow, uv, begin, cells, p, q, threads, tops, sets, free, angle):
+    """What `horizon_block` asks about as many places from `begin` on as `p` holds, all (b,) but
+    cells (6, b); and with it the thread and its tangent angle there."""
+    split_block(R, cloth, uv, begin, cells, p, q)
+    for k in range(p.size):
+        cells[4, k], cells[5, k] = split_table(shadow.table, uv[begin + k, 0], uv[begin + k, 1])
+    for k in range(p.size):
+        i, j = cells[0, k], cells[1, k]
+        which, thread, _, _, psi0, _ = thread_at(
+            R, cloth, i, j, cells[2, k], cells[3, k], p[k], q[k]
+        )
+        sets[k], threads[k], tops[k], angle[k] = which, thread, cloth.grid[i, j], psi0
+        free[k] = which == GAP or cloth.pile[thread] != 0
+
+
+@njit(**LEAN)
+def _lit_one_by_one(R, cloth, shadow, uv, begin, wi, out):
+    """`lit` at as many places from `begin` on as `out` holds."""
+    for k in range(out.size):
+        u, v = uv[begin + k, 0], uv[begin + k, 1]
+        x, y, z = wi[0, begin + k], wi[1, begin + k], wi[2, begin + k]
+        which, thread, s, w, _, length = find(R, cloth, u, v)
+        out[k] = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
+
+
 @njit(parallel=True, **KERNEL)
-def lit_all(R, cloth, shadow, uv, wi, out):  # type: ignore[no-untyped-def]
-    """`lit` at weave coordinates uv (n, 2) float64 for light wi (n, 3), into out (n,)."""
+def lit_all(R, cloth, shadow, uv, wi, out):
+    """`lit` at weave coordinates uv (n, 2) float64 for light wi (3, n), into out (n,)."""
     n = uv.shape[0]
-    block = 1024
-    for b in prange((n + block - 1) // block):
-        for k in range(b * block, min(n, (b + 1) * block)):
-            which, thread, s, w, _, length = find(R, cloth, uv[k, 0], uv[k, 1])
-            out[k] = lit(
-                R, cloth, shadow, uv[k, 0], uv[k, 1], which, thread, s, w, length,
-                wi[k, 0], wi[k, 1], wi[k, 2],
+    for b in prange((n + BLOCK - 1) // BLOCK):
+        begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
+        found = out[begin : begin + size]
+        if shadow.method != HORIZON:
+            _lit_one_by_one(R, cloth, shadow, uv, begin, wi, found)
+        else:
+            ints = np.empty((12, size), np.int32)
+            reals = np.empty((5, size), out.dtype)
+            p, q = reals[0], reals[1]
+            threads, tops, sets, free = ints[6], ints[7], ints[8], ints[9]
+            look_up_block(
+                R, cloth, shadow, uv, begin, ints[:6], p, q, threads, tops, sets, free, reals[2]
+            )
+            horizon_block(
+                R, cloth, shadow, ints[:6], p, q, tops, sets, free, wi, begin, ints[10:],
+                reals[2:], found,
             )  # fmt: skip
 
 
@@ -276,5 +335,5 @@ def shadowing(
                 f"{int(np.argmax(bad))}",
             )
     out = np.empty(len(uv), real)
-    lit_all(real, cloth, shadow, uv, light, out)
+    lit_all(real, cloth, shadow, uv, np.ascontiguousarray(light.T), out)
     return out

@@ -26,18 +26,21 @@ from fabricusd.appearance.accuracy import choose_rule
 from fabricusd.appearance.blocks import BLOCK
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.far import far_values
+from fabricusd.appearance.law import (
+    CONSERVING_ONLY,
+    FAR,
+    PUBLISHED_ONLY,
+    THREAD,
+    SurfaceLaw,
+    conserving_level_value,
+    law_density,
+    law_direction,
+    surface_law,
+)
 from fabricusd.appearance.levels import point_values
+from fabricusd.appearance.multiple import conserving_value
 from fabricusd.appearance.real import KERNEL
 from fabricusd.appearance.shadow import METHODS, Shadow, compile_shadow, lit_all
-from fabricusd.appearance.surface_sampling import (
-    SamplingTables,
-    far_density,
-    far_direction,
-    point_density,
-    point_direction,
-    sampling_tables,
-)
-from fabricusd.appearance.surface_tables import SurfaceTables, surface_tables
 from fabricusd.appearance.weave import WeaveHit, lookup
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -72,10 +75,11 @@ def evaluate(
     shadow: str = "none",
     *,
     max_error: float | None = None,
+    multiple: bool = True,
 ) -> Floats:
     """(n, 3) radiance per unit `L_i dwi` towards wo, cosine included.
 
-    wi, wo : (n, 3) unit vectors in the surface frame, or (3,) for all
+    wi, wo : (n, 3) unit vectors in the surface frame, or one (3,) for all
     uv : (n, 2) weave coordinates in threads (ends along U, picks along V), or (2,) for all; asked
         for at levels `weave` and `thread`
     level : one of LEVELS
@@ -83,17 +87,16 @@ def evaluate(
         none of them
     max_error : bound on the mean relative error of the quadrature over the curves, see
         `accuracy.choose_rule`; None takes `quadrature.default_rule`
+    multiple : whether `conserving` cloth scatters light more than once
 
     Raises FabricError for directions that are not finite unit vectors, an unknown level or
     shadowing, a place that is missing or not finite, a bound that cannot be met.
     """
-    i, o = _pairs(wi, wo)
-    tables, _ = _prepared(fabric, max_error)
+    i, o = _pairs(wi, wo, uv if level != "far" else None)
     hit, places = _places(fabric, uv, level, i.shape[1])
     _check_shadow(shadow)
-    out = np.empty_like(i)
-    _evaluate(tables, hit, level, i, o, out)
-    if hit is not None and shadow != "none":
+    out = _evaluate(_law(fabric, max_error, multiple), level, hit, i, o)
+    if level != "far" and shadow != "none":
         out *= _lit(fabric, shadow, level, places, i)
     return np.ascontiguousarray(out.T)
 
@@ -110,13 +113,10 @@ def pdf(
 
     Arguments and errors as for `evaluate`.
     """
-    i, o = _pairs(wi, wo)
-    tables, sampling = _prepared(fabric, None)
+    i, o = _pairs(wi, wo, uv if level != "far" else None)
     hit, _ = _places(fabric, uv, level, i.shape[1])
     _check_shadow(shadow)
-    out = np.empty(i.shape[1])
-    _density(tables, sampling, hit, i, o, out)
-    return out
+    return _density(_law(fabric), level, hit, i, o)
 
 
 def sample(
@@ -141,23 +141,35 @@ def sample(
     if bad:
         raise FabricError("u", f"holds {bad} number(s) outside 0 to 1")
     o = _repeated(_directions("wo", wo), len(numbers), "wo")
-    tables, sampling = _prepared(fabric, None)
     hit, places = _places(fabric, uv, level, len(numbers))
     _check_shadow(shadow)
-    i, f, p = np.empty_like(o), np.empty_like(o), np.empty(o.shape[1])
-    _draw(tables, sampling, hit, o, np.ascontiguousarray(numbers.T), i)
-    _evaluate(tables, hit, level, i, o, f)
-    _density(tables, sampling, hit, i, o, p)
-    if hit is not None and shadow != "none":
+    law = _law(fabric)
+    i = np.empty_like(o)
+    real: Any = np.float64
+    turned = np.ascontiguousarray(numbers.T)
+    _draw(real, *law, LEVELS.index(level), hit.set, hit.thread, hit.angle, o, turned, i)
+    f = _evaluate(law, level, hit, i, o)
+    if level != "far" and shadow != "none":
         f *= _lit(fabric, shadow, level, places, i)
+    p = _density(law, level, hit, i, o)
     return Sample(np.ascontiguousarray(i.T), np.ascontiguousarray(f.T), p)
 
 
+def _density(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats) -> Floats:
+    real: Any = np.float64
+    out = np.empty(wi.shape[1])
+    _densities(real, *law, LEVELS.index(level), hit.set, hit.thread, hit.angle, wi, wo, out)
+    return out
+
+
+def _law(fabric: Fabric, max_error: float | None = None, multiple: bool = True) -> SurfaceLaw:
+    return _kept_law(fabric, max_error, multiple)
+
+
 @lru_cache(maxsize=32)
-def _prepared(fabric: Fabric, max_error: float | None) -> tuple[SurfaceTables, SamplingTables]:
+def _kept_law(fabric: Fabric, max_error: float | None, multiple: bool) -> SurfaceLaw:
     rule = None if max_error is None else choose_rule(fabric, max_error)
-    tables = surface_tables(fabric, rule=rule)
-    return tables, sampling_tables(fabric, tables)
+    return surface_law(fabric, precision=np.float64, rule=rule, multiple=multiple)
 
 
 @lru_cache(maxsize=32)
@@ -173,7 +185,7 @@ def _lit(fabric: Fabric, method: str, level: str, uv: Floats, wi: Floats) -> Flo
     cloth, shadow = _shadowed(fabric, method, level)
     out = np.empty(len(uv))
     real: Any = np.float64
-    lit_all(real, cloth, shadow, uv, np.ascontiguousarray(wi.T), out)
+    lit_all(real, cloth, shadow, uv, wi, out)
     return out
 
 
@@ -184,12 +196,13 @@ def _check_shadow(method: str) -> None:
 
 def _places(
     fabric: Fabric, uv: ArrayLike | None, level: str, count: int
-) -> tuple[WeaveHit | None, Floats]:
-    """What lies under each of `count` places, None at level `far`; and the places, (count, 2)."""
+) -> tuple[WeaveHit, Floats]:
+    """What lies under each of `count` places, and the places, (count, 2); for `far` any one."""
     if level not in LEVELS:
         raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
     if level == "far":
-        return None, np.empty((0, 2))
+        anywhere = np.zeros((1, 2))
+        return lookup(_cloth(fabric), anywhere), anywhere
     if uv is None:
         raise FabricError("uv", f"is missing; level {level} asks for weave coordinates, (n, 2)")
     places = np.atleast_2d(np.asarray(uv, np.float64))
@@ -232,52 +245,32 @@ def _repeated(w: Floats, count: int, name: str) -> Floats:
     return np.repeat(w, count, axis=1)
 
 
-def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Floats, Floats]:
-    """Both directions as (3, n), one of them repeated if it is single."""
+def _pairs(wi: ArrayLike, wo: ArrayLike, uv: ArrayLike | None) -> tuple[Floats, Floats]:
+    """Both directions as (3, n), a single one repeated for all of the other's or of the places."""
     i, o = _directions("wi", wi), _directions("wo", wo)
-    n = i.shape[1] if o.shape[1] == 1 else o.shape[1]
+    places = 1 if uv is None else len(np.atleast_2d(np.asarray(uv)))
+    n = next((k for k in (i.shape[1], o.shape[1], places) if k != 1), 1)
     return _repeated(i, n, "wi"), _repeated(o, n, "wo")
 
 
-def _evaluate(
-    tables: SurfaceTables, hit: WeaveHit | None, level: str, wi: Floats, wo: Floats, out: Floats
-) -> None:
+def _evaluate(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats) -> Floats:
+    """(3, n) values; the published models by the vectorised loops, the rest one by one."""
     real: Any = np.float64
-    if hit is None:
-        far_all(real, tables, wi, wo, out)
-        return
-    across = level == "thread"
-    points_all(real, tables, across, hit.set, hit.thread, hit.angle, hit.across, wi, wo, out)
-
-
-def _density(
-    tables: SurfaceTables,
-    sampling: SamplingTables,
-    hit: WeaveHit | None,
-    wi: Floats,
-    wo: Floats,
-    out: Floats,
-) -> None:
-    real: Any = np.float64
-    if hit is None:
-        _far_densities(real, sampling, wi, wo, out)
-    else:
-        _point_densities(real, tables, sampling, hit.set, hit.thread, hit.angle, wi, wo, out)
-
-
-def _draw(
-    tables: SurfaceTables,
-    sampling: SamplingTables,
-    hit: WeaveHit | None,
-    wo: Floats,
-    u: Floats,
-    wi: Floats,
-) -> None:
-    real: Any = np.float64
-    if hit is None:
-        _far_directions(real, sampling, wo, u, wi)
-    else:
-        _point_directions(real, tables, sampling, hit.set, hit.thread, hit.angle, wo, u, wi)
+    out = np.zeros_like(wi)
+    if law.kind != CONSERVING_ONLY:
+        if level == "far":
+            far_all(real, law.published, wi, wo, out)
+        else:
+            points_all(
+                real, law.published, level == "thread",
+                hit.set, hit.thread, hit.angle, hit.across, wi, wo, out,
+            )  # fmt: skip
+    if law.kind != PUBLISHED_ONLY:
+        _add_conserving(
+            real, law.conserving, LEVELS.index(level),
+            hit.set, hit.thread, hit.angle, hit.across, wi, wo, out,
+        )  # fmt: skip
+    return out
 
 
 @njit(**KERNEL, parallel=True)
@@ -298,34 +291,59 @@ def points_all(R, tables, across_too, sets, threads, psi0, w, wi, wo, out):  # t
 
 
 @njit(**KERNEL, parallel=True)
-def _far_densities(R, sampling, wi, wo, out):  # type: ignore[no-untyped-def]
-    for k in prange(out.size):
-        out[k] = far_density(
-            R, sampling, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
-        )
+def _add_conserving(R, tables, level, sets, threads, psi0, w, wi, wo, out):  # type: ignore[no-untyped-def]
+    for k in prange(wi.shape[1]):
+        r, g, b = R(0), R(0), R(0)
+        if level == FAR:
+            r, g, b = conserving_value(
+                R, tables, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
+            )
+        elif sets[k] < 2:
+            r, g, b = conserving_level_value(
+                R, tables, level == THREAD, sets[k], threads[k], psi0[k], w[k],
+                wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k],
+            )  # fmt: skip
+        out[0, k] += r
+        out[1, k] += g
+        out[2, k] += b
+
+
+# A parallel loop does not take a tuple of tuples: the law travels in parts.
 
 
 @njit(**KERNEL, parallel=True)
-def _far_directions(R, sampling, wo, u, wi):  # type: ignore[no-untyped-def]
-    for k in prange(u.shape[1]):
-        wi[0, k], wi[1, k], wi[2, k] = far_direction(
-            R, sampling, wo[0, k], wo[1, k], wo[2, k], u[0, k], u[1, k], u[2, k]
-        )
+def _densities(R, kind, a, b, c, d, level, sets, threads, psi0, wi, wo, out):  # type: ignore[no-untyped-def]
+    n = out.size
+    for chunk in prange((n + BLOCK - 1) // BLOCK):
+        first, last = chunk * BLOCK, min(n, (chunk + 1) * BLOCK)
+        _chunk_densities(R, kind, a, b, c, d, level, sets, threads, psi0, wi, wo, out, first, last)
 
 
-@njit(**KERNEL, parallel=True)
-def _point_densities(R, tables, sampling, sets, threads, psi0, wi, wo, out):  # type: ignore[no-untyped-def]
-    for k in prange(out.size):
-        out[k] = point_density(
-            R, tables, sampling, sets[k], threads[k], psi0[k],
+@njit(**KERNEL)
+def _chunk_densities(R, kind, a, b, c, d, level, sets, threads, psi0, wi, wo, out, first, last):  # type: ignore[no-untyped-def]
+    law = SurfaceLaw(kind, a, b, c, d)
+    for k in range(first, last):
+        x = k if level != FAR else 0
+        out[k] = law_density(
+            R, law, level, sets[x], threads[x], psi0[x],
             wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k],
         )  # fmt: skip
 
 
 @njit(**KERNEL, parallel=True)
-def _point_directions(R, tables, sampling, sets, threads, psi0, wo, u, wi):  # type: ignore[no-untyped-def]
-    for k in prange(u.shape[1]):
-        wi[0, k], wi[1, k], wi[2, k] = point_direction(
-            R, tables, sampling, sets[k], threads[k], psi0[k],
+def _draw(R, kind, a, b, c, d, level, sets, threads, psi0, wo, u, wi):  # type: ignore[no-untyped-def]
+    n = wi.shape[1]
+    for chunk in prange((n + BLOCK - 1) // BLOCK):
+        first, last = chunk * BLOCK, min(n, (chunk + 1) * BLOCK)
+        _chunk_draw(R, kind, a, b, c, d, level, sets, threads, psi0, wo, u, wi, first, last)
+
+
+@njit(**KERNEL)
+def _chunk_draw(R, kind, a, b, c, d, level, sets, threads, psi0, wo, u, wi, first, last):  # type: ignore[no-untyped-def]
+    law = SurfaceLaw(kind, a, b, c, d)
+    for k in range(first, last):
+        x = k if level != FAR else 0
+        wi[0, k], wi[1, k], wi[2, k] = law_direction(
+            R, law, level, sets[x], threads[x], psi0[x],
             wo[0, k], wo[1, k], wo[2, k], u[0, k], u[1, k], u[2, k],
         )  # fmt: skip

@@ -75,13 +75,3 @@ def surface_tables(
         gap=precision(coverage(fabric).gap),
         overlap_precision=precision(2.0 / width**2),
     )
-
-
-def is_conserving(fabric: Fabric) -> bool:
-    """Whether any thread of `fabric` is evaluated by the `conserving` model."""
-    return any(fabric.model_of(t) == "conserving" for t in fabric.thread_list)
-
-
-def is_published(fabric: Fabric) -> bool:
-    """Whether any thread of `fabric` is evaluated by a published model."""
-    return any(fabric.model_of(t) != "conserving" for t in fabric.thread_list)

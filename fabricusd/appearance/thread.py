@@ -198,7 +198,7 @@ def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Floats, Floats]:
 
 
 @njit(**KERNEL)
-def _constants(row):  # type: ignore[no-untyped-def]
+def _constants(row):
     """The row's columns before the transmission table."""
     return (
         row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9],
@@ -207,7 +207,7 @@ def _constants(row):  # type: ignore[no-untyped-def]
 
 
 @njit(**KERNEL)
-def _published_block(R, thesis, row, ix, iy, iz, ox, oy, oz, r, g, b):  # type: ignore[no-untyped-def]
+def _published_block(R, thesis, row, ix, iy, iz, ox, oy, oz, r, g, b):
     for k in range(ix.size):
         cos_i, cos_o, cos_half = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
         surface, volume = published_terms(R, thesis, row, ix[k], cos_i, ox[k], cos_o, cos_half)
@@ -217,7 +217,7 @@ def _published_block(R, thesis, row, ix, iy, iz, ox, oy, oz, r, g, b):  # type: 
 
 
 @njit(**KERNEL)
-def _conserving_block(R, row, through, ix, iy, iz, ox, oy, oz, r, g, b):  # type: ignore[no-untyped-def]
+def _conserving_block(R, row, through, ix, iy, iz, ox, oy, oz, r, g, b):
     for k in range(ix.size):
         cos_i, cos_o, cos_half = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
         surface, volume = conserving_terms(R, row, through[k], ix[k], cos_i, ox[k], cos_o, cos_half)
@@ -227,7 +227,7 @@ def _conserving_block(R, row, through, ix, iy, iz, ox, oy, oz, r, g, b):  # type
 
 
 @njit(**KERNEL)
-def _through_block(R, row, iy, iz, oy, oz, out):  # type: ignore[no-untyped-def]
+def _through_block(R, row, iy, iz, oy, oz, out):
     """T(theta_i) T(theta_o)/T_max: the table look-up, which keeps the loop above from gathering."""
     for k in range(out.size):
         cos_i, cos_o, _ = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
@@ -236,7 +236,7 @@ def _through_block(R, row, iy, iz, oy, oz, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**KERNEL, parallel=True)
-def _evaluate_soa(R, row, wi, wo, out):  # type: ignore[no-untyped-def]
+def _evaluate_soa(R, row, wi, wo, out):
     n = wi.shape[1]
     constants = _constants(row)
     model = row[MODEL]
@@ -256,13 +256,13 @@ def _evaluate_soa(R, row, wi, wo, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**KERNEL, parallel=True)
-def _density_soa(R, row, wi, wo, out):  # type: ignore[no-untyped-def]
+def _density_soa(R, row, wi, wo, out):
     for k in prange(out.size):
         out[k] = density(R, row, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k])
 
 
 @njit(**KERNEL, parallel=True)
-def _sample_soa(R, row, wo, u, wi):  # type: ignore[no-untyped-def]
+def _sample_soa(R, row, wo, u, wi):
     for k in prange(u.shape[1]):
         x, y, z = sample_direction(R, row, wo[0, k], wo[1, k], wo[2, k], u[0, k], u[1, k], u[2, k])
         wi[0, k], wi[1, k], wi[2, k] = x, y, z

@@ -76,7 +76,7 @@ def surface_albedo(gamma_surface: float, ior: float, surface_gain: float) -> NDA
     most 1: `integral f_surface cos(theta_o) dwo` at sqrt(cos theta) uniform from 0 to 1.
     """
     row = np.zeros(column.COLUMNS)
-    ior = min(ior, LARGEST_IOR)
+    ior, gamma_surface = min(ior, LARGEST_IOR), max(gamma_surface, NARROWEST)
     row[column.IOR_EXCESS] = (ior - 1.0) * (ior + 1.0)
     row[column.SURFACE_GAIN] = surface_gain
     row[column.GAMMA_SURFACE] = gamma_surface
@@ -92,7 +92,7 @@ def surface_albedo(gamma_surface: float, ior: float, surface_gain: float) -> NDA
 
 
 @njit(**KERNEL)
-def _integrate_surface(row, x, x_weight, phi, phi_weight, out):  # type: ignore[no-untyped-def]
+def _integrate_surface(row, x, x_weight, phi, phi_weight, out):
     """`out[k]` = E at sqrt(cos theta) = k/(n-1); the nodes follow the lobe, however narrow."""
     R = np.float64
     reach = 2.0 * _REACH * row[column.GAMMA_SURFACE]

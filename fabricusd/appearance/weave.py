@@ -16,13 +16,18 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.coverage import GAP, WARP, WEFT, coverage
-from fabricusd.appearance.real import INLINE, KERNEL
+from fabricusd.appearance.coverage import GAP, coverage
+from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave
 
 FARTHEST = 2.0**52
 """Weave coordinates beyond this have no fraction left in float64."""
+
+
+BLOCK = 512
+"""Places that a worker looks up at a time: what it notes about them stays in its nearest cache."""
 
 
 class WeaveHit(NamedTuple):
@@ -50,20 +55,37 @@ class WeaveHit(NamedTuple):
 
 
 @njit(**INLINE)
-def wrap(x, period):  # type: ignore[no-untyped-def]
+def wrap(x, period):
     """Whole number `x` (float64) modulo `period`, non-negative, as an integer."""
     p = float(period)
-    r = x - p * math.floor(x / p)
+    r = x - p * np.floor(x / p)
     # The quotient is rounded: one period off either way where x is a multiple of it.
-    if r < 0.0:
-        r += p
-    if r >= p:
-        r -= p
-    return int(r)
+    r = r + p if r < 0.0 else r
+    r = r - p if r >= p else r
+    return np.int32(r)
 
 
 @njit(**INLINE)
-def piece_of(R, cloth, thread, s):  # type: ignore[no-untyped-def]
+def split(R, cloth, u, v):
+    """Weave coordinates, float64, as what `thread_at` asks for: (i, j, end, pick, x, y).
+
+    i, j : cell of the grid; end, pick : places in the sequences of threads; x, y : in the cell, of
+    precision R, NaN where the coordinates are not finite or have no fraction.
+    """
+    sound = abs(u) <= FARTHEST and abs(v) <= FARTHEST
+    end, pick = np.floor(u) if sound else 0.0, np.floor(v) if sound else 0.0
+    return (
+        wrap(end, cloth.grid.shape[0]),
+        wrap(pick, cloth.grid.shape[1]),
+        wrap(end, cloth.sequence_length[WARP]),
+        wrap(pick, cloth.sequence_length[WEFT]),
+        R(u - end) if sound else R(np.nan),
+        R(v - pick),
+    )
+
+
+@njit(**INLINE)
+def piece_of(R, cloth, thread, s):
     """Index of the linear piece of the thread's curve at `s`, the later one at a jump.
 
     Counting every start up to `s` beats a search on curves of a few pieces: it has no branches to
@@ -82,7 +104,7 @@ def piece_of(R, cloth, thread, s):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def angle_on(R, cloth, thread, s):  # type: ignore[no-untyped-def]
+def angle_on(R, cloth, thread, s):
     """Tangent angle [rad] of thread type `thread` at `s`."""
     k = piece_of(R, cloth, thread, s)
     return (
@@ -92,7 +114,7 @@ def angle_on(R, cloth, thread, s):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def rise_on(R, cloth, thread, k, s):  # type: ignore[no-untyped-def]
+def rise_on(R, cloth, thread, k, s):
     """Height at `s` on linear piece `k` of the thread's curve, in run lengths.
 
     Minus the integral of tan(angle), in closed form as `curve._rise`.
@@ -112,7 +134,7 @@ def rise_on(R, cloth, thread, k, s):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def height_on(R, cloth, thread, s, length):  # type: ignore[no-untyped-def]
+def height_on(R, cloth, thread, s, length):
     """Height [m] of the thread's axis at `s` on a visible run of `length` [m]; 0 on pile."""
     if cloth.pile[thread] != 0:
         return R(0)
@@ -120,26 +142,18 @@ def height_on(R, cloth, thread, s, length):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def crown_on(R, cloth, thread_set, thread, w):  # type: ignore[no-untyped-def]
+def crown_on(R, cloth, thread_set, thread, w):
     """Height [m] that the round of the thread adds at `w`: half the thickness, sqrt(1 - w^2)."""
     return cloth.half_thickness[thread_set, thread] * math.sqrt(max(R(0), R(1) - w * w))
 
 
 @njit(**INLINE)
-def find(R, cloth, u, v):  # type: ignore[no-untyped-def]
-    """Thread under weave coordinates (u, v), float64.
-
-    Returns (set, thread, s, w, angle, length): `length` is the visible run's own length [m], which
-    `height_on` asks for. In a gap the set is GAP and the rest 0. Coordinates that are not finite,
-    or that have no fraction, come back as set WEFT with NaN everywhere, so that nothing hides them.
-    """
+def thread_at(R, cloth, i, j, end, pick, x, y):
+    """The thread at a place that `split` has found; the answer is `find`'s."""
     none = R(0)
-    if not (abs(u) <= FARTHEST and abs(v) <= FARTHEST):
+    if not x >= none:
         nan = R(np.nan)
         return WEFT, 0, nan, nan, nan, nan
-    end, pick = math.floor(u), math.floor(v)
-    i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
-    x, y = R(u - end), R(v - pick)
     # Selections instead of branches from here: which thread a point meets cannot be predicted.
     top = int(cloth.grid[i, j])
     over = x if top == WARP else y
@@ -158,28 +172,55 @@ def find(R, cloth, u, v):  # type: ignore[no-untyped-def]
     s = max(R(0), min((place + seen) / cells, cloth.last))
     # b, and with it w, runs along -U on the warp.
     w = max(R(-1), min(-w if hit == WARP else w, R(1)))
-    count = end if hit == WARP else pick
-    thread = int(cloth.sequence[hit, wrap(count, cloth.sequence_length[hit])])
+    thread = int(cloth.sequence[hit, end if hit == WARP else pick])
     if not (on_top or beside):
         return GAP, 0, none, none, none, none
     length = cells * share * cloth.pitch[1 - hit]
     return hit, thread, s, w, angle_on(R, cloth, thread, s), length
 
 
+@njit(**INLINE)
+def find(R, cloth, u, v):
+    """Thread under weave coordinates (u, v), float64.
+
+    Returns (set, thread, s, w, angle, length): `length` is the visible run's own length [m], which
+    `height_on` asks for. In a gap the set is GAP and the rest 0. Coordinates that are not finite,
+    or that have no fraction, come back as set WEFT with NaN everywhere, so that nothing hides them.
+    """
+    i, j, end, pick, x, y = split(R, cloth, u, v)
+    return thread_at(R, cloth, i, j, end, pick, x, y)
+
+
+@njit(**LEAN)
+def split_block(R, cloth, uv, begin, cells, x, y):
+    """`split` of as many places from `begin` on as cells (4, b) int32, x and y (b,) hold.
+
+    A loop of its own, which LLVM vectorises; the lookup behind it is all gathers.
+    """
+    for k in range(x.size):
+        cells[0, k], cells[1, k], cells[2, k], cells[3, k], x[k], y[k] = split(
+            R, cloth, uv[begin + k, 0], uv[begin + k, 1]
+        )
+
+
 @njit(parallel=True, **KERNEL)
-def find_all(R, cloth, uv, sets, threads, s, w, angle, length):  # type: ignore[no-untyped-def]
+def find_all(R, cloth, uv, sets, threads, s, w, angle, length):
     """`find` at each of uv (n, 2) float64, into the arrays behind it."""
     n = uv.shape[0]
-    block = 4096
-    for b in prange((n + block - 1) // block):
-        for k in range(b * block, min(n, (b + 1) * block)):
-            sets[k], threads[k], s[k], w[k], angle[k], length[k] = find(
-                R, cloth, uv[k, 0], uv[k, 1]
+    for b in prange((n + BLOCK - 1) // BLOCK):
+        begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
+        cells = np.empty((4, size), np.int32)
+        x, y = np.empty(size, s.dtype), np.empty(size, s.dtype)
+        split_block(R, cloth, uv, begin, cells, x, y)
+        for q in range(size):
+            k = begin + q
+            sets[k], threads[k], s[k], w[k], angle[k], length[k] = thread_at(
+                R, cloth, cells[0, q], cells[1, q], cells[2, q], cells[3, q], x[q], y[q]
             )
 
 
 @njit(parallel=True, **KERNEL)
-def heights_all(R, cloth, sets, threads, s, w, length, height, crown):  # type: ignore[no-untyped-def]
+def heights_all(R, cloth, sets, threads, s, w, length, height, crown):
     """`height_on` and `crown_on` at each hit, 0 in gaps, into `height` and `crown`."""
     for k in prange(sets.shape[0]):
         if sets[k] == GAP:

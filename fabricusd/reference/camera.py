@@ -97,11 +97,12 @@ def _filter_offset(kind, u, v):
 
 
 @njit(**LEAN)
-def camera_rays(lens, width, pixels, first, samples, seed, rays, cone):
+def camera_rays(lens, width, pixels, first, samples, seed, rays, cone, path_pixel, path_sample):
     """Write the rays of `samples` samples of each of `pixels`, from sample `first` on.
 
     pixels : (n,) int32 - row times `width` plus column; path `k` is sample `k % samples` of pixel
     `k // samples`. rays : packets; cone : (2, n samples) - width and spread of each ray.
+    path_pixel, path_sample : (n samples,) uint32 - the counters of each path's random numbers.
     """
     whole = rays.view(np.uint32)
     count = pixels.shape[0] * samples
@@ -109,6 +110,7 @@ def camera_rays(lens, width, pixels, first, samples, seed, rays, cone):
         p, lane = k >> 4, k & 15
         pixel = pixels[k // samples]
         sample = np.uint32(first + k % samples)
+        path_pixel[k], path_sample[k] = np.uint32(pixel), sample
         u0, u1, u2, u3 = four_uniform(np.uint32(pixel), sample, np.uint32(0), seed)
         v0, v1 = R(0.5), R(0.5)
         if lens.filter == 2:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, LEAN
+from fabricusd.appearance.real import INLINE
 
 R = np.float32
 _U = np.uint32
@@ -24,7 +24,7 @@ def _mix(x, y, z, w):
     return x, y, z, w
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def pcg4d(a, b, c, d):
     """Hash four uint32 into four uint32."""
     x = _U(_U(a) * _U(1664525) + _U(1013904223))
@@ -45,7 +45,7 @@ def unit_float(x):
     return R(np.int32(x >> _U(8))) * R(5.9604645e-08)
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def four_uniform(pixel, sample, dimension, seed):
     """Four independent float32 in [0, 1)."""
     x, y, z, w = pcg4d(pixel, sample, dimension, seed)

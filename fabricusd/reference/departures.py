@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import LEAN
+from fabricusd.appearance.real import INLINE, LEAN
 from fabricusd.reference.arrivals import LIGHT_ONLY, MIS, SURFACE_ONLY, UNIFORM
 from fabricusd.reference.embree import (
     DX,
@@ -132,7 +132,7 @@ def depart(estimator, count, max_depth, hits, tags, film, shadow_rays, shadow, s
     result[0], result[1] = shadows, spawned
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _shadow_ray(k, h, hits, rays):
     p, lane = k >> 4, k & 15
     start = FRONT if hits[WI + 2, h] >= R(0) else BACK
@@ -147,7 +147,7 @@ def _shadow_ray(k, h, hits, rays):
     rays.view(np.uint32)[p, GEOMETRY, lane] = MISS
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _new_ray(k, start, h, dx, dy, dz, hits, rays):
     p, lane = k >> 4, k & 15
     rays[p, OX, lane], rays[p, OY, lane] = hits[start, h], hits[start + 1, h]
@@ -157,7 +157,7 @@ def _new_ray(k, start, h, dx, dy, dz, hits, rays):
     rays.view(np.uint32)[p, GEOMETRY, lane] = MISS
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _world(hits, h, x, y, z):
     return (
         x * hits[U, h] + y * hits[V, h] + z * hits[N, h],
@@ -166,7 +166,7 @@ def _world(hits, h, x, y, z):
     )
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _go_straight(k, h, hits, tags, rays, lanes, lane_tags):
     """The same ray behind the surface, as if that were not there."""
     dx, dy, dz = _world(hits, h, -hits[WO, h], -hits[WO + 1, h], -hits[WO + 2, h])
@@ -178,7 +178,7 @@ def _go_straight(k, h, hits, tags, rays, lanes, lane_tags):
     lane_tags[0, k], lane_tags[1, k] = tags[PATH, h], tags[DEPTH, h]
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _scatter(estimator, k, h, hits, tags, rays, lanes, lane_tags, result):
     """The path's next ray at place `k`; 1 if there is one."""
     x, y, z = hits[GO, h], hits[GO + 1, h], hits[GO + 2, h]

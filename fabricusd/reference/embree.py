@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import ctypes
 import glob
+import importlib.metadata
 import importlib.util
 import os
-import sys
 from typing import Any
 
 import numpy as np
@@ -179,7 +179,7 @@ class Accelerator:
     def version(self) -> str:
         """Which Embree answers, and whether it has packets of 16 in hardware."""
         if _LIBRARY is None:
-            return f"embreex {getattr(sys.modules.get('embreex'), '__version__', '?')}"
+            return f"embreex {importlib.metadata.version('embreex')}"
         number = _LIBRARY.rtcGetDeviceProperty(self._device, _VERSION)
         native = bool(_LIBRARY.rtcGetDeviceProperty(self._device, _NATIVE16))
         words = f"{number // 10000}.{number // 100 % 100}.{number % 100}"
@@ -203,7 +203,7 @@ class Accelerator:
         _occluded_packets(self._scene, self._valid.ctypes.data, 0, rays, count)
 
     def __del__(self) -> None:
-        if _LIBRARY is not None and getattr(self, "_scene", 0):
+        if _LIBRARY is not None and getattr(self, "_scene", False):
             _LIBRARY.rtcReleaseScene(self._scene)
             _LIBRARY.rtcReleaseDevice(self._device)
 

@@ -8,6 +8,7 @@ the vectorised loops, which want directions of their own, side by side.
 from __future__ import annotations
 
 import threading
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -16,25 +17,26 @@ from numpy.typing import NDArray
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.coverage import GAP
 from fabricusd.appearance.far import far_values
-from fabricusd.appearance.levels import point_values
-from fabricusd.appearance.real import LEAN
-from fabricusd.appearance.shadow import NONE, Shadow, compile_shadow, lit
-from fabricusd.appearance.surface_sampling import (
-    SamplingTables,
-    far_density,
-    far_direction,
-    point_density,
-    point_direction,
-    sampling_tables,
+from fabricusd.appearance.law import (
+    PUBLISHED_ONLY,
+    SurfaceLaw,
+    law_density,
+    law_direction,
+    law_value,
+    surface_law,
 )
-from fabricusd.appearance.surface_tables import SurfaceTables, surface_tables
+from fabricusd.appearance.levels import point_values
+from fabricusd.appearance.real import INLINE, LEAN
+from fabricusd.appearance.shadow import NONE, Shadow, compile_shadow, lit
 from fabricusd.appearance.weave import back_of, find
 from fabricusd.fabric import Fabric
 from fabricusd.reference.embree import aligned_empty
+from fabricusd.reference.fabric_sampling import sample_far, sample_points
 from fabricusd.reference.wave import (
     CHANCE,
     F_PDF,
     FAR_LEVEL,
+    GO,
     GO_PDF,
     KEEP,
     PLACE,
@@ -73,8 +75,7 @@ class _Side:
 
     def __init__(self, fabric: Fabric, shadow: str) -> None:
         self.fabric, self.method = fabric, shadow
-        self.tables: SurfaceTables = surface_tables(fabric, precision=np.float32)
-        self.sampling: SamplingTables = sampling_tables(fabric, self.tables)
+        self.law: SurfaceLaw = surface_law(fabric, precision=np.float32)
         self._near: dict[int, tuple[CompiledFabric, Shadow]] = {}
         self._lock = threading.Lock()
 
@@ -98,37 +99,72 @@ class FabricShader:
 
     def __init__(self, fabric: Fabric, shadow: str) -> None:
         self.sides = (_Side(fabric, shadow), _Side(back_of(fabric), shadow))
-        self.gap = 0.0 if fabric.opaque else float(self.sides[0].tables.gap)
+        self.gap = 0.0 if fabric.opaque else float(self.sides[0].law.published.gap)
 
     def __call__(self, level: int, back: int, wave: Wave, first: int, last: int) -> None:
         """Shade hits `first` to `last`, all on one side at one level."""
         side = self.sides[back]
         scratch = wave.scratch or _Scratch(wave.capacity)
         wave.scratch = scratch
-        count = last - first
-        wo, wi, go, towards, onwards = scratch.views(count)
+        vectors = scratch.views(last - first)
+        wo, wi = vectors[:2]
         _gather(wave.hits, first, wo, wi)
         if level == FAR_LEVEL:
-            _sample_far(R, side.tables, side.sampling, wave.hits, first, wo, wi, go)
-            far_values(R, side.tables, wi, wo, towards)
-            far_values(R, side.tables, go, wo, onwards)
-            _finish_far(R, wave.hits, first, R(self.gap), towards, onwards)
-            return
-        cloth, shadow = side.near(level)
+            self._shade_far(side, wave.hits, first, vectors)
+        else:
+            self._shade_near(side, level, back, scratch, wave.hits, first, vectors)
+
+    def _shade_far(
+        self, side: _Side, hits: NDArray[np.float32], first: int, vectors: list[Any]
+    ) -> None:
+        wo, wi, go, towards, onwards = vectors
+        law = side.law
+        if law.kind == PUBLISHED_ONLY:
+            sample_far(
+                R, law.lobes, wo, wi, *hits[CHANCE : CHANCE + 3], go, hits[F_PDF], hits[GO_PDF],
+                first,
+            )  # fmt: skip
+            far_values(R, law.published, wi, wo, towards, 0, wo.shape[1])
+            far_values(R, law.published, go, wo, onwards, 0, wo.shape[1])
+        else:
+            none = np.zeros(wo.shape[1], np.uint8)
+            real = np.zeros(wo.shape[1], np.float32)
+            _by_law(R, law, FAR_LEVEL, hits, first, *vectors, none, none.astype(np.int32), real,
+                    real)  # fmt: skip
+        _finish_far(R, hits, first, R(self.gap), go, towards, onwards)
+
+    def _shade_near(
+        self,
+        side: _Side,
+        level: int,
+        back: int,
+        scratch: _Scratch,
+        hits: NDArray[np.float32],
+        first: int,
+        vectors: list[Any],
+    ) -> None:
+        wo, wi, go, towards, onwards = vectors
+        law, (cloth, shadow) = side.law, side.near(level)
+        count = wo.shape[1]
         found = (
             scratch.sets[:count], scratch.threads[:count], scratch.along[:count],
             scratch.across[:count], scratch.psi0[:count], scratch.length[:count],
         )  # fmt: skip
         sets, threads, _, across, psi0, _ = found
         v_sign = R(-1) if back else R(1)
-        _sample_point(
-            R, cloth, side.tables, side.sampling, v_sign, wave.hits, first, wo, wi, go, *found
-        )
-        across_too = level == THREAD_LEVEL
-        point_values(R, side.tables, across_too, sets, threads, psi0, across, wi, wo, towards)
-        point_values(R, side.tables, across_too, sets, threads, psi0, across, go, wo, onwards)
+        _look_up(R, cloth, v_sign, hits, first, *found)
+        if law.kind == PUBLISHED_ONLY:
+            sample_points(
+                R, law.published, law.lobes, sets, threads, psi0, wo, wi,
+                *hits[CHANCE : CHANCE + 3], go, hits[F_PDF], hits[GO_PDF], first,
+            )  # fmt: skip
+            near = (R, law.published, level == THREAD_LEVEL, sets, threads, psi0, across)
+            point_values(*near, wi, wo, towards, 0, count)
+            point_values(*near, go, wo, onwards, 0, count)
+        else:
+            _by_law(R, law, level, hits, first, *vectors, sets, threads, psi0, across)
         _finish_point(
-            R, cloth, shadow, v_sign, R(0 if self.gap == 0 else 1), wave.hits, first, wi, go,
+            R, cloth, shadow, v_sign, R(0 if self.gap == 0 else 1), hits, first, wi, go,
             towards, onwards, *found,
         )  # fmt: skip
 
@@ -142,21 +178,34 @@ def _gather(hits, first, wo, wi):
 
 
 @njit(**LEAN)
-def _sample_far(R, tables, sampling, hits, first, wo, wi, go):
-    """Directions and both densities at level `far`."""
+def _by_law(R, law, level, hits, first, wo, wi, go, towards, onwards, sets, threads, psi0, across):
+    """Directions, densities and values of cloth with `conserving` threads, one hit at a time."""
     for k in range(wo.shape[1]):
         h = first + k
+        which, thread, angle, w = int(sets[k]), int(threads[k]), psi0[k], across[k]
         ox, oy, oz = wo[0, k], wo[1, k], wo[2, k]
-        x, y, z = far_direction(
-            R, sampling, ox, oy, oz, hits[CHANCE, h], hits[CHANCE + 1, h], hits[CHANCE + 2, h]
-        )
+        x, y, z = law_direction(
+            R, law, level, which, thread, angle, ox, oy, oz,
+            hits[CHANCE, h], hits[CHANCE + 1, h], hits[CHANCE + 2, h],
+        )  # fmt: skip
         go[0, k], go[1, k], go[2, k] = x, y, z
-        hits[GO_PDF, h] = far_density(R, sampling, x, y, z, ox, oy, oz)
-        hits[F_PDF, h] = far_density(R, sampling, wi[0, k], wi[1, k], wi[2, k], ox, oy, oz)
+        # One call of each function, for both directions: they are large, and compiled in place.
+        for turn in range(2):
+            pdf = law_density(R, law, level, which, thread, angle, x, y, z, ox, oy, oz)
+            red, green, blue = law_value(
+                R, law, level, which, thread, angle, w, x, y, z, ox, oy, oz
+            )
+            if turn == 0:
+                hits[GO_PDF, h] = pdf
+                onwards[0, k], onwards[1, k], onwards[2, k] = red, green, blue
+                x, y, z = wi[0, k], wi[1, k], wi[2, k]
+            else:
+                hits[F_PDF, h] = pdf
+                towards[0, k], towards[1, k], towards[2, k] = red, green, blue
 
 
 @njit(**LEAN)
-def _finish_far(R, hits, first, gap, towards, onwards):
+def _finish_far(R, hits, first, gap, go, towards, onwards):
     """Values and weights; the gap lets its share of the paths go straight on."""
     keep = R(1) - gap
     for k in range(towards.shape[1]):
@@ -164,11 +213,11 @@ def _finish_far(R, hits, first, gap, towards, onwards):
         for row in range(3):
             hits[F + row, h] = towards[row, k]
         hits[KEEP, h], hits[THREAD, h] = keep, R(-1)
-        _finish(hits, h, keep, k, onwards)
+        _finish(hits, h, keep, k, go, onwards)
 
 
-@njit(**LEAN)
-def _finish(hits, h, keep, k, onwards):
+@njit(**INLINE)
+def _finish(hits, h, keep, k, go, onwards):
     pdf = hits[GO_PDF, h]
     chance = hits[CHANCE + 3, h]
     hits[F_PDF, h] *= keep
@@ -176,6 +225,7 @@ def _finish(hits, h, keep, k, onwards):
         hits[GO_PDF, h] = _STRAIGHT
         return
     hits[CHANCE + 3, h] = chance / keep
+    hits[GO, h], hits[GO + 1, h], hits[GO + 2, h] = go[0, k], go[1, k], go[2, k]
     inverse = R(1) / (pdf * keep) if pdf > R(0) else R(0)
     hits[WEIGHT, h], hits[WEIGHT + 1, h] = onwards[0, k] * inverse, onwards[1, k] * inverse
     hits[WEIGHT + 2, h] = onwards[2, k] * inverse
@@ -183,31 +233,15 @@ def _finish(hits, h, keep, k, onwards):
 
 
 @njit(**LEAN)
-def _sample_point(
-    R, cloth, tables, sampling, v_sign, hits, first, wo, wi, go,
-    sets, threads, along, across, psi0, length,
-):  # fmt: skip
-    """The thread under each hit, a direction there, and both densities."""
-    for k in range(wo.shape[1]):
+def _look_up(R, cloth, v_sign, hits, first, sets, threads, along, across, psi0, length):
+    """The thread under each hit."""
+    for k in range(sets.shape[0]):
         h = first + k
         which, thread, s, w, angle, run = find(
             R, cloth, float(hits[PLACE, h]), float(v_sign * hits[PLACE + 1, h])
         )
-        sets[k], threads[k], along[k], across[k], psi0[k], length[k] = (
-            which, thread, s, w, angle, run,
-        )  # fmt: skip
-        ox, oy, oz = wo[0, k], wo[1, k], wo[2, k]
-        x, y, z = point_direction(
-            R, tables, sampling, which, thread, angle, ox, oy, oz,
-            hits[CHANCE, h], hits[CHANCE + 1, h], hits[CHANCE + 2, h],
-        )  # fmt: skip
-        go[0, k], go[1, k], go[2, k] = x, y, z
-        hits[GO_PDF, h] = point_density(
-            R, tables, sampling, which, thread, angle, x, y, z, ox, oy, oz
-        )
-        hits[F_PDF, h] = point_density(
-            R, tables, sampling, which, thread, angle, wi[0, k], wi[1, k], wi[2, k], ox, oy, oz
-        )
+        sets[k], threads[k], along[k], across[k] = which, thread, s, w
+        psi0[k], length[k] = angle, run
 
 
 @njit(**LEAN)
@@ -227,11 +261,12 @@ def _finish_point(
         u, v = float(hits[PLACE, h]), float(v_sign * hits[PLACE + 1, h])
         light, bounce = R(1), R(1)
         if shadow.method != NONE:
-            light = lit(
+            # Light from behind the cloth has threads of its own before it.
+            light = R(1) if wi[2, k] <= R(0) else lit(
                 R, cloth, shadow, u, v, sets[k], threads[k], along[k], across[k], length[k],
                 wi[0, k], wi[1, k], wi[2, k],
             )  # fmt: skip
-            bounce = lit(
+            bounce = R(1) if go[2, k] <= R(0) else lit(
                 R, cloth, shadow, u, v, sets[k], threads[k], along[k], across[k], length[k],
                 go[0, k], go[1, k], go[2, k],
             )  # fmt: skip
@@ -239,4 +274,4 @@ def _finish_point(
             hits[F + row, h] = light * towards[row, k]
             onwards[row, k] = bounce * onwards[row, k]
         hits[KEEP, h], hits[THREAD, h] = R(1), R(threads[k])
-        _finish(hits, h, R(1), k, onwards)
+        _finish(hits, h, R(1), k, go, onwards)

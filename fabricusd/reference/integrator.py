@@ -14,13 +14,20 @@ from numpy.typing import NDArray
 from fabricusd.appearance.compiled import true_repeat
 from fabricusd.errors import FabricError
 from fabricusd.reference import arrivals
-from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, arrive, prepare
+from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, add_emission, arrive, prepare
 from fabricusd.reference.camera import Lens, camera_rays
 from fabricusd.reference.departures import depart, record_first, settle, thin_out
 from fabricusd.reference.embree import Accelerator
 from fabricusd.reference.fabric_surface import FabricShader
 from fabricusd.reference.lights import build_lights
-from fabricusd.reference.preview_surface import OPACITY, OPACITY_MAP, build_surfaces, shade_preview
+from fabricusd.reference.preview_surface import (
+    EMISSIVE,
+    EMISSIVE_MAP,
+    OPACITY,
+    OPACITY_MAP,
+    build_surfaces,
+    shade_preview,
+)
 from fabricusd.reference.scene import FabricSurface, Scene
 from fabricusd.reference.triangles import build_tables
 from fabricusd.reference.wave import (
@@ -72,6 +79,8 @@ class Tracer:
         self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
         self.lights, self.dome = build_lights(scene.lights, self.tables.centre, self.tables.radius)
         self.surfaces = build_surfaces(scene)
+        shining = self.surfaces.table[:, [EMISSIVE, EMISSIVE + 1, EMISSIVE + 2]].any(axis=1)
+        self.shines = bool((shining | (self.surfaces.table[:, EMISSIVE_MAP] >= 0)).any())
         self.max_bounces = max_bounces
         self.level = LEVELS[level]
         self.estimator = ESTIMATORS[estimator]
@@ -110,7 +119,7 @@ class Tracer:
         wave.film[:, :count] = 0.0
         camera_rays(
             lens, width, pixels, first, samples, self.seed, wave.rays,
-            wave.lanes[LANE_WIDTH : LANE_SPREAD + 1],
+            wave.lanes[LANE_WIDTH : LANE_SPREAD + 1], wave.path_pixel, wave.path_sample,
         )  # fmt: skip
         wave.lanes[LANE_BETA : LANE_BETA + 3, :count] = 1.0
         wave.lanes[LANE_PDF, :count] = -1.0
@@ -125,7 +134,7 @@ class Tracer:
                 step, self.max_bounces, self.estimator, count, wave.rays, wave.lanes,
                 wave.lane_tags, self.lights, self.dome, wave.film, wave.keys,
                 self.tables.material, self._repeats, self.tables.records, self.level,
-                pixels, samples, first, self.seed, counts,
+                wave.path_pixel, wave.path_sample, self.seed, counts,
             )  # fmt: skip
             ends = np.cumsum(counts)
             hits = int(ends[-1])
@@ -133,9 +142,11 @@ class Tracer:
                 break
             prepare(
                 step, self.estimator, count, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
-                ends - counts, self.tables.records, self.lights, self.dome, self.surfaces,
-                self.epsilon, pixels, samples, first, self.seed, wave.film, wave.hits, wave.tags,
+                ends - counts, self.tables.records, self.lights, self.dome, self.epsilon,
+                wave.path_pixel, wave.path_sample, self.seed, wave.hits, wave.tags,
             )  # fmt: skip
+            if self.shines:
+                add_emission(hits, self.surfaces, wave.hits, wave.tags, wave.film)
             for queue in np.flatnonzero(counts):
                 start, end = int(ends[queue] - counts[queue]), int(ends[queue])
                 self._shade(wave, int(queue), start, end)

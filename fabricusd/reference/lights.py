@@ -13,15 +13,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.real import LEAN, cos, sin
+from fabricusd.appearance.real import INLINE, LEAN, cos, sin
 from fabricusd.reference.dome import (
+    DENSITY,
     LUMINANCE,
     Dome,
     build_dome,
-    density_at,
+    cell_at,
     place_of,
-    radiance_at,
     sample_dome,
+    smooth_radiance,
 )
 from fabricusd.reference.scene import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE, Light
 
@@ -92,10 +93,10 @@ def _row(light: Light, centre: NDArray[np.float64]) -> NDArray[np.float64]:
 def _irradiance(row: NDArray[np.float64], dome: Dome, radius: float) -> float:
     """Rough irradiance at the scene's centre, for choosing among lights."""
     if row[KIND] == DOME:
-        h = dome.image.shape[0]
+        h, w = (int(n) for n in dome.size)
         edges = np.cos(np.pi * np.arange(h + 1) / h)
-        solid = (edges[:-1] - edges[1:])[:, None] * 2 * np.pi / dome.image.shape[1]
-        return float((dome.image @ LUMINANCE * solid).sum() / 2)
+        solid = np.repeat((edges[:-1] - edges[1:]) * 2 * np.pi / w, w)
+        return float((dome.cells[:, :3] @ LUMINANCE) @ solid / 2)
     brightness = float(row[RED : RED + 3] @ LUMINANCE)
     if row[KIND] == DISTANT:
         return brightness * (2 * math.pi * row[AREA] if row[AREA] > 0 else 1.0)
@@ -111,7 +112,7 @@ def _merge_domes(domes: list[Light]) -> Dome:
     pictures = []
     for light in domes:
         image = np.ones((1, 1, 3), np.float32) if light.image is None else light.image
-        pictures.append(np.asarray(image, np.float32) * np.float32(light.radiance))
+        pictures.append(np.asarray(image, np.float32) * np.array(light.radiance, np.float32))
     turns = [_rotation(light.frame) for light in domes]
     if len(domes) == 1:
         return build_dome(pictures[0], turns[0])
@@ -133,7 +134,7 @@ def _add_dome(total, dome):
             sine = sin(R, theta)
             x, y, z = sine * cos(R, longitude), cos(R, theta), sine * sin(R, longitude)
             column, row, _ = place_of(dome, x, y, z)
-            red, green, blue = radiance_at(dome, column, row)
+            red, green, blue = smooth_radiance(dome, column, row)
             total[j, i, 0] += red
             total[j, i, 1] += green
             total[j, i, 2] += blue
@@ -148,7 +149,7 @@ def _rotation(frame: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([x, y, z * np.sign(z @ frame[:3, 2] or 1.0)])
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def choose_light(table, u):
     """Index of the light that a uniform number chooses."""
     last = table.shape[0] - 1
@@ -159,7 +160,7 @@ def choose_light(table, u):
     return last
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _to_surface(light, px, py, pz, qx, qy, qz, cosine_of):
     """Direction, distance and pdf towards a point q of the light whose normal is `cosine_of`."""
     dx, dy, dz = qx - px, qy - py, qz - pz
@@ -174,7 +175,7 @@ def _to_surface(light, px, py, pz, qx, qy, qz, cosine_of):
     return dx, dy, dz, distance, light[CHANCE] * square / (cosine * light[AREA])
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _cone(light, ax, ay, az, one_minus_cos, u0, u1):
     """A direction in the cone around the unit axis a, uniform by solid angle, and its pdf."""
     down = u0 * one_minus_cos
@@ -190,7 +191,7 @@ def _cone(light, ax, ay, az, one_minus_cos, u0, u1):
     return x, y, z, light[CHANCE] / (R(2) * _PI * one_minus_cos)
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def sample_light(light, dome, px, py, pz, u0, u1, u2):
     """Towards one light from p, by three uniform numbers: (dx, dy, dz, distance, r, g, b, pdf).
 
@@ -201,8 +202,7 @@ def sample_light(light, dome, px, py, pz, u0, u1, u2):
     far = R(1e30)
     red, green, blue = light[RED], light[RED + 1], light[RED + 2]
     if kind == DOME:
-        dx, dy, dz, column, row, pdf = sample_dome(dome, u0, u1, u2)
-        red, green, blue = radiance_at(dome, column, row)
+        dx, dy, dz, red, green, blue, pdf = sample_dome(dome, u0, u1, u2)
         return dx, dy, dz, far, red, green, blue, pdf * light[CHANCE]
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
     if kind == DISTANT:
@@ -244,9 +244,12 @@ def sample_light(light, dome, px, py, pz, u0, u1, u2):
     return dx, dy, dz, distance, red, green, blue, pdf
 
 
-@njit(**LEAN)
-def hit_light(light, dome, px, py, pz, dx, dy, dz, reach):
-    """What a ray sees of one light nearer than `reach`: (r, g, b, pdf); pdf 0 where nothing."""
+@njit(**INLINE)
+def hit_light(light, dome, to_camera, px, py, pz, dx, dy, dz, reach):
+    """What a ray sees of one light nearer than `reach`: (r, g, b, pdf); pdf 0 where nothing.
+
+    to_camera : a dome's picture is then interpolated, and its pdf only not 0
+    """
     kind = int(light[KIND])
     none = R(0)
     red, green, blue = light[RED], light[RED + 1], light[RED + 2]
@@ -254,8 +257,11 @@ def hit_light(light, dome, px, py, pz, dx, dy, dz, reach):
         if reach < R(1e29):
             return none, none, none, none
         column, row, sine = place_of(dome, dx, dy, dz)
-        red, green, blue = radiance_at(dome, column, row)
-        return red, green, blue, density_at(dome, column, row, sine) * light[CHANCE]
+        if to_camera:
+            red, green, blue = smooth_radiance(dome, column, row)
+            return red, green, blue, R(1)
+        cell = dome.cells[cell_at(dome, column, row)]
+        return cell[0], cell[1], cell[2], cell[DENSITY] / sine * light[CHANCE]
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
     if kind == DISTANT:
         if light[AREA] <= R(0) or reach < R(1e29):
@@ -288,7 +294,7 @@ def hit_light(light, dome, px, py, pz, dx, dy, dz, reach):
     return red, green, blue, light[CHANCE] * t * t / (cosine * light[AREA])
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _hit_plane(light, kind, ax, ay, az, dx, dy, dz):
     """Distance to a rect or disk and the cosine there; distance 0 for a miss."""
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
@@ -305,7 +311,7 @@ def _hit_plane(light, kind, ax, ay, az, dx, dy, dz):
     return (t if inside else R(0)), cosine
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _hit_tube(light, ax, ay, az, dx, dy, dz):
     """Distance to the outside of a cylinder and the cosine there; distance 0 for a miss."""
     xx, xy, xz = light[X], light[X + 1], light[X + 2]

@@ -19,7 +19,8 @@ def triangulate(
     Polygons of fewer than three corners are left out.
     """
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    faces, corners = [], []
+    faces: list[NDArray[Any]] = []
+    corners: list[NDArray[Any]] = []
     for size in np.unique(counts):
         which = np.flatnonzero(counts == size)
         first = starts[which]
@@ -33,10 +34,10 @@ def triangulate(
                 fan = np.stack([turn, (turn + k) % 4, (turn + k + 1) % 4], axis=1)
                 corners.append(first[:, None] + fan)
         elif size > 4:
-            for face, start in zip(which, first, strict=True):
-                ears = _cut_ears(points[indices[start : start + size]])
-                faces.append(np.full(len(ears), face))
-                corners.append(start + ears)
+            for polygon, begin in zip(which, first, strict=True):
+                ears = _cut_ears(points[indices[begin : begin + size]])
+                faces.append(np.full(len(ears), polygon))
+                corners.append(begin + ears)
     if not faces:
         return np.zeros(0, np.int64), np.zeros((0, 3), np.int64)
     face, corner = np.concatenate(faces), np.concatenate(corners)

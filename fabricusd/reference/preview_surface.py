@@ -125,7 +125,7 @@ def texture_at(surfaces, index, u, v):
     return red, green, blue
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def opacity_at(surfaces, material, u, v):
     """Share of the light that does not go straight through."""
     row = surfaces.table[material]
@@ -137,7 +137,7 @@ def opacity_at(surfaces, material, u, v):
     return min(max(opacity, R(0)), R(1))
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def emission_at(surfaces, material, u, v):
     """Radiance that the surface itself sends out: (r, g, b)."""
     row = surfaces.table[material]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fabricusd
+from fabricusd.appearance.shadow import METHODS
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.reference.camera import build_lens, default_camera
@@ -48,7 +49,8 @@ class RenderResult:
     paths : the files written; notes : what was left out or assumed, one line each
     rays : rays traced, shadow rays included; seconds : of sampling, without reading the scene
     not_finite : values that were left out because they were not finite
-    noise : the largest relative error of a pixel's mean, estimated; complete : False after Ctrl-C
+    noise : the relative error that 99 % of the pixels' means stay below, estimated
+    complete : False after Ctrl-C
     """
 
     layers: dict[str, NDArray[np.float32]]
@@ -99,6 +101,8 @@ def render(
     result's `notes`. On Ctrl-C what is done is written, and `complete` is False.
     """
     _require_settings(width, height, spp, noise)
+    if shadow not in METHODS:
+        raise FabricError("shadow", f"is '{shadow}'; it must be one of {', '.join(METHODS)}")
     layers = tuple(dict.fromkeys(("beauty", *aovs)))
     require_aovs(layers)
     targets = _targets(out, frames)
@@ -225,10 +229,16 @@ def render_scene(
         seconds=seconds,
         not_finite=not_finite,
         samples=float(film.samples.mean()),
-        noise=float(np.quantile(error[np.isfinite(error)], 0.99)) if error.size else 0.0,
+        noise=_typical_worst(error),
         complete=complete,
         metadata=metadata,
     )
+
+
+def _typical_worst(error: NDArray[np.float64]) -> float:
+    """The relative error that 99 % of the pixels stay below; infinite where none is known."""
+    known = error[np.isfinite(error)]
+    return float(np.quantile(known, 0.99)) if known.size else float("inf")
 
 
 def _sample(
@@ -245,8 +255,9 @@ def _sample(
     """Passes over the picture until every pixel has `most` samples or is quiet enough."""
     order = pixels_along_z_curve(film.width, film.height)
     size = BATCH
-    # A small picture still makes work for every worker.
-    while size > 2048 and len(order) * min(PASS, most) < 4 * workers * size:
+    # A small picture still makes work for many workers. Their number must not matter here: rounding
+    # depends on which lane of a vector a ray falls into, and that on the batch.
+    while size > 2048 and len(order) * min(PASS, most) < 16 * size:
         size //= 2
     waves = [Wave(size, aovs=film.extra) for _ in range(workers)]
     done = 0

@@ -7,6 +7,7 @@ place inside a thread however large the UVs are.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,9 @@ from fabricusd.reference.scene import FabricSurface, Mesh, Scene
 # D1, D2 their differences along E1 and E2. RATE is both coordinates' steepness [1/m].
 P0, E1, E2, N, T, ST, D1, D2, HAND, RATE = 0, 3, 6, 9, 18, 27, 29, 31, 33, 34
 RECORD = 36
+
+CREASE = math.radians(40.0)
+"""Below it, two faces around a point are one smooth surface: a fold of up to 80 degrees."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,8 +56,8 @@ def build_tables(scene: Scene) -> TriangleTables:
         every = np.concatenate([p for p in finite if len(p)] or [np.zeros((1, 3))])
         low, high = every.min(axis=0), every.max(axis=0)
     centre = 0.5 * (low + high)
-    parts = [_mesh_tables(scene, mesh, centre) for mesh in scene.meshes]
-    parts = [p for p in parts if len(p[1])]
+    kept = [(mesh, _sound_triangles(scene, mesh)) for mesh in scene.meshes]
+    parts = [_mesh_tables(scene, mesh, keep, centre) for mesh, keep in kept if keep.any()]
     counts = np.cumsum([0] + [len(p[0]) for p in parts])
     return TriangleTables(
         centre=centre,
@@ -74,9 +78,10 @@ def _stack(parts: list[NDArray[Any]], empty: tuple[int, ...], kind: Any) -> NDAr
     return np.ascontiguousarray(np.concatenate(parts), kind)
 
 
-def _mesh_tables(scene: Scene, mesh: Mesh, centre: NDArray[np.float64]) -> tuple[Any, ...]:
-    """Points, triangles, records, UV and materials of one mesh."""
-    keep = _sound_triangles(scene, mesh)
+def _mesh_tables(
+    scene: Scene, mesh: Mesh, keep: NDArray[np.bool_], centre: NDArray[np.float64]
+) -> tuple[Any, ...]:
+    """Points, triangles, records, UV and materials of one mesh's triangles to keep."""
     tri = np.asarray(mesh.triangles)[keep]
     material = np.asarray(mesh.material, np.int32)[keep]
     points = np.where(np.isfinite(mesh.points), mesh.points, 0.0) - centre
@@ -116,7 +121,7 @@ def _sound_triangles(scene: Scene, mesh: Mesh) -> NDArray[np.bool_]:
     tri = np.asarray(mesh.triangles)
     if not len(tri):
         return np.zeros(0, bool)
-    finite = np.isfinite(mesh.points).all(axis=1)
+    finite = np.asarray(np.isfinite(mesh.points).all(axis=1))
     whole = finite[tri].all(axis=1)
     if not whole.all():
         scene.note(
@@ -144,7 +149,8 @@ def _unit(v: NDArray[Any], instead: NDArray[Any]) -> NDArray[Any]:
 def smooth_normals(points: NDArray[np.float64], tri: NDArray[Any]) -> NDArray[np.float64]:
     """(m, 3, 3) unit normals at the corners: faces around a point, weighted by their angle there.
 
-    Points at one place are one point, so a seam of the UVs is no crease.
+    Points at one place are one point, so a seam of the UVs is no crease. A corner whose mean is
+    turned away from its own face by more than CREASE keeps that face's normal, as on a box.
     """
     shared = _same_places(points)[tri]
     corners = points[tri]
@@ -160,7 +166,9 @@ def smooth_normals(points: NDArray[np.float64], tri: NDArray[Any]) -> NDArray[np
             total[:, axis] += np.bincount(
                 shared[:, k], weights=angle * face[:, axis], minlength=len(total)
             )
-    return _unit(total[shared], face[:, None])
+    mean = _unit(total[shared], face[:, None])
+    cosine = np.einsum("mkc,mc->mk", mean, face)
+    return np.where((cosine < math.cos(CREASE))[..., None], face[:, None], mean)
 
 
 def _same_places(points: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -138,7 +138,7 @@ def _picture(prim: Usd.Prim, where: str, value: Any, scene: Scene) -> NDArray[np
         scene.note(where, f"has a picture laid out as '{layout}'; it is rendered as constant")
         return None
     try:
-        picture = read_image(asset.resolvedPath or asset.path)
+        picture = read_image(asset.resolvedPath or asset.path, most=4096)
     except FabricError as error:
         scene.note(where, f"is rendered as constant: {error}")
         return None

@@ -51,6 +51,9 @@ BEAUTY_ROWS = 7
 
 FAR_LEVEL, WEAVE_LEVEL, THREAD_LEVEL = 0, 1, 2
 
+ROW_PADDING = 80
+"""Numbers between rows: five cache lines, prime to the number of a cache's sets."""
+
 
 class Wave:
     """Buffers for up to `capacity` paths, owned by one worker."""
@@ -60,16 +63,20 @@ class Wave:
         self.rays = new_packets(capacity)
         self.shadow_rays = new_packets(capacity)
         self.next_rays = new_packets(capacity)
-        self.lanes = aligned_empty((6, capacity))
-        self.next_lanes = aligned_empty((6, capacity))
-        self.lane_tags = aligned_empty((2, capacity), np.int32)
-        self.next_tags = aligned_empty((2, capacity), np.int32)
-        self.hits = aligned_empty((HIT_ROWS, capacity))
-        self.tags = aligned_empty((5, capacity), np.int32)
+        # Rows a power of two apart would all fall into the same few lines of a cache.
+        row = capacity + ROW_PADDING
+        self.lanes = aligned_empty((6, row))
+        self.next_lanes = aligned_empty((6, row))
+        self.lane_tags = aligned_empty((2, row), np.int32)
+        self.next_tags = aligned_empty((2, row), np.int32)
+        self.hits = aligned_empty((HIT_ROWS, row))
+        self.tags = aligned_empty((5, row), np.int32)
         self.keys = aligned_empty((capacity,), np.int32)
-        self.shadow = aligned_empty((4, capacity))
+        self.path_pixel = aligned_empty((capacity,), np.uint32)
+        self.path_sample = aligned_empty((capacity,), np.uint32)
+        self.shadow = aligned_empty((4, row))
         self.shadow_path = aligned_empty((capacity,), np.int32)
-        self.film = aligned_empty((FILM_ROWS if aovs else BEAUTY_ROWS, capacity))
+        self.film = aligned_empty((FILM_ROWS if aovs else BEAUTY_ROWS, row))
         self.scratch: Any = None
 
     def swap(self) -> None:

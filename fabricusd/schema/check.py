@@ -40,10 +40,10 @@ class Finding:
         return asdict(self)
 
 
-def check_prim(prim: Usd.Prim, file: str = "") -> Iterator[Finding]:
-    """The findings on one prim."""
+def check_prim(prim: Usd.Prim, file: str = "", severity: str = "") -> Iterator[Finding]:
+    """The findings on one prim; of one severity if it is given."""
     for checked in RULES:
-        if applies(checked, prim):
+        if severity in ("", checked.severity) and applies(checked, prim):
             for name, problem in run(checked, prim):
                 yield Finding(
                     checked.name, checked.severity, file, str(prim.GetPath()), name, problem

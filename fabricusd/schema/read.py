@@ -32,11 +32,11 @@ def load(source: str | os.PathLike[str]) -> Fabric:
 
 def read_fabric(prim: Usd.Prim) -> Fabric:
     """A Fabric prim -> Fabric, with its back."""
-    fabric = _read_side(prim, None)
+    fabric = read_side(prim)
     targets = prim.GetRelationship("fabric:back").GetForwardedTargets()
     if not targets:
         return fabric
-    back = _read_side(prim.GetStage().GetPrimAtPath(targets[0]), prim)
+    back = read_side(prim.GetStage().GetPrimAtPath(targets[0]), prim)
     return _replace(fabric, back=back)
 
 
@@ -46,8 +46,8 @@ def _replace(fabric: Fabric, **changes: Any) -> Fabric:
     return replace(fabric, **changes)
 
 
-def _read_side(prim: Usd.Prim, front: Usd.Prim | None) -> Fabric:
-    """One side. A back may name its front as its own back, and nothing else."""
+def read_side(prim: Usd.Prim, front: Usd.Prim | None = None) -> Fabric:
+    """A Fabric prim without its back; a back may name its `front` as its own, and nothing else."""
     _require_clean(prim)
     if front is not None:
         beyond = prim.GetRelationship("fabric:back").GetForwardedTargets()
@@ -81,9 +81,8 @@ def _read_side(prim: Usd.Prim, front: Usd.Prim | None) -> Fabric:
 
 
 def _require_clean(prim: Usd.Prim) -> None:
-    for finding in check_prim(prim):
-        if finding.severity == "error":
-            raise FabricError(f"{finding.prim} {finding.property}".strip(), finding.problem)
+    for finding in check_prim(prim, severity="error"):
+        raise FabricError(f"{finding.prim} {finding.property}".strip(), finding.problem)
 
 
 def _read_numbers(prim: Usd.Prim, table: tuple[Attribute, ...]) -> dict[str, Any]:

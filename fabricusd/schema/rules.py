@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom
 
+from fabricusd.errors import FabricError
 from fabricusd.fabric import describe_limits, within_limits
 from fabricusd.schema import attributes, weave_rows
 from fabricusd.schema.attributes import Attribute
@@ -260,6 +261,29 @@ def threads_used(prim: Usd.Prim) -> Iterator[Fault]:
     for index, thread in enumerate(thread_prims(prim)):
         if thread and index not in used:
             yield "fabric:threads", f"[{index}], {thread.GetName()}, is in neither warp nor weft"
+
+
+@rule(FABRIC, severity="warning")
+def albedo_is_safe(prim: Usd.Prim) -> Iterator[Fault]:
+    """In no view does the fabric send back more light than it gets."""
+    from fabricusd.appearance.albedo import QUICK, WORST_VIEWS, albedo_by_view, safe_albedo
+    from fabricusd.schema.read import read_side
+
+    try:
+        fabric = read_side(prim)
+    except FabricError:
+        return  # another rule tells why
+    worst = float(albedo_by_view(fabric, np.radians(WORST_VIEWS), QUICK).max())
+    if worst > 1.0:
+        safe = safe_albedo(fabric, QUICK)
+        yield (
+            "fabric:threads",
+            f"send back {worst:.3g} of the light in the worst view; thread:albedo must be lower, "
+            f"white is safe up to {safe:.2g}, or fabric:model conserving",
+        )
+    for name, thread in fabric.threads.items():
+        if fabric.model_of(thread) == "conserving" and max(thread.albedo) > 1.0:
+            yield "fabric:threads", f"{name} has an albedo above 1, which conserving takes as 1"
 
 
 # ---- FabricThread -------------------------------------------------------------------------------

@@ -1,0 +1,313 @@
+"""The weave under a point, its shadow and its thread's BSDF: `python bench/bench_weave.py`.
+
+Everything runs in one process on the same places and directions, so that the ratios to plain NumPy
+hold on a busy machine. Each figure is the best of several runs. A satin: five picks, a set that is
+seen underneath, a curve of five pieces; weave coordinates reach to 10^4 threads.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numba
+import numpy as np
+from bench_thread import microcylinder_in_numpy
+from numba import njit, prange
+
+from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
+from fabricusd.appearance.coverage import GAP
+from fabricusd.appearance.frame import WARP, to_thread
+from fabricusd.appearance.real import KERNEL, LEAN, cos, sin
+from fabricusd.appearance.shadow import (
+    Shadow,
+    compile_shadow,
+    horizon_block,
+    lit_all,
+    look_up_block,
+)
+from fabricusd.appearance.surface import points_all
+from fabricusd.appearance.surface_tables import surface_tables
+from fabricusd.appearance.thread_table import pack_threads
+from fabricusd.appearance.thread_terms import pair_angles, published_terms
+from fabricusd.appearance.weave import BLOCK, find_all, lookup
+from fabricusd.fabric import DEGREE, Fabric, TangentCurve, Thread, ThreadSet, Weave
+
+Array = np.ndarray
+
+COMPONENTS = 8
+"""What is noted of each place: angle, shadow, wi and wo."""
+
+
+def satin() -> Fabric:
+    """Nearly the published satin: the sets' own cells leave something to show underneath."""
+    i, j = np.indices((5, 5))
+    angles = (-32, -32, -18, 0, 0, 18, 32, 32)
+    flat = TangentCurve.from_lengths(
+        (a * DEGREE for a in angles), (1.33, 0.66, 2, 2, 2, 0.66, 1.33)
+    )
+    common = {"ior": 1.539, "thickness": 1e-4}
+    return Fabric(
+        threads={
+            "flat": Thread(
+                albedo=(0.035, 0.013, 0.01),
+                isotropic=0.1,
+                gamma_surface=2.5 * DEGREE,
+                gamma_volume=5 * DEGREE,
+                curve=flat,
+                **common,
+            ),
+            "twisted": Thread(
+                albedo=(0.2, 0.07, 0.06),
+                isotropic=0.7,
+                gamma_surface=30 * DEGREE,
+                gamma_volume=60 * DEGREE,
+                **common,
+            ),
+        },
+        weave=Weave((j - 2 * i) % 5 < 4, "satin"),
+        warp=ThreadSet(sequence=(0,), density=10000.0, coverage=0.9),
+        weft=ThreadSet(sequence=(1,), density=4000.0, coverage=0.1),
+    )
+
+
+@njit(**LEAN)
+def _bring_together(which, thread, sets, threads, notes, wi, wo, begin, where, found):  # type: ignore[no-untyped-def]
+    """The block's places on one thread, side by side: found (COMPONENTS, b); their number."""
+    count = 0
+    for k in range(sets.size):
+        where[count] = k
+        count += int(sets[k] == which and threads[k] == thread)
+    for k in range(count):
+        at = where[k]
+        found[0, k], found[1, k] = notes[0, at], notes[1, at]
+        for c in range(3):
+            found[2 + c, k], found[5 + c, k] = wi[c, begin + at], wo[c, begin + at]
+    return count
+
+
+@njit(**LEAN)
+def _constants(row):  # type: ignore[no-untyped-def]
+    """A thread's numbers as a tuple: LLVM need not fear that a store to an array changes them."""
+    return (
+        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9],
+        row[10], row[11], row[12], row[13], row[14],
+    )  # fmt: skip
+
+
+@njit(**LEAN)
+def _scatter(R, row, which, a, g, ix, iy, iz, ox, oy, oz, size):  # type: ignore[no-untyped-def]
+    """g f_s of the places noted for one thread, over the directions' own memory."""
+    for k in range(size):
+        c, s = cos(R, a[k]), sin(R, a[k])
+        ti, bi, ni = to_thread(R, which, c, s, ix[k], iy[k], iz[k])
+        to, bo, no = to_thread(R, which, c, s, ox[k], oy[k], oz[k])
+        cos_i, cos_o, half = pair_angles(R, bi, ni, bo, no)
+        surface, volume = published_terms(R, False, row, ti, cos_i, to, cos_o, half)
+        ix[k] = g[k] * (surface + volume * row[0])
+        iy[k] = g[k] * (surface + volume * row[1])
+        iz[k] = g[k] * (surface + volume * row[2])
+
+
+@njit(parallel=True, **KERNEL)
+def lookup_shadow_scatter(R, cloth, shadow, rows, uv, wi, wo, out):  # type: ignore[no-untyped-def]
+    """Lookup, horizon and microcylinder BSDF of (n, 2) places and (3, n) pairs of directions."""
+    n, kinds = uv.shape[0], rows.shape[0]
+    for b in prange((n + BLOCK - 1) // BLOCK):
+        begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
+        ints, reals = np.empty((12, size), np.int32), np.empty((5, size), out.dtype)
+        notes, a = np.empty((2, size), out.dtype), np.empty((COMPONENTS, size), out.dtype)
+        where = np.empty(size + 1, np.int32)
+        cells, threads, tops, sets, free = ints[:6], ints[6], ints[7], ints[8], ints[9]
+        p, q = reals[0], reals[1]
+        look_up_block(R, cloth, shadow, uv, begin, cells, p, q, threads, tops, sets, free, notes[0])
+        horizon_block(
+            R, cloth, shadow, cells, p, q, tops, sets, free, wi, begin, ints[10:], reals[2:],
+            notes[1],
+        )  # fmt: skip
+        for c in range(3):
+            out[c, begin : begin + size] = 0
+        for thread in range(kinds):
+            row = _constants(rows[thread])
+            for which in range(2):
+                if cloth.area[which, thread] == 0:
+                    continue
+                found = _bring_together(
+                    which, thread, sets, threads, notes, wi, wo, begin, where, a
+                )
+                _scatter(R, row, which, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], found)
+                for k in range(found):
+                    for c in range(3):
+                        out[c, begin + where[k]] = a[2 + c, k]
+
+
+def lookup_in_numpy(cloth: CompiledFabric, uv: Array) -> dict[str, Array]:
+    """The lookup as one would write it with NumPy arrays, in the precision of `cloth`."""
+    cell = np.floor(uv)
+    xy = (uv - cell).astype(cloth.width.dtype)
+    i, j = np.mod(cell, cloth.grid.shape).astype(np.int32).T
+    top = cloth.grid[i, j].astype(np.int32)
+    over, along = (np.where(top == WARP, xy[:, a], xy[:, 1 - a]) for a in (0, 1))
+    width = cloth.width[top]
+    on_top = np.abs(over - 0.5) <= 0.5 * width
+    beside = ~on_top & (cloth.under == 1 - top)
+    beside &= np.abs(along - 0.5) <= 0.5 * cloth.under_width
+    share = np.where(on_top, 1, 1 - width)
+    strip = np.where(over < 0.5, over, over - width)
+    seen = np.where(on_top, along, strip / np.where(share > 0, share, 1))
+    w = 2 * np.where(on_top, (over - 0.5) / width, (along - 0.5) / cloth.under_width)
+    runs = cloth.runs[i, j, np.where(on_top, 0, cloth.runs.shape[2] - 1)]
+    s = np.minimum((runs[:, 0] + seen) / runs[:, 1], cloth.last)
+    hit = np.where(on_top, top, 1 - top)
+    lengths = cloth.sequence_length[hit]
+    place = np.mod(np.where(hit == WARP, cell[:, 0], cell[:, 1]), lengths).astype(np.int32)
+    thread = cloth.sequence[hit, place]
+    piece = (s[:, None] >= cloth.curve_start[thread]).sum(axis=1) - 1
+    angle = cloth.curve_angle[thread, piece]
+    angle = angle + (s - cloth.curve_start[thread, piece]) * cloth.curve_slope[thread, piece]
+    return {
+        "set": np.where(on_top | beside, hit, GAP), "thread": thread, "angle": angle,
+        "w": np.where(hit == WARP, -w, w), "cell": np.stack((i, j)), "top": top,
+        "along": np.where(on_top, along, seen),
+        "across": np.where(on_top, (over - 0.5) / width, (along - 0.5) / cloth.under_width) + 0.5,
+        "slot": np.where(on_top, 0, cloth.runs.shape[2] - 1),
+    }  # fmt: skip
+
+
+def horizon_in_numpy(shadow: Shadow, hit: dict[str, Array], wi: Array) -> Array:
+    """The horizon table, interpolated with NumPy arrays."""
+    table = shadow.table
+    part = wi[0] / (np.abs(wi[0]) + np.abs(wi[1]))
+    turn = np.where(wi[1] >= 0, 1 - part, 3 + part) * (table.shape[5] / 4)
+    a = np.minimum(turn.astype(np.int32), table.shape[5] - 1)
+    rows, columns = table.shape[3:5]
+    p, q = (np.clip(hit[k] * n - 0.5, 0, n - 1) for k, n in (("along", rows), ("across", columns)))
+    r, c = np.minimum(p.astype(np.int32), rows - 2), np.minimum(q.astype(np.int32), columns - 2)
+    i, j = hit["cell"]
+    sine = 0
+    for dr, dc, da in itertools.product((0, 1), repeat=3):
+        weight = np.abs(1 - dr - (p - r)) * np.abs(1 - dc - (q - c)) * np.abs(1 - da - (turn - a))
+        azimuth = (a + da) % table.shape[5]
+        sine = sine + weight * table[i, j, hit["slot"], r + dr, c + dc, azimuth]
+    sine = sine / 255
+    flat = np.sqrt(wi[0] ** 2 + wi[1] ** 2)
+    t = (wi[2] * np.sqrt(np.maximum(0, 1 - sine * sine)) - flat * sine) / shadow.softness + 0.5
+    t = np.clip(t, 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def all_in_numpy(
+    fabric: Fabric, cloth: CompiledFabric, shadow: Shadow, uv: Array, wi: Array, wo: Array
+) -> Array:
+    hit = lookup_in_numpy(cloth, uv)
+    g = horizon_in_numpy(shadow, hit, wi)
+    c, s = np.cos(hit["angle"]), np.sin(hit["angle"])
+    turned = []
+    for x, y, z in (wi, wo):
+        warp = hit["set"] == WARP
+        along = np.where(warp, y, x)
+        turned.append(np.stack((c * along - s * z, np.where(warp, -x, y), s * along + c * z)))
+    out = np.zeros_like(wi)
+    for k, thread in enumerate(fabric.thread_list):
+        on = (hit["thread"] == k) & (hit["set"] != GAP)
+        out[:, on] = g[on] * microcylinder_in_numpy(thread, turned[0][:, on], turned[1][:, on])
+    return out
+
+
+def best(function: Callable[[], Any], repeats: int) -> float:
+    """Seconds of the fastest of `repeats` calls, after one that compiles."""
+    function()
+    seconds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        function()
+        seconds.append(time.perf_counter() - start)
+    return min(seconds)
+
+
+def upper(generator: np.random.Generator, n: int) -> Array:
+    w = generator.standard_normal((3, n), dtype=np.float32)
+    w[2] = np.abs(w[2])
+    return w / np.sqrt((w * w).sum(axis=0))
+
+
+def errors(fabric: Fabric, uv: Array) -> None:
+    """How far the float32 lookup is from the float64 one."""
+    exact = lookup(compile_fabric(fabric, precision=np.float64), uv)
+    quick = lookup(compile_fabric(fabric, precision=np.float32), uv)
+    same = exact.set == quick.set
+    print(f"\nfloat32 against float64 at {len(uv)} places out to 10^4 threads")
+    print(f"another thread, within rounding of an edge: {np.count_nonzero(~same)}")
+    for name, unit in (("position", "of the run"), ("across", ""), ("angle", "rad")):
+        error = np.abs(getattr(exact, name) - getattr(quick, name))[same]
+        print(f"{name}: 99.9th percentile {np.quantile(error, 0.999):.1e} {unit}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--places", type=int, default=500_000)
+    parser.add_argument("--repeats", type=int, default=15)
+    parser.add_argument("--workers", type=int, default=2)
+    options = parser.parse_args()
+    n, workers = options.places, min(options.workers, numba.config.NUMBA_NUM_THREADS)
+    fabric = satin()
+    generator = np.random.default_rng(0)
+    uv = generator.uniform(-1e4, 1e4, (n, 2))
+    wi, wo = upper(generator, n), upper(generator, n)
+    cloth, shadow = compile_fabric(fabric), compile_shadow(fabric)
+    rows = pack_threads(fabric, np.float32)
+    law = surface_tables(fabric, precision=np.float32)
+    real: Any = np.float32
+    places = np.empty(n, np.uint8), np.empty(n, np.int32), *np.empty((4, n), real)
+    out, g = np.empty_like(wi), np.empty(n, real)
+
+    def find() -> None:
+        find_all(real, cloth, uv, *places)
+
+    def scatter() -> None:
+        lookup_shadow_scatter(real, cloth, shadow, rows, uv, wi, wo, out)
+
+    def weave_level() -> None:
+        find()
+        points_all(
+            real, law, False, places[0], places[1], places[4], places[3], wi, wo, out
+        )  # fmt: skip
+        lit_all(real, cloth, shadow, uv, wi, g)
+        np.multiply(out, g, out=out)
+
+    few = max(2, options.repeats // 5)
+    m = n // 4
+    slow_find = m / best(lambda: lookup_in_numpy(cloth, uv[:m]), few)
+    slow_all = m / best(
+        lambda: all_in_numpy(fabric, cloth, shadow, uv[:m], wi[:, :m], wo[:, :m]), few
+    )
+    scatter()
+    expected = all_in_numpy(fabric, cloth, shadow, uv[:m], wi[:, :m], wo[:, :m])
+    gap = np.abs(out[:, :m] - expected) / (np.abs(expected) + 1e-3)
+    print(f"both give the same: 99.9 % within {np.quantile(gap, 0.999):.1e} of one another")
+    print(f"{n} places, float32, best of {options.repeats}; M places/s, and times plain NumPy")
+    print(f"{'NumPy, lookup':52}{slow_find / 1e6:8.1f}{1.0:8.1f}")
+    print(f"{'NumPy, lookup + horizon + thread BSDF':52}{slow_all / 1e6:8.1f}{1.0:8.1f}")
+    for count in sorted({1, workers}):
+        numba.set_num_threads(count)
+        for label, function, slow in (
+            ("lookup", find, slow_find),
+            ("lookup + horizon + thread BSDF", scatter, slow_all),
+            ("level weave (masked, with Q) x horizon", weave_level, slow_all),
+        ):
+            rate = n / best(function, options.repeats)
+            print(f"{f'{label}, {count} worker(s)':52}{rate / 1e6:8.1f}{rate / slow:8.1f}")
+    errors(fabric, uv)
+    cells = np.random.default_rng(1).random((4096, 4096)) < 0.5
+    vast = replace(fabric, weave=Weave(cells, "vast"))
+    seconds = best(lambda: compile_fabric(vast), 3)
+    size = sum(x.nbytes for x in compile_fabric(vast) if isinstance(x, np.ndarray))
+    print(f"\na grid of 4096 x 4096 compiles in {seconds:.2f} s to {size / 1e6:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()

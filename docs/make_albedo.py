@@ -1,0 +1,85 @@
+"""Write docs/albedo.md: how much of a white sky each preset sends back, and the safe albedos.
+
+python docs/make_albedo.py
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fabricusd.appearance import surface
+from fabricusd.appearance.albedo import FINE, albedo_by_view, safe_albedo
+from fabricusd.fabric import Fabric
+from fabricusd.schema import load, preset_names
+
+HERE = Path(__file__).resolve().parent
+THETA = (0.0, 30.0, 60.0, 75.0, 85.0, 89.0, 89.9)
+AZIMUTHS = 8
+SAMPLES = 4096
+
+HEAD = """# Directional albedo and safe albedos
+
+Made by `make docs` (`python docs/make_albedo.py`).
+
+The share of a white sky's light that reaches the viewer, by the angle between view and normal: the
+brightest channel, at the worst of 16 azimuths (8 for `conserving`). The published models do not
+conserve energy; *safe A* is the largest albedo of white threads at which no view sends back more
+than it gets. `fabricusd check` warns where a fabric's own colours go beyond 1 (`AlbedoIsSafe`).
+
+In `conserving` the value is reflection plus transmission, multiple scattering included, from
+{samples} samples a view; an albedo there is one, and any from 0 to 1 is safe.
+"""
+
+
+def uniform_model(fabric: Fabric, model: str) -> Fabric:
+    """`fabric` with every thread in one model."""
+    threads = {name: replace(t, model="") for name, t in fabric.threads.items()}
+    return replace(fabric, model=model, threads=threads, back=None)
+
+
+def conserving(fabric: Fabric) -> list[float]:
+    """Reflected plus transmitted share at each angle, by importance sampling."""
+    rng = np.random.default_rng(11)
+    worst = []
+    for theta in np.radians(THETA):
+        shares = []
+        for phi in np.arange(AZIMUTHS) * 2 * math.pi / AZIMUTHS:
+            wo = np.array(
+                [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
+            )
+            drawn = surface.sample(fabric, wo, rng.random((SAMPLES, 3)))
+            weight = np.where(drawn.pdf > 0, 1 / np.where(drawn.pdf > 0, drawn.pdf, 1), 0)
+            shares.append((drawn.f * weight[:, None]).mean(axis=0).max())
+        worst.append(max(shares))
+    return worst
+
+
+def row(name: str, values: list[float], safe: str) -> str:
+    """One line of a table."""
+    return f"| {name} | " + " | ".join(f"{v:.3f}" for v in values) + f" | {safe} |"
+
+
+def main() -> None:
+    """Write the page."""
+    lines = [HEAD.format(samples=SAMPLES)]
+    columns = " | ".join(f"{t:g}°" for t in THETA)
+    for model in ("microcylinder", "thesis", "conserving"):
+        lines += [f"## {model}", "", f"| preset | {columns} | safe A |"]
+        lines += ["|---" * (len(THETA) + 2) + "|"]
+        for name in preset_names():
+            fabric = uniform_model(load(name), model)
+            if model == "conserving":
+                lines.append(row(name, conserving(fabric), "1"))
+                continue
+            values = albedo_by_view(fabric, np.radians(THETA), FINE).max(axis=(1, 2))
+            lines.append(row(name, values.tolist(), f"{safe_albedo(fabric, FINE):.2f}"))
+        lines.append("")
+    (HERE / "albedo.md").write_text("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()

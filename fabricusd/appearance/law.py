@@ -1,0 +1,199 @@
+"""The surface law of a fabric as one value: what the path tracer and the public functions call.
+
+A cloth may mix published and `conserving` threads. Then each kind scatters by its own law, with
+all threads masking and shadowing, the values add up, and directions are drawn from both samplers
+alike. Scalar kernels, precision `R` first. A value is radiance per unit `L_i dwi`, cosine included.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from fabricusd.appearance.conserving import ConservingTables, facet_terms, single_tables, visible
+from fabricusd.appearance.conserving_sampling import (
+    ConservingSamplingTables,
+    conserving_density,
+    conserving_direction,
+    conserving_point_density,
+    conserving_point_direction,
+    conserving_sampling_tables,
+)
+from fabricusd.appearance.far import far_value
+from fabricusd.appearance.frame import to_thread
+from fabricusd.appearance.levels import across_at, point_value
+from fabricusd.appearance.multiple import (
+    conserving_point_value,
+    conserving_tables,
+    conserving_value,
+    multiple_share,
+)
+from fabricusd.appearance.quadrature import Rule
+from fabricusd.appearance.real import LEAN, cos, sin
+from fabricusd.appearance.surface_sampling import (
+    AZIMUTHS,
+    ELEVATIONS,
+    STRETCH_COLUMNS,
+    SamplingTables,
+    far_density,
+    far_direction,
+    point_density,
+    point_direction,
+    sampling_tables,
+)
+from fabricusd.appearance.surface_tables import SurfaceTables, surface_tables
+from fabricusd.appearance.thread_terms import ALBEDO_B, ALBEDO_G, ALBEDO_R, CONSERVING, MODEL
+from fabricusd.fabric import PILE_ANGLE, Fabric
+
+FAR, WEAVE, THREAD = 0, 1, 2
+"""Levels, in the order of `surface.LEVELS`."""
+
+PUBLISHED_ONLY, CONSERVING_ONLY, MIXED = 0, 1, 2
+"""Values of `SurfaceLaw.kind`."""
+
+
+class SurfaceLaw(NamedTuple):
+    """All tables of one fabric's surface law, in one precision.
+
+    kind : int - PUBLISHED_ONLY, CONSERVING_ONLY or MIXED; tables that it does not ask for are empty
+    published, lobes : of the threads with a published model, and their sampler
+    conserving, conserving_lobes : of the `conserving` threads, and their sampler
+    """
+
+    kind: int
+    published: SurfaceTables
+    lobes: SamplingTables
+    conserving: ConservingTables
+    conserving_lobes: ConservingSamplingTables
+
+
+def surface_law(
+    fabric: Fabric,
+    *,
+    precision: type[np.floating[Any]] = np.float32,
+    rule: Rule | None = None,
+    multiple: bool = True,
+) -> SurfaceLaw:
+    """The law of `fabric` in `precision`, np.float32 or np.float64.
+
+    rule : quadrature over the curves; None takes each model's default
+    multiple : whether `conserving` cloth scatters light more than once; its table takes a second
+    """
+    models = {fabric.model_of(t) == "conserving" for t in fabric.thread_list}
+    kind = MIXED if len(models) == 2 else CONSERVING_ONLY if models == {True} else PUBLISHED_ONLY
+    published = surface_tables(fabric, precision=precision, rule=rule)
+    nothing = np.zeros((0, STRETCH_COLUMNS), precision)
+    lobes = SamplingTables(nothing, np.zeros((ELEVATIONS, AZIMUTHS, 0), precision))
+    if kind != CONSERVING_ONLY:
+        lobes = sampling_tables(fabric, published)
+    if kind == PUBLISHED_ONLY:
+        conserving = single_tables(fabric, precision=precision, rule=rule)
+        shares = np.zeros((ELEVATIONS, AZIMUTHS, 2), precision)
+        both = ConservingSamplingTables(nothing, shares, 0)
+    else:
+        conserving = conserving_tables(fabric, precision=precision, multiple=multiple, rule=rule)
+        both = conserving_sampling_tables(fabric, conserving)
+    return SurfaceLaw(kind, published, lobes, conserving, both)
+
+
+@njit(**LEAN)
+def law_value(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """(r, g, b) at a level.
+
+    thread_set, thread, psi0, w : what `weave.find` gave under the point; not read at level FAR
+    """
+    red, green, blue = R(0), R(0), R(0)
+    if law.kind != CONSERVING_ONLY:
+        if level == FAR:
+            red, green, blue = far_value(R, law.published, ix, iy, iz, ox, oy, oz)
+        elif thread_set < 2:
+            red, green, blue = point_value(
+                R, law.published, level == THREAD, thread_set, thread, psi0, w,
+                ix, iy, iz, ox, oy, oz,
+            )  # fmt: skip
+    if law.kind != PUBLISHED_ONLY:
+        r, g, b = R(0), R(0), R(0)
+        if level == FAR:
+            r, g, b = conserving_value(R, law.conserving, ix, iy, iz, ox, oy, oz)
+        elif thread_set < 2:
+            r, g, b = conserving_level_value(
+                R, law.conserving, level == THREAD, thread_set, thread, psi0, w,
+                ix, iy, iz, ox, oy, oz,
+            )  # fmt: skip
+        red, green, blue = red + r, green + g, blue + b
+    return red, green, blue
+
+
+@njit(**LEAN)
+def conserving_level_value(
+    R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz
+):  # type: ignore[no-untyped-def]
+    """`multiple.conserving_point_value`, with the factors across the width if `across_too`."""
+    row = tables.threads[thread]
+    if not across_too or row[MODEL] != R(CONSERVING):
+        return conserving_point_value(R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz)
+    scale = visible(R, tables, ix, iy, iz) * visible(R, tables, ox, oy, oz) * abs(iz)
+    if tables.opaque != 0 and (iz > R(0)) != (oz > R(0)):
+        scale = R(0)
+    angle = min(max(psi0, R(-PILE_ANGLE)), R(PILE_ANGLE))
+    c, s = cos(R, angle), sin(R, angle)
+    surface, volume = facet_terms(R, tables, thread_set, thread, c, s, ix, iy, iz, ox, oy, oz)
+    _, b_i, n_i = to_thread(R, thread_set, c, s, ix, iy, iz)
+    _, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
+    on_surface, on_volume = across_at(R, row, w, b_i, n_i, b_o, n_o)
+    scale /= c
+    surface, volume = surface * on_surface * scale, volume * on_volume * scale
+    share = multiple_share(R, tables, ix, iy, iz, ox, oy, oz) / tables.covered
+    return (
+        surface + volume * row[ALBEDO_R] + share * tables.strength[0],
+        surface + volume * row[ALBEDO_G] + share * tables.strength[1],
+        surface + volume * row[ALBEDO_B] + share * tables.strength[2],
+    )
+
+
+@njit(**LEAN)
+def law_density(R, law, level, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """pdf(wi) [1/sr] of `law_direction`; 0 where it never goes."""
+    p, q = R(0), R(0)
+    if law.kind != CONSERVING_ONLY:
+        if level == FAR:
+            p = far_density(R, law.lobes, ix, iy, iz, ox, oy, oz)
+        else:
+            p = point_density(
+                R, law.published, law.lobes, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz
+            )
+    if law.kind != PUBLISHED_ONLY:
+        if level == FAR:
+            q = conserving_density(R, law.conserving_lobes, ix, iy, iz, ox, oy, oz)
+        else:
+            q = conserving_point_density(
+                R, law.conserving, law.conserving_lobes, thread_set, thread, psi0,
+                ix, iy, iz, ox, oy, oz,
+            )  # fmt: skip
+    # A viewer below the cloth sees no published model: all directions are the other's.
+    if law.kind == MIXED and oz > R(0):
+        return R(0.5) * (p + q)
+    return q if law.kind != PUBLISHED_ONLY else p
+
+
+@njit(**LEAN)
+def law_direction(R, law, level, thread_set, thread, psi0, ox, oy, oz, u0, u1, u2):  # type: ignore[no-untyped-def]
+    """wi (x, y, z) for a viewer and three numbers in [0, 1); check `law_density` of it above 0."""
+    published = law.kind == PUBLISHED_ONLY
+    if law.kind == MIXED and oz > R(0):
+        published = u0 < R(0.5)
+        u0 = R(2) * u0 if published else R(2) * u0 - R(1)
+    if published:
+        if level == FAR:
+            return far_direction(R, law.lobes, ox, oy, oz, u0, u1, u2)
+        return point_direction(
+            R, law.published, law.lobes, thread_set, thread, psi0, ox, oy, oz, u0, u1, u2
+        )
+    if level == FAR:
+        return conserving_direction(R, law.conserving_lobes, ox, oy, oz, u0, u1, u2)
+    return conserving_point_direction(
+        R, law.conserving, law.conserving_lobes, thread_set, thread, psi0,
+        ox, oy, oz, u0, u1, u2,
+    )  # fmt: skip

@@ -1,0 +1,63 @@
+"""`fabricusd compare`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+
+EPILOG = """A is measured against the reference B; EXR is radiance, the rest display colours
+
+status: 0 done, 1 the difference is above --max-flip or --max-error, 2 a picture cannot be read
+
+example:
+  fabricusd compare new.exr golden.exr -o difference.png
+  fabricusd compare blender.png reference.png --max-error 2"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Two pictures, and what to make of them."""
+    parser.add_argument("a", metavar="A", help="picture")
+    parser.add_argument("b", metavar="B", help="reference")
+    parser.add_argument("-o", "--output", metavar="PNG", help="draw where they differ, by FLIP")
+    parser.add_argument("--json", action="store_true", help="figures as JSON")
+    parser.add_argument("--max-flip", type=_bound, metavar="X", help="status 1 above this mean")
+    parser.add_argument(
+        "--max-error", type=_bound, metavar="DE", help="status 1 above this mean delta E 2000"
+    )
+
+
+def _bound(text: str) -> float:
+    value = float(text)
+    if not (math.isfinite(value) and value >= 0):
+        raise argparse.ArgumentTypeError(f"'{text}' must be a number of at least 0")
+    return value
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the figures, draw the map, judge the bounds."""
+    from fabricusd.quality.pictures import difference, flip_map, heat
+    from fabricusd.reference.images import read_image, write_png
+
+    high_range = options.a.lower().endswith(".exr") and options.b.lower().endswith(".exr")
+    a, b = read_image(options.a), read_image(options.b)
+    found = difference(a, b, high_range=high_range)
+    if options.json:
+        print(json.dumps(found.as_dict(), indent=2))
+    else:
+        print(f"RMSE          {found.rmse:.6g}")
+        print(f"relative MSE  {found.relative_mse:.6g}")
+        print(f"FLIP          {found.flip:.4f}")
+        print(f"delta E 2000  {found.delta_e_mean:.3f} mean, {found.delta_e_95:.3f} at 95 %")
+    if found.not_finite:
+        print(
+            f"fabricusd: {found.not_finite} pixels are not finite and were left out",
+            file=sys.stderr,
+        )
+    if options.output:
+        write_png(options.output, heat(flip_map(a, b, high_range=high_range)))
+    over = (options.max_flip is not None and found.flip > options.max_flip) or (
+        options.max_error is not None and found.delta_e_mean > options.max_error
+    )
+    return 1 if over else 0

@@ -1,0 +1,134 @@
+"""`fabricusd render`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from fabricusd.errors import FabricError
+
+EPILOG = """SCENE is .usd, .usda, .usdc or .usdz, or with --fabric an .obj, .glb or .ply
+
+OUT.exr gets every layer and a .png beside it; Ctrl-C keeps what is done
+
+example:
+  fabricusd render garment.usda -o review.exr
+  fabricusd render towel.obj --fabric silk_shot -o towel.exr --spp 256
+  fabricusd render shot.usda -o shot.exr --frames 1-24 --noise 0.02 --aov normal --aov depth"""
+
+MOST_FRAMES = 100_000
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to render, how well, and where to."""
+    parser.add_argument("scene", metavar="SCENE")
+    parser.add_argument("-o", "--output", metavar="OUT", required=True, help=".exr or .png")
+    parser.add_argument("--fabric", metavar="FILE[:/PRIM]", help="fabric file, draft or preset")
+    parser.add_argument("--camera", metavar="PATH", help="prim path (default: the first camera)")
+    parser.add_argument("--width", type=int, default=960)
+    parser.add_argument("--height", type=int, default=540)
+    parser.add_argument("--spp", type=int, metavar="N", help="samples a pixel (default: 64)")
+    parser.add_argument(
+        "--noise", type=float, metavar="E", help="stop a pixel at this relative error"
+    )
+    parser.add_argument("--max-bounces", type=int, default=4, metavar="N")
+    parser.add_argument("--level", choices=("auto", "far", "weave", "thread"), default="auto")
+    parser.add_argument(
+        "--shadow", choices=("none", "peak", "horizon", "traced"), default="horizon"
+    )
+    parser.add_argument("--aov", action="append", default=[], metavar="LAYER", help="or 'all'")
+    parser.add_argument("--frames", metavar="A-B", help="time codes: 7, 1-10, 1-10x2, or a list")
+    parser.add_argument("--exposure", type=float, default=0.0, metavar="STOPS", help="of the .png")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, metavar="N", help="CPU threads (default: all)")
+    parser.add_argument("-n", "--dry-run", action="store_true", help="read the scene only")
+    parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Render, and say what was left out."""
+    from fabricusd.reference import AOVS, read_scene, render
+
+    frames = parse_frames(options.frames) if options.frames else None
+    output = Path(options.output)
+    if options.no_clobber:
+        for path in {output, output.with_suffix(".png")}:
+            if path.exists():
+                raise FabricError(str(path), "exists; it must be a new name with --no-clobber")
+    fabric = None
+    if options.fabric:
+        from fabricusd.schema.anysource import load_any
+
+        fabric, _ = load_any(options.fabric)
+    if options.dry_run:
+        scene = read_scene(options.scene, fabric=fabric, camera=options.camera)
+        _tell(scene.notes, options)
+        triangles = sum(len(mesh.triangles) for mesh in scene.meshes)
+        words = f"{len(scene.meshes)} meshes, {triangles} triangles, {len(scene.lights)} lights"
+        print(f"fabricusd: would render {words} to {output}", file=sys.stderr)
+        return 0
+    layers = tuple(AOVS) if "all" in options.aov else tuple(options.aov)
+    bar, progress = _progress(options)
+    try:
+        result = render(
+            options.scene, options.output, fabric=fabric, camera=options.camera,
+            width=options.width, height=options.height, spp=options.spp, noise=options.noise,
+            max_bounces=options.max_bounces, level=options.level, shadow=options.shadow,
+            aovs=layers, frames=frames, seed=options.seed, workers=options.workers,
+            exposure=options.exposure, progress=progress,
+        )  # fmt: skip
+    finally:
+        bar()
+    _tell(result.notes, options)
+    if not options.quiet:
+        rate = result.rays / max(result.seconds, 1e-9) / 1e6
+        print(
+            f"fabricusd: {', '.join(result.paths)}: {result.samples:.4g} samples a pixel, "
+            f"{result.rays / 1e6:.3g} M rays in {result.seconds:.3g} s ({rate:.3g} M/s)",
+            file=sys.stderr,
+        )
+    if not result.complete:
+        print("fabricusd: interrupted; what was done is kept", file=sys.stderr)
+        return 130
+    return 1 if options.noise and result.noise > options.noise else 0
+
+
+def _tell(notes: object, options: argparse.Namespace) -> None:
+    if not options.quiet:
+        for note in notes:  # type: ignore[attr-defined]
+            print(f"fabricusd: {note}", file=sys.stderr)
+
+
+def _progress(
+    options: argparse.Namespace,
+) -> tuple[Callable[[], None], Callable[[float, float], None] | None]:
+    """(what to call at the end, what to call meanwhile): a bar on a terminal, else nothing."""
+    if options.quiet or not sys.stderr.isatty():
+        return (lambda: None), None
+    from tqdm import tqdm
+
+    bar = tqdm(total=1.0, bar_format="{percentage:3.0f} %|{bar}| {remaining} left", leave=False)
+
+    def update(share: float, _seconds: float) -> None:
+        bar.update(max(0.0, share - bar.n))
+
+    return bar.close, update
+
+
+def parse_frames(text: str) -> tuple[float, ...]:
+    """`1-10`, `1-10x2`, `7`, `1,4,9-12` -> time codes."""
+    codes: list[float] = []
+    for part in text.split(","):
+        span, _, step = part.partition("x")
+        first, dash, last = span.strip().partition("-")
+        try:
+            a, b = float(first), float(last if dash else first)
+            stride = float(step or 1)
+        except ValueError:
+            raise FabricError("--frames", f"is '{text}'; it must be as in 1-10 or 1-10x2") from None
+        if not (stride > 0 and b >= a and (b - a) / stride < MOST_FRAMES):
+            raise FabricError("--frames", f"is '{text}'; it must rise, by steps above 0")
+        codes += [a + k * stride for k in range(int((b - a) / stride + 1e-9) + 1)]
+    return tuple(codes)

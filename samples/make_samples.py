@@ -1,0 +1,335 @@
+"""Make the sample scenes: cylinders in three orientations, a draped cloth, a skirt on a figure.
+
+    python samples/make_samples.py [FOLDER]
+
+Writes `cylinders.usda`, `drape.usda` and `skirt.usda` with their geometry in `.usdc` files beside
+them. Lengths are in metres, +y is up. Everything is computed here: no file is read.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from cloth_simulation import drum_body, simulate, turned_body
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, Vt
+from scipy.ndimage import gaussian_filter, zoom
+
+from fabricusd.fabric import Binding
+from fabricusd.schema import load, write_binding, write_fabric
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A grid of points as quads with UVs in metres; `around` closes its first axis."""
+
+    points: Points
+    uv: NDArray[np.float64]
+    around: bool = False
+
+
+def define_grid(stage: Usd.Stage, path: str, grid: Grid) -> UsdGeom.Mesh:
+    """A mesh of quads, counter-clockwise seen from where the first axis turns to the second."""
+    m, n = grid.points.shape[:2]
+    i = np.arange(m * n).reshape(m, n)
+    # UVs have one column more than points where the grid is closed: the seam has two.
+    columns = grid.uv.shape[0]
+    j = np.arange(columns * n).reshape(columns, n)
+    ring = np.concatenate([i, i[:1]]) if grid.around else i
+    faces = _quads(ring)
+    corners = _quads(j)
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(grid.points.reshape(-1, 3).astype(np.float32)))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 4, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.ravel().astype(np.int32)))
+    mesh.CreateSubdivisionSchemeAttr("none")
+    primvar = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
+        "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying
+    )
+    primvar.Set(Vt.Vec2fArray.FromNumpy(grid.uv.reshape(-1, 2).astype(np.float32)))
+    primvar.SetIndices(Vt.IntArray.FromNumpy(corners.ravel().astype(np.int32)))
+    low, high = grid.points.reshape(-1, 3).min(axis=0), grid.points.reshape(-1, 3).max(axis=0)
+    mesh.CreateExtentAttr([Gf.Vec3f(*low.tolist()), Gf.Vec3f(*high.tolist())])
+    return mesh
+
+
+def _quads(i: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
+
+
+def finer(points: Points, factor: int, *, around: bool = False) -> Points:
+    """A grid with each cell cut into `factor` by `factor`, by cubic splines."""
+    m = points.shape[0]
+    if around:
+        # Periodic: pad by whole columns, refine, and cut the padding off again.
+        pad = 6
+        points = np.concatenate([points[-pad:], points, points[: pad + 1]])
+    fine = np.stack(
+        [
+            zoom(points[..., k], [((s - 1) * factor + 1) / s for s in points.shape[:2]], order=3)
+            for k in range(points.shape[2])
+        ],
+        axis=-1,
+    )
+    return fine[pad * factor : (pad + m) * factor] if around else fine
+
+
+def new_scene(path: Path) -> Usd.Stage:
+    """A stage in metres with a floor, a soft sky, and a key light as a reviewer sets it."""
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/World").GetPrim())
+    grey(stage, "/World/Looks/Floor", (0.32, 0.31, 0.30), 0.9)
+    floor = define_grid(stage, "/World/Floor", Grid(*_backdrop()))
+    bind(stage, floor, "/World/Looks/Floor")
+    sky = UsdLux.DomeLight.Define(stage, "/World/Lights/Sky")
+    sky.CreateIntensityAttr(0.55)
+    sky.CreateColorAttr((0.92, 0.97, 1.0))
+    rect_light(stage, "Key", (-1.6, 2.4, 1.8), 1.0, 34.0, 5200.0)
+    rect_light(stage, "Rim", (1.9, 1.9, -1.5), 0.8, 26.0, 6500.0)
+    return stage
+
+
+def _backdrop() -> tuple[Points, NDArray[np.float64]]:
+    """A floor that bends up into a wall behind the subject."""
+    t = np.linspace(0, 1, 65)
+    z = np.where(t < 0.55, 3.5 - t / 0.55 * 5.0, 0.0)
+    y = np.zeros_like(t)
+    bend = np.clip((t - 0.55) / 0.2, 0, 1) * math.pi / 2
+    z = np.where(t >= 0.55, -1.5 - 1.0 * np.sin(bend), z)
+    y = np.where(t >= 0.55, 1.0 - np.cos(bend), y)
+    y = np.where(t > 0.75, 1.0 + (t - 0.75) * 14, y)
+    x = np.linspace(-6, 6, 2)
+    points = np.stack(
+        [np.tile(x[:, None], (1, 65)), np.tile(y, (2, 1)), np.tile(z, (2, 1))], axis=-1
+    )
+    return points, points[..., :2]
+
+
+def rect_light(
+    stage: Usd.Stage, name: str, at: tuple[float, float, float], size: float, intensity: float,
+    temperature: float,
+) -> None:  # fmt: skip
+    """A square light at `at` that shines on the middle of the scene."""
+    light = UsdLux.RectLight.Define(stage, f"/World/Lights/{name}")
+    light.CreateWidthAttr(size)
+    light.CreateHeightAttr(size)
+    light.CreateIntensityAttr(intensity)
+    light.CreateEnableColorTemperatureAttr(True)
+    light.CreateColorTemperatureAttr(temperature)
+    light.AddTransformOp().Set(look_at(at, (0.0, 0.4, 0.0)))
+
+
+def look_at(eye: tuple[float, float, float], at: tuple[float, float, float]) -> Gf.Matrix4d:
+    """The transform of what stands at `eye` and looks along its -z to `at`."""
+    view = Gf.Matrix4d().SetLookAt(Gf.Vec3d(*eye), Gf.Vec3d(*at), Gf.Vec3d(0, 1, 0))
+    return view.GetInverse()
+
+
+def camera(
+    stage: Usd.Stage, eye: tuple[float, float, float], at: tuple[float, float, float],
+    focal_length: float, name: str = "Camera",
+) -> None:  # fmt: skip
+    """A full-frame camera; `focal_length` in millimetres."""
+    prim = UsdGeom.Camera.Define(stage, f"/World/{name}")
+    # A camera's film is measured in tenths of a scene unit.
+    prim.CreateFocalLengthAttr(focal_length * 0.01)
+    prim.CreateHorizontalApertureAttr(36 * 0.01)
+    prim.CreateVerticalApertureAttr(24 * 0.01)
+    prim.CreateClippingRangeAttr((0.01, 1000.0))
+    prim.CreateFocusDistanceAttr(math.dist(eye, at))
+    prim.CreateFStopAttr(0.0)
+    prim.AddTransformOp().Set(look_at(eye, at))
+
+
+def grey(stage: Usd.Stage, path: str, color: tuple[float, float, float], roughness: float) -> None:
+    """A plain UsdPreviewSurface."""
+    material = UsdShade.Material.Define(stage, path)
+    shader = UsdShade.Shader.Define(stage, f"{path}/Surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(color)
+    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(roughness)
+    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+
+
+def bind(stage: Usd.Stage, mesh: Any, path: str) -> None:
+    """Give a mesh a plain material."""
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(
+        UsdShade.Material(stage.GetPrimAtPath(path))
+    )
+
+
+def dress(stage: Usd.Stage, mesh: UsdGeom.Mesh, preset: str, **binding: Any) -> None:
+    """Make a mesh of a preset's fabric, which the stage then holds; UVs are in metres."""
+    path = f"/World/Looks/{preset}"
+    fabric = load(preset)
+    if not stage.GetPrimAtPath(path):
+        write_fabric(stage, path, fabric)
+    write_binding(mesh.GetPrim(), path, Binding(fabric=fabric, metres_per_uv=1.0, **binding))
+
+
+def make_cylinders(folder: Path) -> Path:
+    """Three upright cylinders whose fabric runs upright, at 45 degrees, and round."""
+    path = folder / "cylinders.usda"
+    stage = new_scene(path)
+    radius, height = 0.11, 0.5
+    phi = np.linspace(0, 2 * math.pi, 257)
+    y = np.linspace(0, height, 33)
+    for k, (name, degrees) in enumerate((("Upright", 0), ("Bias", 45), ("Round", 90))):
+        p, h = np.meshgrid(phi, y, indexing="ij")
+        x0 = 0.3 * (k - 1)
+        points = np.stack([x0 + radius * np.sin(p), h + 0.002, radius * np.cos(p)], axis=-1)
+        uv = np.stack([radius * p, h], axis=-1)
+        mesh = define_grid(stage, f"/World/{name}", Grid(points[:-1], uv, around=True))
+        dress(stage, mesh, "polyester_satin_charmeuse", rotation=math.radians(degrees))
+    camera(stage, (0.0, 0.55, 2.1), (0.0, 0.24, 0.0), 70.0)
+    stage.GetRootLayer().Save()
+    return path
+
+
+def make_drape(folder: Path, *, cells: int = 74, factor: int = 3, steps: int = 420) -> Path:
+    """A cloth that hangs over a drum; 98 568 triangles at the usual size."""
+    path = folder / "drape.usda"
+    stage = new_scene(path)
+    size, radius, height = 0.88, 0.25, 0.42
+    line = np.linspace(-size / 2, size / 2, cells + 1)
+    x, z = np.meshgrid(line, line[::-1], indexing="ij")
+    turn = math.radians(20)
+    start = np.stack(
+        [
+            math.cos(turn) * x + math.sin(turn) * z,
+            np.full_like(x, height + 0.02) + 0.002 * np.sin(31 * x) * np.cos(27 * z),
+            math.cos(turn) * z - math.sin(turn) * x,
+        ],
+        axis=-1,
+    )
+    rest = np.stack([x, z], axis=-1)
+    hung = simulate(start, rest, drum_body(radius, height, 0.03), steps=steps)
+    hung[..., 1] += 0.003
+    fine = finer(hung, factor)
+    uv = finer(np.stack([x, -z], axis=-1), factor)
+    mesh = define_grid(stage, "/World/Cloth", Grid(fine, uv))
+    dress(stage, mesh, "silk_shot")
+    camera(stage, (0.55, 0.95, 1.75), (0.0, 0.24, 0.0), 60.0)
+    stage.GetRootLayer().Save()
+    return path
+
+
+BODY_HEIGHTS = np.array([0.0, 0.10, 0.45, 0.52, 0.80, 0.90, 1.05, 1.22, 1.38, 1.44, 1.50])
+BODY_RADII = np.array(
+    [
+        [0.075, 0.075], [0.080, 0.080], [0.110, 0.090], [0.120, 0.095], [0.172, 0.120],
+        [0.180, 0.125], [0.132, 0.095], [0.150, 0.108], [0.165, 0.095], [0.090, 0.070],
+        [0.055, 0.055],
+    ]
+)  # fmt: skip
+"""A dressmaker's figure: half widths along x and z [m] at heights [m]."""
+
+
+def make_skirt(folder: Path, *, around: int = 120, down: int = 44, steps: int = 420) -> Path:
+    """A flared skirt of two panels on a dressmaker's figure; warp runs down the centre front."""
+    path = folder / "skirt.usda"
+    stage = new_scene(path)
+    waist, length, sweep = 1.05, 0.58, math.radians(105)
+    # Each panel is a sector of a ring: at the waist as long as half the figure there.
+    t = np.linspace(0, 2 * math.pi, around, endpoint=False)
+    a, b = (np.interp(waist, BODY_HEIGHTS, BODY_RADII[:, k]) + 0.006 for k in range(2))
+    girth = math.pi * (3 * (a + b) - math.sqrt((3 * a + b) * (a + 3 * b)))
+    inner = 0.5 * girth / sweep
+    s = np.linspace(0, length, down)
+    tt, ss = np.meshgrid(t, s, indexing="ij")
+    ring = (inner + ss) / inner
+    start = np.stack(
+        [
+            a * np.sin(tt) * (1 + 0.75 * (ring - 1)),
+            waist - 0.55 * ss,
+            b * np.cos(tt) * (1 + 0.75 * (ring - 1)),
+        ],
+        axis=-1,
+    )
+    start[..., 0] *= 1 + 0.02 * np.sin(9 * tt) * ss / length
+    start[..., 2] *= 1 + 0.02 * np.cos(11 * tt) * ss / length
+    # Distances of rest are the pattern's: chords of rings, and straight lines down.
+    flat = np.stack(
+        [
+            (inner + ss) * 2 * sweep / (2 * math.pi) * np.sin(tt),
+            ss,
+            (inner + ss) * 2 * sweep / (2 * math.pi) * np.cos(tt),
+        ],
+        axis=-1,
+    )
+    # On the cone that the pattern rolls into, a step down is also a step outwards.
+    flat[..., 1] = np.sqrt(np.maximum(1 - (2 * sweep / (2 * math.pi)) ** 2, 0.05)) * ss
+    pinned = np.zeros(start.shape[:2], bool)
+    pinned[:, 0] = True
+    body = turned_body(BODY_HEIGHTS, BODY_RADII, 0.006)
+    hung = simulate(start, flat, body, pinned=pinned, around=True, steps=steps, bending=0.06)
+    fine = finer(hung, 3, around=True)
+    # From the hem upwards, so that the outside is the front.
+    uv = _skirt_uv(fine.shape, inner, length, sweep)
+    mesh = define_grid(stage, "/World/Skirt", Grid(fine[:, ::-1], uv[:, ::-1], True))
+    dress(stage, mesh, "polyester_satin_charmeuse")
+    _figure(stage)
+    camera(stage, (0.75, 1.15, 3.3), (0.0, 0.80, 0.0), 70.0)
+    stage.GetRootLayer().Save()
+    return path
+
+
+def _skirt_uv(
+    shape: tuple[int, ...], inner: float, length: float, sweep: float
+) -> NDArray[np.float64]:
+    """(m + 1, n, 2) [m] the place of each point on its flat panel, v up, u to the wearer's left.
+
+    Panels meet at the sides; each lies symmetric about its own centre line, which is the grain.
+    """
+    m, n = shape[:2]
+    s = np.linspace(0, length, n)
+    t = np.arange(m + 1) / m * 2 * math.pi
+    panel = np.floor((t + math.pi / 2) / math.pi)
+    angle = (t - panel * math.pi) / math.pi * sweep
+    aa, ss = np.meshgrid(angle, s, indexing="ij")
+    return np.stack([(inner + ss) * np.sin(aa), -(inner + ss) * np.cos(aa)], axis=-1)
+
+
+def _figure(stage: Usd.Stage) -> None:
+    grey(stage, "/World/Looks/Figure", (0.55, 0.50, 0.45), 0.6)
+    y = np.linspace(0.30, 1.50, 121)
+    a = gaussian_filter(np.interp(y, BODY_HEIGHTS, BODY_RADII[:, 0]), 3) - 0.004
+    b = gaussian_filter(np.interp(y, BODY_HEIGHTS, BODY_RADII[:, 1]), 3) - 0.004
+    a[-4:] *= [0.95, 0.8, 0.5, 0.02]
+    b[-4:] *= [0.95, 0.8, 0.5, 0.02]
+    t = np.linspace(0, 2 * math.pi, 96, endpoint=False)
+    tt, yy = np.meshgrid(t, y, indexing="ij")
+    points = np.stack([a * np.sin(tt), yy, b * np.cos(tt)], axis=-1)
+    uv = np.zeros((97, len(y), 2))
+    figure = define_grid(stage, "/World/Figure", Grid(points, uv, around=True))
+    bind(stage, figure, "/World/Looks/Figure")
+    pole = np.stack(
+        [
+            0.015 * np.sin(tt[:, :2]),
+            np.broadcast_to([0.0, 0.31], (96, 2)),
+            0.015 * np.cos(tt[:, :2]),
+        ],
+        axis=-1,
+    )
+    stand = define_grid(stage, "/World/Stand", Grid(pole, np.zeros((97, 2, 2)), around=True))
+    bind(stage, stand, "/World/Looks/Figure")
+
+
+def main() -> None:
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parent
+    folder.mkdir(parents=True, exist_ok=True)
+    for make in (make_cylinders, make_drape, make_skirt):
+        print(make(folder))
+
+
+if __name__ == "__main__":
+    main()
