@@ -1,9 +1,9 @@
 """How long a bake takes: against plain NumPy in one run, and by the number of texels.
 
-    python bench/bench_bake.py [--full SCENE]
+    python bench/bench_bake.py [--full SCENE] [--btf]
 
 Ratios in one run, so that a busy machine does not matter. `--full` bakes the whole map set of SCENE
-at 4K and prints seconds and peak memory.
+at 4K and prints seconds and peak memory; `--btf` prints error against megabytes of the BTF's forms.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import argparse
 import resource
 import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from fabricusd.bake import moments as m
 from fabricusd.bake import planes
 from fabricusd.bake.angle_rows import steepness
 from fabricusd.bake.bake import Settings, bake
+from fabricusd.bake.btf.write import FORMS, write_btf
 from fabricusd.bake.garment import garments
 from fabricusd.bake.reflectance import reflectance_table
 from fabricusd.fabric import Binding, Fabric
@@ -183,11 +185,26 @@ def full(scene: str) -> None:
         )
 
 
+def btf_curve() -> None:
+    for name in ("linen_plain", "polyester_satin_charmeuse", "velvet"):
+        for bound in (8.0, 4.0, 2.0, 1.0, 0.5):
+            with tempfile.TemporaryDirectory() as folder:
+                records = write_btf(load(name), Path(folder), FORMS, max_error=bound)
+            for r in records:
+                print(
+                    f"{name:26} {r['form']:10} {r['megabytes']:6.2f} MB  rank {max(r['rank']):3}  "
+                    f"delta E {r['delta_e']:.2f}, between directions {r['delta_e_between']:.2f}"
+                )
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--full", metavar="SCENE")
+    parser.add_argument("--btf", action="store_true")
     options = parser.parse_args()
     against_numpy()
     by_texels()
     if options.full:
         full(options.full)
+    if options.btf:
+        btf_curve()

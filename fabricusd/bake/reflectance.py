@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.surface import points_all
-from fabricusd.appearance.surface_tables import is_conserving, surface_tables
+from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -35,13 +35,9 @@ _POLAR, _AZIMUTHAL, _VIEWS = 24, 48, 4
 def reflectance_table(fabric: Fabric) -> NDArray[np.float64]:
     """(2, k, ANGLES, COLUMNS) by thread set (weft, warp), thread type and tangent angle.
 
-    Raises FabricError for fabrics whose model has no level `weave` of its own.
+    Raises FabricError for the `conserving` model.
     """
-    if is_conserving(fabric):
-        raise FabricError(
-            f"{fabric.name} model",
-            "is 'conserving', which is not baked; it must be 'microcylinder' or 'thesis'",
-        )
+    refuse_conserving(fabric)
     table = np.zeros((2, len(fabric.threads), ANGLES, COLUMNS))
     for column, tint in ((0, 0.0), (1, 1.0)):
         painted = {
@@ -60,6 +56,16 @@ def reflectance_table(fabric: Fabric) -> NDArray[np.float64]:
     brightness = np.array([np.mean(t.albedo) for t in fabric.thread_list])
     table[..., 2] *= np.minimum(brightness, 1.0)[None, :, None]
     return table
+
+
+def refuse_conserving(fabric: Fabric) -> None:
+    """Raise FabricError where a thread's model is one that the baker does not know."""
+    for name, thread in fabric.threads.items():
+        if fabric.model_of(thread) == "conserving":
+            raise FabricError(
+                f"{fabric.name} {name} model",
+                "is 'conserving', which is not baked; it must be 'microcylinder' or 'thesis'",
+            )
 
 
 def _reflected(tables: Any, thread_set: int, thread: int, view: float) -> NDArray[np.float64]:

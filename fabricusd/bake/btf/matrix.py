@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from fabricusd.appearance.compiled import true_repeat
 from fabricusd.appearance.coverage import GAP
 from fabricusd.appearance.surface import points_all
-from fabricusd.appearance.surface_tables import is_conserving, surface_tables
+from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.weave import lookup
+from fabricusd.bake.reflectance import refuse_conserving
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -81,11 +82,7 @@ def btf_of(fabric: Fabric, *, per_thread: int = 16, directions: Floats | None = 
 
     Raises FabricError for a repeat of too many texels.
     """
-    if is_conserving(fabric):
-        raise FabricError(
-            f"{fabric.name} model",
-            "is 'conserving', which is not baked; it must be 'microcylinder' or 'thesis'",
-        )
+    refuse_conserving(fabric)
     ends, picks = true_repeat(fabric)
     size = (picks * per_thread, ends * per_thread)
     if size[0] * size[1] > LARGEST:
