@@ -20,6 +20,7 @@ from fabricusd.appearance.compiled import true_repeat
 from fabricusd.bake import moments as m
 from fabricusd.bake.garment import Garment
 from fabricusd.bake.maps import Texels, TextureMap
+from fabricusd.bake.planes import PLANES
 from fabricusd.bake.raster import NOBODY, owners, texel_triangles
 from fabricusd.files import whole_file
 
@@ -117,7 +118,7 @@ def bake_block(
         if level + 1 < sheet.levels:
             stacks = {k: m.halve(planes, owned) for k, (planes, owned) in stacks.items()}
     lays = len(sheet.garment.lays)
-    top, share = np.zeros((lays, m.PLANES), np.float32), np.zeros(lays, np.float32)
+    top, share = np.zeros((lays, PLANES), np.float32), np.zeros(lays, np.float32)
     for k, (planes, owned) in stacks.items():
         top[k], share[k] = planes[:, 0, 0], owned[0, 0]
     return found, top, share
@@ -126,12 +127,12 @@ def bake_block(
 def _planes(
     sheet: Sheet, lay: int, owner: NDArray[np.int32], window: tuple[int, int, int, int]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    planes = np.zeros((m.PLANES, *owner.shape), np.float32)
+    planes = np.zeros((PLANES, *owner.shape), np.float32)
     step = texel_step(sheet, lay)
     made = sheet.recipes[lay]
     side = m.samples_for(made, step, true_repeat(sheet.garment.lays[lay].fabric))
     start = texel_start(sheet, lay, window[0], window[1])
-    sums = np.empty(m.PLANES, np.float32)
+    sums = np.empty(PLANES, np.float32)
     m.texels(made, step, start, (window[0], window[1]), owner, lay, side, sums, planes)
     return planes, (owner == lay).astype(np.float32)
 

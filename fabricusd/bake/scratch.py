@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from fabricusd.bake import blocks as b
 from fabricusd.bake import moments as m
 from fabricusd.bake.maps import TextureMap
+from fabricusd.bake.planes import PLANES
 from fabricusd.errors import FabricError
 from fabricusd.files import whole_file
 
@@ -94,15 +95,15 @@ def read_tops(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """(lays, PLANES, n, n) planes of the texel that each block shrinks to, (lays, n, n) owned."""
     lays, n = len(sheet.garment.lays), sheet.across
-    planes, owned = np.empty((lays, m.PLANES, n, n), np.float32), np.empty((lays, n, n), np.float32)
+    planes, owned = np.empty((lays, PLANES, n, n), np.float32), np.empty((lays, n, n), np.float32)
     last = b.sizes(sheet, maps)[-1][-1] if maps else (0, 0)
-    count = lays * m.PLANES
+    count = lays * PLANES
     for by in range(n):
         for bx in range(n):
             with scratch.block(sheet, bx, by).open("rb") as stream:
                 stream.seek(sum(last))
                 values = np.frombuffer(stream.read(4 * (count + lays)), np.float32)
-            planes[:, :, by, bx] = values[:count].reshape(lays, m.PLANES)
+            planes[:, :, by, bx] = values[:count].reshape(lays, PLANES)
             owned[:, by, bx] = values[count:]
     return planes, owned
 

@@ -63,7 +63,7 @@ def unwrapped(axis: str, binding: Binding | None, scene: Scene, mesh: Mesh) -> G
         name="",
         points=mesh.points,
         triangles=tri,
-        normals=smooth_normals(mesh.points, tri),
+        normals=np.asarray(smooth_normals(mesh.points, tri), np.float64),
         uv=uv,
         lays=tuple(lays),
         lay=lay,

@@ -118,7 +118,7 @@ def write_mip_exr(
     """
     half = np.dtype(kind) == np.float16
     with whole_file(path) as temporary:
-        output = oiio.ImageOutput.create(str(temporary))
+        output: Any = oiio.ImageOutput.create(str(temporary))
         good = output is not None
         for level, bands in enumerate(levels):
             side = size >> level
