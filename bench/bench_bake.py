@@ -123,13 +123,8 @@ def against_numpy() -> None:
     sheet = b.sheet_of(one, (made,), 1001, (0, 0), size, 0)
     step = np.abs(b.texel_step(sheet, 0))
     owner = np.zeros((size, size), np.int32)
-<<<<<<< HEAD
-    out = np.empty((m.PLANES, size, size), np.float32)
-    sums = np.empty(m.PLANES, np.float32)
-=======
     out = np.empty((planes.PLANES, size, size), np.float32)
     sums = np.empty(planes.PLANES, np.float32)
->>>>>>> baker
 
     def ours() -> None:
         m.texels(made, step, np.zeros(2), (0, 0), owner, 0, SIDE, sums, out)
@@ -141,11 +136,7 @@ def against_numpy() -> None:
     print(
         f"planes of {size} x {size} texels, {SIDE}x{SIDE} samples, 1 worker: {seconds[0]:.3f} s "
         f"plain NumPy {seconds[1]:.3f} s, ratio {seconds[1] / seconds[0]:.1f} "
-<<<<<<< HEAD
-        f"(means of the {m.PLANES} planes differ by at most {close:.4f})"
-=======
         f"(means of the {planes.PLANES} planes differ by at most {close:.4f})"
->>>>>>> baker
     )
 
 

@@ -31,18 +31,10 @@ from fabricusd.bake.manifest import manifest_of, write_json
 from fabricusd.bake.maps import TextureMap, chosen_maps
 from fabricusd.bake.overlaps import refuse_overlaps
 from fabricusd.bake.report import write_report
-<<<<<<< HEAD
-from fabricusd.bake.scratch import Scratch, bands, bytes_needed, upper_levels
-from fabricusd.bake.unwrap import unwrapped
-from fabricusd.errors import FabricError
-from fabricusd.fabric import Binding, Fabric
-from fabricusd.reference.images import write_mip_exr
-=======
 from fabricusd.bake.scratch import Scratch, bytes_needed
 from fabricusd.bake.unwrap import unwrapped
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
->>>>>>> baker
 from fabricusd.reference.read import as_binding, read_scene
 from fabricusd.reference.scene import Scene
 from fabricusd.reference.workers import worker_count

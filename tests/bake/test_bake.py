@@ -15,10 +15,7 @@ import numpy as np
 import pytest
 from bake.meshes import write_quad
 
-<<<<<<< HEAD
-=======
 from fabricusd.bake import assemble
->>>>>>> baker
 from fabricusd.bake import bake as module
 from fabricusd.bake.bake import Settings, bake, plan
 from fabricusd.bake.relight import BakedSet
@@ -123,11 +120,7 @@ def test_a_block_that_was_damaged_is_made_again(whole, square, linen, tmp_path, 
         raise FabricError("texture", "stopped")
 
     with monkeypatch.context() as patch:
-<<<<<<< HEAD
-        patch.setattr(module, "write_mip_exr", stop)
-=======
         patch.setattr(assemble, "write_mip_exr", stop)
->>>>>>> baker
         with pytest.raises(FabricError, match="stopped"):
             bake(square, tmp_path, SMALL, fabric=linen)
     block = next((tmp_path / ".bake").glob("*/0_0.block"))
