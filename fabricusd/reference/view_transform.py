@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.schema.weaves.color import linear_from_srgb, srgb_from_linear
+
 _A, _B, _C, _D, _E = 2.51, 0.03, 2.43, 0.59, 0.14
 GREY = 0.18
 
@@ -33,15 +35,13 @@ def tone_curve(radiance: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def srgb_encode(linear: NDArray[Any]) -> NDArray[np.float64]:
-    """Linear display light to sRGB code values, [0, 1] [IEC61966-2-1]."""
-    x = np.clip(np.asarray(linear, np.float64), 0.0, 1.0)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
+    """Linear display light to sRGB code values, [0, 1]."""
+    return srgb_from_linear(np.clip(np.asarray(linear, np.float64), 0.0, 1.0))
 
 
 def srgb_decode(code: NDArray[Any]) -> NDArray[np.float64]:
     """sRGB code values to linear light, the inverse of `srgb_encode`."""
-    x = np.asarray(code, np.float64)
-    return np.where(x <= 0.04045, x / 12.92, np.power((np.maximum(x, 0) + 0.055) / 1.055, 2.4))
+    return linear_from_srgb(code)
 
 
 def view(radiance: NDArray[Any], exposure: float = 0.0) -> NDArray[np.uint8]:
