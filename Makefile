@@ -18,8 +18,12 @@ $(STAMP): pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
 	@touch $@
 
-demo: $(STAMP)  ## Install into .venv, then author, check and print every preset into demo/.
+demo: $(STAMP)  ## Install into .venv, author and check every preset, drape and render a garment, into demo/.
 	$(BIN)/fabricusd demo -o demo
+	$(BIN)/python samples/make_samples.py demo
+	$(BIN)/fabricusd render demo/skirt.usda -o demo/skirt.exr --width 480 --height 480 --spp 32
+	@if [ -f ../shared/data/towel.obj ]; then $(BIN)/fabricusd render ../shared/data/towel.obj \
+		--fabric silk_shot -o demo/towel.exr --width 480 --height 360 --spp 32; fi
 
 test: $(STAMP)  ## Run every test, the linters and the type checker.
 	$(BIN)/ruff format --check .

@@ -32,6 +32,7 @@ from fabricusd.appearance.shadow import (
 )
 from fabricusd.appearance.surface import points_all
 from fabricusd.appearance.surface_tables import surface_tables
+from fabricusd.appearance.thread_table import pack_threads
 from fabricusd.appearance.thread_terms import pair_angles, published_terms
 from fabricusd.appearance.weave import BLOCK, find_all, lookup
 from fabricusd.fabric import DEGREE, Fabric, TangentCurve, Thread, ThreadSet, Weave
@@ -113,9 +114,9 @@ def _scatter(R, row, which, a, g, ix, iy, iz, ox, oy, oz, size):  # type: ignore
 
 
 @njit(parallel=True, **KERNEL)
-def lookup_shadow_scatter(R, cloth, shadow, uv, wi, wo, out):  # type: ignore[no-untyped-def]
+def lookup_shadow_scatter(R, cloth, shadow, rows, uv, wi, wo, out):  # type: ignore[no-untyped-def]
     """Lookup, horizon and microcylinder BSDF of (n, 2) places and (3, n) pairs of directions."""
-    n, kinds = uv.shape[0], cloth.threads.shape[0]
+    n, kinds = uv.shape[0], rows.shape[0]
     for b in prange((n + BLOCK - 1) // BLOCK):
         begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
         ints, reals = np.empty((12, size), np.int32), np.empty((5, size), out.dtype)
@@ -131,7 +132,7 @@ def lookup_shadow_scatter(R, cloth, shadow, uv, wi, wo, out):  # type: ignore[no
         for c in range(3):
             out[c, begin : begin + size] = 0
         for thread in range(kinds):
-            row = _constants(cloth.threads[thread])
+            row = _constants(rows[thread])
             for which in range(2):
                 if cloth.area[which, thread] == 0:
                     continue
@@ -258,6 +259,7 @@ def main() -> None:
     uv = generator.uniform(-1e4, 1e4, (n, 2))
     wi, wo = upper(generator, n), upper(generator, n)
     cloth, shadow = compile_fabric(fabric), compile_shadow(fabric)
+    rows = pack_threads(fabric, np.float32)
     law = surface_tables(fabric, precision=np.float32)
     real: Any = np.float32
     places = np.empty(n, np.uint8), np.empty(n, np.int32), *np.empty((4, n), real)
@@ -267,7 +269,7 @@ def main() -> None:
         find_all(real, cloth, uv, *places)
 
     def scatter() -> None:
-        lookup_shadow_scatter(real, cloth, shadow, uv, wi, wo, out)
+        lookup_shadow_scatter(real, cloth, shadow, rows, uv, wi, wo, out)
 
     def weave_level() -> None:
         find()

@@ -1,4 +1,4 @@
-"""A fabric as contiguous arrays: what the kernels read.
+"""The weave of a fabric as contiguous arrays: what the lookup and the shadows read.
 
 `compile_fabric` turns the frozen dataclasses of `fabricusd.fabric` into a `CompiledFabric`, once
 per fabric and precision. Index conventions: sets are WEFT and WARP of `coverage`, thread types
@@ -15,9 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.coverage import GAP, Coverage, coverage, sets
-from fabricusd.appearance.curve import is_pile, nodes, pieces
-from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.thread import pack_threads
+from fabricusd.appearance.curve import is_pile, pieces
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -25,22 +23,15 @@ Reals = NDArray[Any]
 """float32 or float64, by the precision that the fabric was compiled for."""
 
 
-CLOSEST_NODES = math.radians(0.1)
-"""Nodes are no closer than this [rad]: a lobe may be as narrow as a mirror's, and nodes as close as
-it is wide would fill the memory."""
-
-
 class CompiledFabric(NamedTuple):
     """Arrays and scalars of one fabric; `real` below is the precision asked for.
 
-    threads : (k, F) real - `thread.pack_threads`, a row per thread type
     grid : (m, n) uint8 - 1 where end i lies over pick j
     runs : (m, n, slots, 2) uint16, uint32 beyond 65535 threads - in slot 0 for the thread on top,
         in slot 1 for the one underneath (only where `under` is a set): place of the cell in the
         visible run (cells from its start along the thread), and length of that run (cells)
     sequence : (2, k) int32 - thread types of each set, in as many columns as the longer one takes
     sequence_length : (2,) int64 - after how many threads the types repeat
-    repeat : (2,) real - ends and picks after which grid *and* threads repeat
     width : (2,) real - share of its cells' width that a set takes where it is on top
     under : int - the set that is seen underneath the other, or GAP
     under_width : real - share of its width that it shows there
@@ -53,20 +44,13 @@ class CompiledFabric(NamedTuple):
     curve_angle, curve_slope : (k, p) real - angle there [rad], change of angle per run length
     curve_height : (k, p) real - height there, in run lengths
     pile : (k,) uint8 - 1 where the type's curve has no height field
-    node_angle, node_weight, node_position : (q,) real - quadrature of the curves: angle [rad],
-        share of the cloth's area (sums to 1 - gap), position in run lengths
-    node_thread, node_set : (q,) int32 - whose node it is
-    masking_width : real - standard deviation of `u` [rad]
     last, tiny : real - the largest number below 1, the smallest normal number
-    opaque : int - 1 where no light passes
     """
 
-    threads: Reals
     grid: NDArray[np.uint8]
     runs: NDArray[Any]
     sequence: NDArray[np.int32]
     sequence_length: NDArray[np.int64]
-    repeat: Reals
     width: Reals
     under: int
     under_width: Any
@@ -79,28 +63,16 @@ class CompiledFabric(NamedTuple):
     curve_slope: Reals
     curve_height: Reals
     pile: NDArray[np.uint8]
-    node_angle: Reals
-    node_weight: Reals
-    node_position: Reals
-    node_thread: NDArray[np.int32]
-    node_set: NDArray[np.int32]
-    masking_width: Any
     last: Any
     tiny: Any
-    opaque: int
 
 
 def compile_fabric(
     fabric: Fabric,
     *,
     precision: type[np.floating[Any]] = np.float32,
-    error: float | None = None,
 ) -> CompiledFabric:
-    """Arrays of `fabric` in `precision`, np.float32 or np.float64.
-
-    error : bound on the relative error of the quadrature over each curve, see `curve.nodes`; None
-        takes nodes at most the surface lobe's width apart
-    """
+    """Arrays of `fabric` in `precision`, np.float32 or np.float64."""
     if precision not in (np.float32, np.float64):
         raise FabricError("precision", f"is {precision!r}; it must be float32 or float64")
     real = precision
@@ -114,14 +86,11 @@ def compile_fabric(
     for row, thread_set in zip(sequence, sets(fabric), strict=True):
         row[: len(thread_set.sequence)] = thread_set.sequence
     pitch = np.array([s.pitch for s in sets(fabric)])
-    angle, weight, position, thread, thread_set = _nodes(fabric, share, error)
     return CompiledFabric(
-        threads=pack_threads(fabric, real),
         grid=np.ascontiguousarray(fabric.weave.cells, dtype=np.uint8),
         runs=_run_table(fabric.weave.cells, share.under),
         sequence=sequence,
         sequence_length=lengths,
-        repeat=reals(true_repeat(fabric)),
         width=reals(share.width),
         under=share.under,
         under_width=real(share.under_width),
@@ -131,15 +100,8 @@ def compile_fabric(
         half_thickness=reals(_half_thickness(fabric, share, pitch)),
         **{name: reals(table) for name, table in _curve_tables(fabric).items()},
         pile=np.array([is_pile(t.curve) for t in fabric.thread_list], np.uint8),
-        node_angle=reals(angle),
-        node_weight=reals(weight),
-        node_position=reals(position),
-        node_thread=thread,
-        node_set=thread_set,
-        masking_width=real(fabric.masking_width),
         last=np.nextafter(real(1), real(0)),
         tiny=np.finfo(real).tiny,
-        opaque=int(fabric.opaque),
     )
 
 
@@ -238,20 +200,3 @@ def _curve_tables(fabric: Fabric) -> dict[str, NDArray[np.float64]]:
         "curve_slope": slope,
         "curve_height": height,
     }
-
-
-def _nodes(fabric: Fabric, share: Coverage, error: float | None) -> tuple[Any, ...]:
-    """Quadrature nodes of every (set, type) that covers anything, weighted by its area."""
-    columns: list[list[NDArray[Any]]] = [[], [], [], [], []]
-    for j in (WEFT, WARP):
-        for k, thread in enumerate(fabric.thread_list):
-            area = share.type_area[j, k]
-            if not area > 0:
-                continue
-            q = nodes(thread.curve, max(thread.gamma_surface, CLOSEST_NODES), error=error)
-            one = np.ones(len(q.angle), np.int32)
-            for column, values in zip(
-                columns, (q.angle, q.weight * area, q.position, one * k, one * j), strict=True
-            ):
-                column.append(values)
-    return tuple(np.concatenate(c) if c else np.zeros(0) for c in columns)

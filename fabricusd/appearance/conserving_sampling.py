@@ -13,7 +13,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from fabricusd.appearance.conserving import (
@@ -27,7 +27,7 @@ from fabricusd.appearance.conserving import (
 from fabricusd.appearance.coverage import WARP, WEFT
 from fabricusd.appearance.frame import from_thread, to_thread
 from fabricusd.appearance.multiple import multiple_share
-from fabricusd.appearance.real import INLINE, LEAN, atan2, cos, sin
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, atan2, cos, sin
 from fabricusd.appearance.sampling_lobes import (
     ISOTROPIC,
     STEEPEST,
@@ -96,7 +96,8 @@ def conserving_sampling_tables(
     owner = owners(rows, psi0, sets, tables.node_thread)
     stretches = rows.astype(R)
     energy = np.zeros((ELEVATIONS, AZIMUTHS, 6 * len(rows) + 2))
-    _measure(R, tables, stretches, owner, energy)
+    single: Any = np.float32
+    _measure(single, _in_single_precision(tables), rows.astype(single), owner, energy)
     total = energy.sum(axis=2, keepdims=True)
     possible = np.ones(energy.shape[2])
     if tables.opaque:
@@ -108,28 +109,43 @@ def conserving_sampling_tables(
     return ConservingSamplingTables(stretches, np.ascontiguousarray(shares, dtype=R), tables.opaque)
 
 
-@njit(**LEAN)
+def _in_single_precision(tables: ConservingTables) -> ConservingTables:
+    """Shares need no more, and one kernel serves both precisions."""
+    return tables._replace(
+        threads=tables.threads.astype(np.float32),
+        nodes=tables.nodes.astype(np.float32),
+        covered=np.float32(tables.covered),
+        lost=tables.lost.astype(np.float32),
+        strength=tables.strength.astype(np.float32),
+        forward=np.float32(tables.forward),
+    )
+
+
+@njit(**KERNEL, parallel=True)
 def _measure(R, tables, stretches, owner, energy):  # type: ignore[no-untyped-def]
     """Energy of every lobe at every view, each by directions drawn from the lobe itself."""
+    for view in prange(ELEVATIONS * AZIMUTHS):
+        _measure_view(R, tables, stretches, owner, view // AZIMUTHS, view % AZIMUTHS, energy)
+
+
+@njit(**LEAN)
+def _measure_view(R, tables, stretches, owner, e, a, energy):  # type: ignore[no-untyped-def]
     lobes = 3 * stretches.shape[0]
-    for e in range(ELEVATIONS):
-        theta = R(0.5 * math.pi) * min(R(e) / R(ELEVATIONS - 1), R(0.99))
-        for a in range(AZIMUTHS):
-            phi = R(2 * math.pi / AZIMUTHS) * R(a)
-            ox, oy = sin(R, theta) * cos(R, phi), sin(R, theta) * sin(R, phi)
-            oz = cos(R, theta)
-            for side in range(1 if tables.opaque != 0 else 2):
-                energy[e, a, 2 * lobes + side] = _multiple_energy(R, tables, side, ox, oy, oz)
-                for y in range(stretches.shape[0]):
-                    surface = _lobe_energy(
-                        R, tables, stretches, owner, y, side, SURFACE, ox, oy, oz
-                    )
-                    volume = _lobe_energy(R, tables, stretches, owner, y, side, VOLUME, ox, oy, oz)
-                    kd = tables.threads[int(stretches[y, THREAD]), KD]
-                    k = side * lobes + 3 * y
-                    energy[e, a, k + SURFACE] = surface
-                    energy[e, a, k + VOLUME] = volume * (R(1) - kd)
-                    energy[e, a, k + ISOTROPIC] = volume * kd
+    # Short of 90 degrees, where nothing is seen.
+    theta = R(0.5 * math.pi) * min(R(e) / R(ELEVATIONS - 1), R(0.99))
+    phi = R(2 * math.pi / AZIMUTHS) * R(a)
+    ox, oy = sin(R, theta) * cos(R, phi), sin(R, theta) * sin(R, phi)
+    oz = cos(R, theta)
+    for side in range(1 if tables.opaque != 0 else 2):
+        energy[e, a, 2 * lobes + side] = _multiple_energy(R, tables, side, ox, oy, oz)
+        for y in range(stretches.shape[0]):
+            surface = _lobe_energy(R, tables, stretches, owner, y, side, SURFACE, ox, oy, oz)
+            volume = _lobe_energy(R, tables, stretches, owner, y, side, VOLUME, ox, oy, oz)
+            kd = tables.threads[int(stretches[y, THREAD]), KD]
+            k = side * lobes + 3 * y
+            energy[e, a, k + SURFACE] = surface
+            energy[e, a, k + VOLUME] = volume * (R(1) - kd)
+            energy[e, a, k + ISOTROPIC] = volume * kd
 
 
 @njit(**INLINE)

@@ -1,4 +1,4 @@
-"""The tangent curve along one visible run of a thread: angle, height, quadrature.
+"""The tangent curve along one visible run of a thread: angle and height.
 
 Everything is per unit of the run's length: a position `s` goes from 0 to 1 over the run, a height
 is in run lengths. A segment of zero length is a jump; it has no weight, and the curve is
@@ -7,14 +7,11 @@ right-continuous there. Source: [Bisker2011] section 5.2.1; `docs/model.md` sect
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import erf
 
-from fabricusd.errors import FabricError
 from fabricusd.fabric import PILE_ANGLE, TangentCurve
 
 Floats = NDArray[np.float64]
@@ -38,14 +35,6 @@ class Pieces(NamedTuple):
     first: Floats
     last: Floats
     height: Floats
-
-
-class Nodes(NamedTuple):
-    """Quadrature nodes of a curve: position (q,), angle (q,) [rad], weight (q,), which sum to 1."""
-
-    position: Floats
-    angle: Floats
-    weight: Floats
 
 
 def pieces(curve: TangentCurve) -> Pieces:
@@ -140,59 +129,3 @@ def is_pile(curve: TangentCurve) -> bool:
     p = pieces(curve)
     rise = _rise(p.first, p.last, p.length)
     return bool(abs(rise.sum()) > CLOSING_ERROR * np.abs(rise).sum())
-
-
-def nodes(curve: TangentCurve, spacing: float, *, error: float | None = None) -> Nodes:
-    """Midpoint nodes of the curve, at most `spacing` [rad] apart in angle on each linear piece.
-
-    spacing : the thread's surface lobe width `gs`; on the published fabrics the mean over the curve
-        of a lobe that wide is then wrong by at most 1 % of its greatest value, at any centre
-    error : where given, the nodes are refined until `lobe_error(curve, nodes, spacing)` is at most
-        this
-
-    A piece of one angle takes one node. The weights are the pieces' lengths, and sum to 1.
-    """
-    if not spacing > 0:
-        raise FabricError("spacing", f"is {spacing}; it must be above 0")
-    if error is not None and not error > 0:
-        raise FabricError("error", f"is {error}; it must be above 0")
-    step = spacing
-    found = _midpoints(curve, step)
-    while error is not None and (miss := lobe_error(curve, found, spacing)) > error:
-        # The midpoint rule is of second order; 0.7 keeps the step from shrinking by inches.
-        step *= min(0.7, math.sqrt(error / miss))
-        found = _midpoints(curve, step)
-    return found
-
-
-def _midpoints(curve: TangentCurve, step: float) -> Nodes:
-    p = pieces(curve)
-    # A piece of exactly `step` takes one node, whatever rounding says.
-    count = np.maximum(1, np.ceil(np.abs(p.last - p.first) / step - 1e-9)).astype(np.int64)
-    k = np.repeat(np.arange(len(count)), count)
-    within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    share = (within + 0.5) / count[k]
-    return Nodes(
-        p.start[k] + p.length[k] * share,
-        p.first[k] + (p.last[k] - p.first[k]) * share,
-        p.length[k] / count[k],
-    )
-
-
-def lobe_error(curve: TangentCurve, q: Nodes, width: float) -> float:
-    """Worst error of the nodes on a Gaussian lobe of standard deviation `width` [rad].
-
-    The mean of the lobe over the curve has a closed form in erf; the answer is the greatest
-    difference over all centres of the lobe, relative to the greatest mean.
-    """
-    p = pieces(curve)
-    reach = float(np.abs([p.first, p.last]).max()) + 3.0 * width
-    centre = np.arange(-reach, reach + 0.25 * width, 0.25 * width)[:, None]
-    scale = 1.0 / (math.sqrt(2.0) * width)
-    change = np.where(np.abs(p.last - p.first) < 1e-9, 1.0, p.last - p.first)
-    area = math.sqrt(math.pi / 2.0) * width
-    swept = area * (erf((p.last - centre) * scale) - erf((p.first - centre) * scale)) / change
-    flat = np.exp(-(((p.first - centre) * scale) ** 2))
-    exact = np.where(np.abs(p.last - p.first) < 1e-9, flat, swept) @ p.length
-    found = np.exp(-(((q.angle - centre) * scale) ** 2)) @ q.weight
-    return float(np.abs(found - exact).max() / exact.max())

@@ -40,7 +40,14 @@ from fabricusd.appearance.law import (
 from fabricusd.appearance.levels import point_values
 from fabricusd.appearance.multiple import conserving_value
 from fabricusd.appearance.real import KERNEL
-from fabricusd.appearance.shadow import METHODS, Shadow, compile_shadow, lit_all
+from fabricusd.appearance.shadow import (
+    METHODS,
+    Shadow,
+    compile_shadow,
+    horizon_block,
+    lit_all,
+    look_up_block,
+)
 from fabricusd.appearance.weave import WeaveHit, lookup
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -162,8 +169,12 @@ def _density(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats)
     return out
 
 
-@lru_cache(maxsize=32)
 def _law(fabric: Fabric, max_error: float | None = None, multiple: bool = True) -> SurfaceLaw:
+    return _kept_law(fabric, max_error, multiple)
+
+
+@lru_cache(maxsize=32)
+def _kept_law(fabric: Fabric, max_error: float | None, multiple: bool) -> SurfaceLaw:
     rule = None if max_error is None else choose_rule(fabric, max_error)
     return surface_law(fabric, precision=np.float64, rule=rule, multiple=multiple)
 
@@ -284,6 +295,36 @@ def points_all(R, tables, across_too, sets, threads, psi0, w, wi, wo, out):  # t
     for chunk in prange((n + _CHUNK - 1) // _CHUNK):
         first, last = chunk * _CHUNK, min(n, (chunk + 1) * _CHUNK)
         point_values(R, tables, across_too, sets, threads, psi0, w, wi, wo, out, first, last)
+
+
+@njit(**KERNEL, parallel=True)
+def weave_all(R, cloth, shadow, tables, uv, wi, wo, out):
+    """Level `weave` by the `horizon` table at places uv (n, 2) float64, each looked up once.
+
+    cloth, shadow, tables : compiled for precision R, the shadow by "horizon"; wi, wo, out : (3, n)
+    """
+    n = uv.shape[0]
+    found, psi0 = np.empty((4, n), np.int32), np.empty(n, out.dtype)
+    for b in prange((n + BLOCK - 1) // BLOCK):
+        begin, end = b * BLOCK, min(n, (b + 1) * BLOCK)
+        size = end - begin
+        ints, reals = np.empty((8, size), np.int32), np.empty((6, size), out.dtype)
+        sets, threads, tops, free = (
+            found[0, begin:end], found[1, begin:end], found[2, begin:end], found[3, begin:end],
+        )  # fmt: skip
+        p, q = reals[0], reals[1]
+        look_up_block(
+            R, cloth, shadow, uv, begin, ints[:6], p, q, threads, tops, sets, free,
+            psi0[begin:end],
+        )  # fmt: skip
+        horizon_block(
+            R, cloth, shadow, ints[:6], p, q, tops, sets, free, wi, begin, ints[6:], reals[2:5],
+            reals[5],
+        )  # fmt: skip
+        point_values(R, tables, False, found[0], found[1], psi0, psi0, wi, wo, out, begin, end)
+        for c in range(3):
+            for k in range(size):
+                out[c, begin + k] *= reals[5, k]
 
 
 @njit(**KERNEL, parallel=True)

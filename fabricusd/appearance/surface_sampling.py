@@ -17,7 +17,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from fabricusd.appearance.blocks import node_range
@@ -25,7 +25,7 @@ from fabricusd.appearance.coverage import WARP, WEFT, coverage
 from fabricusd.appearance.curve import pieces
 from fabricusd.appearance.far import normalization
 from fabricusd.appearance.frame import from_thread, to_thread
-from fabricusd.appearance.real import INLINE, LEAN, atan2, cos, sin
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, atan2, cos, sin
 from fabricusd.appearance.sampling_lobes import (
     ISOTROPIC,
     STEEPEST,
@@ -97,7 +97,9 @@ def sampling_tables(fabric: Fabric, tables: SurfaceTables) -> SamplingTables:
     owner = owners(rows, psi0, sets, tables.node_thread)
     stretches = rows.astype(R)
     energy = np.zeros((ELEVATIONS, AZIMUTHS, 3 * len(rows)))
-    _measure(R, tables, stretches, owner, energy)
+    single: Any = np.float32
+    if len(rows):
+        _measure(single, _in_single_precision(tables), rows.astype(single), owner, energy)
     total = energy.sum(axis=2, keepdims=True)
     even = 1.0 / max(energy.shape[2], 1)
     measured = np.where(total > 0, energy / np.where(total > 0, total, 1.0), even)
@@ -158,26 +160,43 @@ def owners(
     threads: NDArray[np.int32],
 ) -> NDArray[np.int32]:
     """(q,) the stretch that each quadrature node belongs to: the nearest of its thread and set."""
+    if not len(rows):
+        return np.zeros(0, np.int32)
     distance = np.abs(psi0[:, None] - rows[:, PSI0])
     other = (sets[:, None] != rows[:, SET]) | (threads[:, None] != rows[:, THREAD])
     return np.argmin(np.where(other, np.inf, distance), axis=1).astype(np.int32)
 
 
-@njit(**LEAN)
+def _in_single_precision(tables: SurfaceTables) -> SurfaceTables:
+    """Shares need no more, and one kernel serves both precisions."""
+    return tables._replace(
+        threads=tables.threads.astype(np.float32),
+        smooth=tables.smooth.astype(np.float32),
+        nodes=tables.nodes.astype(np.float32),
+        gap=np.float32(tables.gap),
+        overlap_precision=np.float32(tables.overlap_precision),
+    )
+
+
+@njit(**KERNEL, parallel=True)
 def _measure(R, tables, stretches, owner, energy):
     """Energy of every lobe at every view, each by directions drawn from the lobe itself."""
-    for e in range(ELEVATIONS):
-        # Short of 90 degrees, where nothing is seen.
-        theta = R(0.5 * math.pi) * min(R(e) / R(ELEVATIONS - 1), R(0.99))
-        for a in range(AZIMUTHS):
-            phi = R(2 * math.pi / AZIMUTHS) * R(a)
-            ox, oy = sin(R, theta) * cos(R, phi), sin(R, theta) * sin(R, phi)
-            oz = cos(R, theta)
-            for y in range(stretches.shape[0]):
-                for lobe in range(3):
-                    energy[e, a, 3 * y + lobe] = _lobe_energy(
-                        R, tables, stretches, owner, y, lobe, ox, oy, oz
-                    )
+    for view in prange(ELEVATIONS * AZIMUTHS):
+        _measure_view(R, tables, stretches, owner, view // AZIMUTHS, view % AZIMUTHS, energy)
+
+
+@njit(**LEAN)
+def _measure_view(R, tables, stretches, owner, e, a, energy):
+    # Short of 90 degrees, where nothing is seen.
+    theta = R(0.5 * math.pi) * min(R(e) / R(ELEVATIONS - 1), R(0.99))
+    phi = R(2 * math.pi / AZIMUTHS) * R(a)
+    ox, oy = sin(R, theta) * cos(R, phi), sin(R, theta) * sin(R, phi)
+    oz = cos(R, theta)
+    for y in range(stretches.shape[0]):
+        for lobe in range(3):
+            energy[e, a, 3 * y + lobe] = _lobe_energy(
+                R, tables, stretches, owner, y, lobe, ox, oy, oz
+            )
 
 
 @njit(**INLINE)
@@ -269,6 +288,8 @@ def far_density(R, sampling, ix, iy, iz, ox, oy, oz):
     """pdf(wi) [1/sr] of `far_direction`; 0 at or below the cloth."""
     if iz <= R(0) or oz <= R(0):
         return R(0)
+    if sampling.stretches.shape[0] == 0:
+        return R(0.5 / math.pi)
     corner = view_corner(R, ox, oy, oz)
     p = R(UNIFORM / (2 * math.pi))
     for y in range(sampling.stretches.shape[0]):

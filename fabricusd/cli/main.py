@@ -21,6 +21,7 @@ COMMANDS = {
     "new": "make a fabric from a preset, a weave, an image or a WIF draft",
     "cat": "say what a fabric is, in a weaver's words, and draw its draft",
     "check": "find faults in fabrics, threads and bindings",
+    "bake": "make textures of a fabric on a garment",
     "render": "path-trace a scene for look-dev review",
     "compare": "measure how far one picture is from another",
     "plugin-path": "print the folder that PXR_PLUGINPATH_NAME needs",

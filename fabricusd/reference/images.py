@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -99,3 +99,58 @@ def read_exr_layers(
         planes.setdefault(layer or "beauty", []).append(pixels[..., k])
     metadata = {a.name: a.value for a in buffer.spec().extra_attribs}
     return {layer: np.stack(p, axis=-1) for layer, p in planes.items()}, metadata
+
+
+def write_mip_exr(
+    path: str | os.PathLike[str],
+    levels: Sequence[Callable[[], Iterator[NDArray[Any]]]],
+    size: int,
+    channels: tuple[str, ...],
+    kind: type[Any],
+    metadata: Mapping[str, Any],
+) -> None:
+    """A square mip-mapped EXR in tiles of 64, zip compressed, written band by band.
+
+    levels : for each level a function that gives its rows from the top, as (rows, size, channels)
+        arrays of `kind`, np.float16 or np.float32; heights in multiples of 64, or the whole level
+
+    Written whole or not at all; `FabricError` where it cannot.
+    """
+    half = np.dtype(kind) == np.float16
+    with whole_file(path) as temporary:
+        output = oiio.ImageOutput.create(str(temporary))
+        good = output is not None
+        for level, bands in enumerate(levels):
+            side = size >> level
+            spec = oiio.ImageSpec(side, side, len(channels), oiio.HALF if half else oiio.FLOAT)
+            spec.channelnames = channels
+            spec.tile_width = spec.tile_height = 64
+            spec.attribute("compression", "zip")
+            spec.attribute("openexr:levelmode", 1)
+            spec.attribute("textureformat", "Plain Texture")
+            spec.attribute("wrapmodes", "clamp,clamp")
+            # The time of writing would make two files of the same pixels differ.
+            spec.attribute("DateTime", "1970:01:01 00:00:00")
+            for key, value in metadata.items():
+                spec.attribute(key, value if isinstance(value, int | float | str) else str(value))
+            mode = "Create" if level == 0 else "AppendMIPLevel"
+            good = good and output.open(str(temporary), spec, mode)
+            row = 0
+            for band in bands() if good else ():
+                end = row + band.shape[0]
+                good = good and output.write_tiles(0, side, row, end, 0, 1, band)
+                row = end
+        good = good and output.close()
+        reason = output.geterror() if output is not None else "no EXR writer"
+        # The file is complete only once the writer is gone.
+        del output
+        if not good:
+            raise FabricError(str(path), f"cannot be written: {' '.join(str(reason).split())}")
+
+
+def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.float32]:
+    """(h, w, c) float32 pixels of one mip level, values as they are in the file."""
+    buffer = oiio.ImageBuf(str(readable_file(path)), 0, level)
+    if buffer.has_error or level >= max(buffer.nmiplevels, 1):
+        raise FabricError(str(path), f"has no level {level}: {buffer.geterror()}")
+    return np.asarray(buffer.get_pixels(oiio.FLOAT), np.float32)

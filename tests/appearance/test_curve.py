@@ -1,4 +1,4 @@
-"""The tangent curve: angle, height in closed form, quadrature."""
+"""The tangent curve: angle, height in closed form, crest, pile."""
 
 from __future__ import annotations
 
@@ -7,13 +7,10 @@ import math
 import numpy as np
 import pytest
 from hypothesis import assume, given
-from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from fabricusd.appearance import curve as c
-from fabricusd.errors import FabricError
 from fabricusd.fabric import DEGREE, TangentCurve
-from tests.appearance.presets import PRESETS
 from tests.strategies import curves
 
 
@@ -73,12 +70,10 @@ ZERO_LENGTHS = {
 
 
 @pytest.mark.parametrize(("curve", "count"), ZERO_LENGTHS.values(), ids=ZERO_LENGTHS.keys())
-def test_a_zero_length_has_no_weight_and_no_node(curve: TangentCurve, count: int) -> None:
+def test_a_zero_length_is_no_piece_and_has_no_weight(curve: TangentCurve, count: int) -> None:
     assert len(c.pieces(curve).start) == count
-    q = c.nodes(curve, math.pi)
-    assert len(q.angle) == count
-    assert q.weight.sum() == pytest.approx(1.0, abs=1e-15)
-    assert np.isfinite(q.angle).all()
+    assert c.pieces(curve).length.sum() == pytest.approx(1.0, abs=1e-15)
+    assert (c.pieces(curve).length > 0).all()
 
 
 PILE = {
@@ -107,59 +102,10 @@ def test_every_curve_has_finite_angles_and_heights_and_whole_weights(curve: Tang
     s = np.linspace(0, 1, 33)
     assert np.isfinite(c.angle_at(curve, s)).all()
     assert np.isfinite(c.height_at(curve, s)).all()
-    q = c.nodes(curve, 0.1)
-    assert q.weight.sum() == pytest.approx(1.0, abs=1e-12)
-    assert (q.weight > 0).all()
-    np.testing.assert_allclose(c.angle_at(curve, q.position), q.angle, atol=1e-9)
     p = c.pieces(curve)
-    exact_mean = float((0.5 * (p.first + p.last)) @ p.length)
-    assert float(q.angle @ q.weight) == pytest.approx(exact_mean, abs=1e-12)
-
-
-@given(curves(), st.floats(0.02, 1.5))
-def test_nodes_are_at_most_the_spacing_apart_on_a_piece(
-    curve: TangentCurve, spacing: float
-) -> None:
-    p = c.pieces(curve)
-    q = c.nodes(curve, spacing)
-    for first, last, start, length in zip(p.first, p.last, p.start, p.length, strict=True):
-        inside = (q.position > start) & (q.position < start + length)
-        steps = abs(last - first) / np.count_nonzero(inside)
-        assert steps <= spacing * (1 + 1e-6)
-
-
-@given(curves(), st.sampled_from((1e-2, 1e-3, 1e-4)), st.floats(0.05, 1.0))
-def test_nodes_meet_the_error_that_the_caller_asks_for(
-    curve: TangentCurve, error: float, spacing: float
-) -> None:
-    q = c.nodes(curve, spacing, error=error)
-    # The lobe of unit height, integrated by brute force over the curve.
-    s = (np.arange(20000) + 0.5) / 20000
-    for centre in (0.0, 0.3, -0.7, curve.angles[0]):
-        lobe = np.exp(-0.5 * ((c.angle_at(curve, s) - centre) / spacing) ** 2).mean()
-        found = float(np.exp(-0.5 * ((q.angle - centre) / spacing) ** 2) @ q.weight)
-        assert abs(found - lobe) <= error + 2e-4
-
-
-def test_the_error_measure_sees_nodes_that_are_too_few() -> None:
-    assert c.lobe_error(HUMP, c.nodes(HUMP, 50 * DEGREE), 5 * DEGREE) > 0.5
-
-
-PUBLISHED = [
-    (name, k, t) for name, fabric in PRESETS.items() for k, t in enumerate(fabric.thread_list)
-]
-
-
-@pytest.mark.parametrize(
-    ("name", "k", "thread"), PUBLISHED, ids=[f"{n} {k}" for n, k, _ in PUBLISHED]
-)
-def test_nodes_a_lobe_apart_are_within_about_one_percent_at_every_centre(name, k, thread) -> None:  # type: ignore[no-untyped-def]
-    width = thread.gamma_surface
-    worst = c.lobe_error(thread.curve, c.nodes(thread.curve, width), width)
-    assert worst < 0.011
-    # Half of the spacing divides the error by about four: the rule is of second order.
-    finer = c.lobe_error(thread.curve, c.nodes(thread.curve, width / 2), width)
-    assert finer < 0.31 * worst + 1e-9
+    assert p.length.sum() == pytest.approx(1.0, abs=1e-12)
+    middle = p.start + 0.5 * p.length
+    np.testing.assert_allclose(c.angle_at(curve, middle), 0.5 * (p.first + p.last), atol=1e-9)
 
 
 def test_the_crest_is_where_the_height_is_greatest() -> None:
@@ -180,11 +126,3 @@ def test_a_curve_shorn_of_its_lengths_is_the_same_curve(curve: TangentCurve) -> 
     double = TangentCurve(positions=tuple(3 + 7 * x for x in curve.positions), angles=curve.angles)
     s = np.linspace(0.01, 0.99, 7)
     np.testing.assert_allclose(c.height_at(double, s), c.height_at(curve, s), atol=1e-9)
-
-
-@pytest.mark.parametrize("spacing", [0.0, -1.0, math.nan])
-def test_a_spacing_of_nothing_is_refused(spacing: float) -> None:
-    with pytest.raises(FabricError, match=r"spacing is .*; it must be above 0"):
-        c.nodes(HUMP, spacing)
-    with pytest.raises(FabricError, match=r"error is .*; it must be above 0"):
-        c.nodes(HUMP, 0.1, error=spacing)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fabricusd.appearance import plain, surface
+from fabricusd.appearance.compiled import compile_fabric
 from fabricusd.appearance.conserving import NODE_COS as C_COS
 from fabricusd.appearance.conserving import NODE_SIN as C_SIN
 from fabricusd.appearance.conserving import NODE_WEIGHT as C_WEIGHT
@@ -22,7 +23,7 @@ from fabricusd.appearance.law import (
 )
 from fabricusd.appearance.levels import point_value, point_values
 from fabricusd.appearance.quadrature import curve_nodes
-from fabricusd.appearance.shadow import METHODS
+from fabricusd.appearance.shadow import METHODS, compile_shadow
 from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.weave import lookup
 from fabricusd.fabric import MODELS
@@ -192,3 +193,18 @@ def test_in_mixed_cloth_each_thread_scatters_by_its_own_model(level):
         else:
             assert found == pytest.approx(alone, rel=1e-9)
     assert law_value(R, law, FAR, 0, 0, 0.0, 0.0, *WI[0], *-WO[0]) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", ["silk_crepe_de_chine", "polyester_satin_charmeuse", "velvet"])
+def test_the_loop_that_looks_up_once_is_weave_by_the_horizon(name):
+    fabric = PRESETS[name]
+    places, wi, wo = spread_places(1500), random_directions(1500, 4), random_directions(1500, 5)
+    cloth = compile_fabric(fabric, precision=np.float64)
+    shadow = compile_shadow(fabric, "horizon", precision=np.float64)
+    out = np.empty((3, 1500))
+    surface.weave_all(
+        R, cloth, shadow, surface_tables(fabric), places,
+        np.ascontiguousarray(wi.T), np.ascontiguousarray(wo.T), out,
+    )  # fmt: skip
+    expected = surface.evaluate(fabric, wi, wo, uv=places, level="weave", shadow="horizon")
+    assert out.T == pytest.approx(expected, rel=1e-9, abs=1e-12)

@@ -1,0 +1,416 @@
+"""From a scene to a folder of textures."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fabricusd import __version__
+from fabricusd.bake import blocks as b
+from fabricusd.bake import moments as m
+from fabricusd.bake.accuracy import SwatchError, swatch_error
+from fabricusd.bake.btf.write import MAX_ERROR, write_btf
+from fabricusd.bake.garment import (
+    Garment,
+    fitted,
+    garments,
+    resolution_for,
+    threads_per_uv,
+    tiles_of,
+)
+from fabricusd.bake.layer import write_mesh_layer
+from fabricusd.bake.manifest import manifest_of, write_json
+from fabricusd.bake.maps import TextureMap, chosen_maps
+from fabricusd.bake.overlaps import refuse_overlaps
+from fabricusd.bake.report import write_report
+from fabricusd.bake.scratch import Scratch, bands, bytes_needed, upper_levels
+from fabricusd.bake.unwrap import unwrapped
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Binding, Fabric
+from fabricusd.reference.images import write_mip_exr
+from fabricusd.reference.read import as_binding, read_scene
+from fabricusd.reference.scene import Scene
+from fabricusd.reference.workers import Batches, worker_count
+
+MARGIN = 16
+"""Texels that a shell is continued beyond its border: enough for four mip levels without a seam."""
+
+LARGEST = 32768
+"""Texels along a side: beyond it a texture is more than most tools open; use more UDIM tiles."""
+
+FEWEST = 2.0
+"""Texels per thread below which threads do not resolve and texels hold means of several."""
+
+Progress = Callable[[str, int, int], Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What is made of a scene.
+
+    resolution : texels along a side, a power of two from 64; 0 to take `texels_per_thread`
+    maps : names from the registry, None for all
+    light : direction to a light in the surface frame, for the map `shadow`
+    level : "weave" or "thread", whether threads are flat or round across their width
+    udim : bake each UDIM tile that the UVs reach into
+    fit : move and scale each garment's UVs into the unit square first
+    unwrap : "x", "y" or "z": new UVs by xatlas, with the warp along that axis of the world
+    max_error : mean delta E 2000 of re-lit texels against level `weave` to reach; 0 to ask nothing
+    btf : forms of the BTF to write, see `btf.write.FORMS`
+    """
+
+    resolution: int = 1024
+    texels_per_thread: float = 0.0
+    maps: tuple[str, ...] | None = None
+    light: tuple[float, float, float] | None = None
+    shadow: str = "peak"
+    level: str = "weave"
+    udim: bool = False
+    fit: bool = False
+    unwrap: str = ""
+    max_error: float = 0.0
+    btf: tuple[str, ...] = ()
+    margin: int = MARGIN
+
+
+@dataclass(kw_only=True)
+class Baked:
+    """What a bake has made.
+
+    files : names of the textures, by garment, map and UDIM number
+    errors : of each garment, measured as `accuracy.swatch_error` does
+    btf : records of the BTFs that were written, by fabric
+    notes : what had to be assumed or left out
+    """
+
+    folder: Path
+    resolution: int
+    garments: list[Garment]
+    maps: list[TextureMap]
+    files: dict[str, dict[str, dict[int, str]]]
+    notes: list[str] = field(default_factory=list)
+    errors: dict[str, SwatchError] = field(default_factory=dict)
+    btf: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    seconds: float = 0.0
+    finished: bool = True
+
+    def reached(self, max_error: float) -> bool:
+        """Whether every garment, and every BTF, is within `max_error`."""
+        records = [r["delta_e"] for rows in self.btf.values() for r in rows]
+        return all(e.point <= max_error for e in self.errors.values()) and all(
+            e <= max_error for e in records
+        )
+
+
+def bake(
+    scene: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    settings: Settings | None = None,
+    *,
+    fabric: str | Fabric | Binding | None = None,
+    mesh: str | None = None,
+    resume: bool = False,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Baked:
+    """Bake what wears a fabric in `scene` into the folder `out`; its textures and their manifest.
+
+    fabric : laid on everything that names none, as for `render`
+    mesh : path of the one mesh to bake
+    resume : go on with a bake of the same job that was stopped
+
+    Raises FabricError for a scene, mesh or setting that cannot be baked, before anything is
+    written; and for a disk that is full, with what is done kept for `resume`.
+    """
+    began = time.perf_counter()
+    settings = settings or Settings()
+    read = read_scene(scene, fabric=fabric)
+    found = _garments(read, settings, mesh, fabric)
+    maps = chosen_maps(settings.maps, light=settings.light is not None)
+    resolution = _resolution(settings, found)
+    tiles = [tiles_of(one, settings.udim) for one in found]
+    folder = _folder(out)
+    for one, places in zip(found, tiles, strict=True):
+        refuse_overlaps(one, places, min(resolution, 2048), folder)
+    recipes = _recipes(found, settings)
+    if settings.max_error:
+        resolution = resolution_within(settings.max_error, found, tiles, recipes, resolution)
+    sheets = [
+        b.sheet_of(
+            one, tuple(recipes[lay.fabric] for lay in one.lays), number, place, resolution,
+            settings.margin,
+        )
+        for one, places in zip(found, tiles, strict=True)
+        for number, place in places.items()
+    ]  # fmt: skip
+    result = Baked(
+        folder=folder,
+        resolution=resolution,
+        garments=found,
+        maps=maps,
+        files={},
+        notes=[*read.notes, *(n for g in found for n in g.notes), *_coarse(found, resolution)],
+    )
+    scratch = Scratch(folder, _key(found, settings, resolution, maps), resume=resume)
+    _check_space(folder, bytes_needed(sheets, maps))
+    count = worker_count(workers)
+    result.finished = all(
+        step(scratch, sheets, maps, folder, settings.udim, count, progress)
+        for step in (_compute, _assemble)
+    )
+    if not result.finished:
+        return result
+    for sheet in sheets:
+        per_map = result.files.setdefault(sheet.garment.name, {})
+        for texture in maps:
+            name = file_name(sheet, texture, settings.udim).name
+            per_map.setdefault(texture.name, {})[sheet.number] = name
+    for one in found:
+        write_mesh_layer(folder / f"{one.name}.usdc", one, read.up_axis)
+    _measure(result, sheets, settings)
+    result.seconds = time.perf_counter() - began
+    write_json(folder / "manifest.json", manifest_of(result, settings, Path(scene)))
+    write_report(result, settings)
+    scratch.close()
+    return result
+
+
+def _measure(result: Baked, sheets: Sequence[b.Sheet], settings: Settings) -> None:
+    """The error of each garment's first sheet, and the BTFs of its fabrics."""
+    for sheet in sheets:
+        if sheet.garment.name not in result.errors:
+            result.errors[sheet.garment.name] = swatch_error(sheet)
+        for lay in sheet.garment.lays:
+            if settings.btf and lay.fabric.name not in result.btf:
+                result.btf[lay.fabric.name] = write_btf(
+                    lay.fabric, result.folder, settings.btf,
+                    max_error=settings.max_error or MAX_ERROR,
+                )  # fmt: skip
+
+
+def resolution_within(
+    max_error: float,
+    found: Sequence[Garment],
+    tiles: Sequence[dict[int, tuple[int, int]]],
+    recipes: dict[Fabric, m.Recipe],
+    largest: int,
+) -> int:
+    """The least power of two up to `largest` at which every garment meets `max_error`.
+
+    `largest` itself where none does: the report then says what was reached.
+    """
+    resolution = 64
+    while resolution < largest:
+        if all(
+            swatch_error(
+                b.sheet_of(
+                    one, tuple(recipes[lay.fabric] for lay in one.lays),
+                    *next(iter(places.items())), resolution, MARGIN,
+                )
+            ).point
+            <= max_error
+            for one, places in zip(found, tiles, strict=True)
+        ):  # fmt: skip
+            return resolution
+        resolution *= 2
+    return largest
+
+
+def plan(
+    scene: str | os.PathLike[str],
+    settings: Settings,
+    *,
+    fabric: str | Fabric | Binding | None = None,
+    mesh: str | None = None,
+) -> list[str]:
+    """One line for each texture set that `bake` would make; the same errors, nothing written."""
+    found = _garments(read_scene(scene, fabric=fabric), settings, mesh, fabric)
+    maps = chosen_maps(settings.maps, light=settings.light is not None)
+    resolution = _resolution(settings, found)
+    return [
+        f"{one.name}: {len(maps)} maps, tiles {', '.join(map(str, tiles_of(one, settings.udim)))}, "
+        f"{resolution} x {resolution}, {resolution / threads_per_uv(one):.3g} texels per thread"
+        for one in found
+    ]
+
+
+def _garments(
+    scene: Scene,
+    settings: Settings,
+    mesh: str | None,
+    fabric: str | Fabric | Binding | None,
+) -> list[Garment]:
+    if settings.unwrap:
+        return garments(scene, mesh, partial(unwrapped, settings.unwrap, as_binding(fabric)))
+    found = garments(scene, mesh)
+    return [fitted(one) for one in found] if settings.fit else found
+
+
+def _folder(out: str | os.PathLike[str]) -> Path:
+    folder = Path(out)
+    if folder.exists() and not folder.is_dir():
+        raise FabricError(str(folder), "is a file; it must be a folder's name")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FabricError(str(folder), f"cannot be made: {error.strerror}") from error
+    if not os.access(folder, os.W_OK):
+        raise FabricError(str(folder), "cannot be written; it must be a folder of yours")
+    return folder
+
+
+def _resolution(settings: Settings, found: Sequence[Garment]) -> int:
+    asked = settings.resolution
+    if settings.texels_per_thread:
+        asked = resolution_for(found, settings.texels_per_thread)
+    if asked < 64 or asked & (asked - 1) or asked > LARGEST:
+        words = f"a power of two from 64 to {LARGEST}"
+        if settings.texels_per_thread:
+            raise FabricError(
+                "--texels-per-thread",
+                f"is {settings.texels_per_thread:g}, which takes {asked} texels; it must lead to "
+                f"{words}: bake fewer threads a tile",
+            )
+        raise FabricError("--resolution", f"is {asked}; it must be {words}")
+    return asked
+
+
+def _coarse(found: Sequence[Garment], resolution: int) -> list[str]:
+    notes = []
+    for one in found:
+        texels = resolution / threads_per_uv(one)
+        if texels < FEWEST:
+            notes.append(
+                f"{one.copies[0]} has {texels:.2g} texels per thread; threads resolve from "
+                f"{FEWEST:g}, so each texel holds the mean of what it spans"
+            )
+    return notes
+
+
+def _recipes(found: Sequence[Garment], settings: Settings) -> dict[Fabric, m.Recipe]:
+    made: dict[Fabric, m.Recipe] = {}
+    for one in found:
+        for lay in one.lays:
+            if lay.fabric not in made:
+                made[lay.fabric] = m.recipe(
+                    lay.fabric, level=settings.level, light=settings.light, method=settings.shadow
+                )
+    return made
+
+
+def _key(
+    found: Sequence[Garment], settings: Settings, resolution: int, maps: Sequence[TextureMap]
+) -> str:
+    words = [__version__, repr(settings), str(resolution), *(t.name for t in maps)]
+    words += [one.name + one.fingerprint for one in found]
+    return hashlib.sha256("\n".join(words).encode()).hexdigest()
+
+
+def _check_space(folder: Path, need: int) -> None:
+    free = shutil.disk_usage(folder).free
+    if need > free:
+        raise FabricError(
+            str(folder),
+            f"has {free / 1e9:.3g} GB left; the bake needs {need / 1e9:.3g} GB while it runs",
+        )
+
+
+def _compute(
+    scratch: Scratch,
+    sheets: Sequence[b.Sheet],
+    maps: Sequence[TextureMap],
+    folder: Path,
+    udim: bool,
+    workers: int,
+    progress: Progress | None,
+) -> bool:
+    """Every block that is not there yet; False where interrupted."""
+    jobs = []
+    for sheet in sheets:
+        if all(scratch.is_done(folder / file_name(sheet, one, udim)) for one in maps):
+            continue
+        jobs += [(sheet, x, y) for y in range(sheet.across) for x in range(sheet.across)]
+
+    def one_block(_: int, k: int) -> None:
+        sheet, x, y = jobs[k]
+        path = scratch.block(sheet, x, y)
+        if not b.block_is_sound(path):
+            b.write_block(path, *b.bake_block(sheet, maps, x, y))
+
+    report = partial(progress, "blocks", len(jobs)) if progress else None
+    return Batches(workers, one_block).run(len(jobs), report)
+
+
+def file_name(sheet: b.Sheet, one: TextureMap, udim: bool) -> Path:
+    """A texture's name: garment, map, and the tile's number where there are tiles."""
+    number = f".{sheet.number}" if udim else ""
+    return Path(f"{sheet.garment.name}.{one.name}{number}.exr")
+
+
+def _assemble(
+    scratch: Scratch,
+    sheets: Sequence[b.Sheet],
+    maps: Sequence[TextureMap],
+    folder: Path,
+    udim: bool,
+    workers: int,
+    progress: Progress | None,
+) -> bool:
+    """Every texture that is not there yet; False where interrupted."""
+    for sheet in sheets:
+        todo = [
+            k
+            for k, one in enumerate(maps)
+            if not scratch.is_done(folder / file_name(sheet, one, udim))
+        ]
+        if not todo:
+            continue
+        task = partial(_write_texture, scratch, sheet, maps, folder, udim, todo)
+        task = partial(task, upper_levels(scratch, sheet, maps))
+        report = partial(progress, "textures", len(todo)) if progress else None
+        if not Batches(workers, task).run(len(todo), report):
+            return False
+        scratch.drop(sheet)
+    return True
+
+
+def _write_texture(
+    scratch: Scratch,
+    sheet: b.Sheet,
+    maps: Sequence[TextureMap],
+    folder: Path,
+    udim: bool,
+    todo: Sequence[int],
+    upper: list[list[Any]],
+    _worker: int,
+    job: int,
+) -> None:
+    """One texture, from the blocks and the levels above them."""
+    k = todo[job]
+    one, places = maps[k], b.sizes(sheet, maps)[k]
+    levels: list[Any] = [
+        partial(bands, scratch, sheet, one, level, places) for level in range(sheet.levels)
+    ]
+    levels += [partial(_whole, level) for level in upper[k]]
+    metadata = {
+        "fabricusd:map": one.name,
+        "fabricusd:meaning": one.meaning,
+        "oiio:ColorSpace": "lin_rec709" if one.color else "Raw",
+        "Software": f"fabricusd {__version__}",
+    }
+    path = folder / file_name(sheet, one, udim)
+    write_mip_exr(path, levels, sheet.resolution, one.channels, one.kind, metadata)
+    scratch.mark_done(path)
+
+
+def _whole(level: np.ndarray[Any, Any]) -> Any:
+    return iter((level,))

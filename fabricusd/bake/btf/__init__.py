@@ -1,0 +1,1 @@
+"""Bidirectional texture functions of a fabric's repeat, in three compressed forms."""

@@ -1,0 +1,131 @@
+"""The factored form: a table of one repeat, which every texel reaches by its weave coordinate.
+
+The atlas of components holds the same as pictures, for tools that only know textures.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fabricusd.bake.btf.factors import Factors
+from fabricusd.bake.btf.interpolate import evaluate
+from fabricusd.bake.btf.matrix import Btf
+from fabricusd.errors import FabricError
+from fabricusd.files import readable_file, whole_file
+from fabricusd.reference.images import read_exr_layers, write_exr
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FactoredBtf:
+    """Joint factors of one repeat: directions (d, 3), size (h, w), texels per thread."""
+
+    directions: Floats
+    factors: Factors
+    size: tuple[int, int]
+    per_thread: int
+
+    def evaluate(self, weave: ArrayLike, wi: ArrayLike, wo: ArrayLike) -> Floats:
+        """(n, 3) radiance per unit `L_i dwi` at weave coordinates (n, 2), cosine included.
+
+        wi, wo : (3,) unit vectors in the weave's frame
+        """
+        return evaluate(self.directions, self.factors, self.size, self.per_thread, weave, wi, wo)
+
+
+def factored(btf: Btf, made: Factors) -> FactoredBtf:
+    """The form of a table's joint factors."""
+    return FactoredBtf(
+        directions=btf.directions, factors=made, size=btf.size, per_thread=btf.per_thread
+    )
+
+
+def write_factored(path: str | os.PathLike[str], one: FactoredBtf) -> None:
+    """A compressed `.npz` of half floats, whole or not at all."""
+    rows, columns = one.factors.rows[0], one.factors.columns[0]
+    scale = np.maximum(np.abs(rows).max(axis=(0, 1)), 1e-20)
+    with whole_file(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(
+            stream,
+            directions=one.directions,
+            rows=(rows / scale).astype(np.float16),
+            columns=(columns * scale).astype(np.float16),
+            size=np.array(one.size),
+            per_thread=np.array(one.per_thread),
+            delta_e=np.array(one.factors.delta_e),
+        )
+
+
+def read_factored(path: str | os.PathLike[str]) -> FactoredBtf:
+    """Read what `write_factored` wrote; FabricError for anything else."""
+    try:
+        with np.load(readable_file(path)) as data:
+            h, w = (int(n) for n in data["size"])
+            return FactoredBtf(
+                directions=data["directions"],
+                factors=Factors(
+                    rows=(data["rows"].astype(np.float32),),
+                    columns=(data["columns"].astype(np.float32),),
+                    delta_e=float(data["delta_e"]),
+                ),
+                size=(h, w),
+                per_thread=int(data["per_thread"]),
+            )
+    except (ValueError, KeyError, OSError, EOFError) as error:
+        raise FabricError(str(path), f"is no factored BTF: {error}") from error
+
+
+def write_atlas(stem: str | os.PathLike[str], one: FactoredBtf) -> tuple[Path, Path]:
+    """`<stem>.components.exr` and `<stem>.weights.exr`: reflectance is the sum over k of component
+    k at the place, times weight k at the pair of directions.
+
+    A component is a channel over one repeat, its top row at the greatest v; a weight is an RGB
+    layer with the light's number along x and the view's along y.
+    """
+    d, (h, w) = len(one.directions), one.size
+    columns = one.factors.columns[0].reshape(h, w, -1)[::-1]
+    weights = one.factors.rows[0].reshape(d, d, 3, -1)
+    names = [f"c{k:03d}" for k in range(columns.shape[2])]
+    places, angles = Path(f"{stem}.components.exr"), Path(f"{stem}.weights.exr")
+    said = {"fabricusd:texelsPerThread": one.per_thread, "fabricusd:deltaE": one.factors.delta_e}
+    write_exr(
+        places,
+        {n: columns[..., k : k + 1] for k, n in enumerate(names)},
+        dict.fromkeys(names, ("Y",)),
+        said,
+    )
+    polar = ";".join(f"{x:.6f},{y:.6f},{z:.6f}" for x, y, z in one.directions)
+    write_exr(
+        angles,
+        {n: weights[..., k] for k, n in enumerate(names)},
+        dict.fromkeys(names, ("R", "G", "B")),
+        {**said, "fabricusd:directions": polar},
+    )
+    return places, angles
+
+
+def read_atlas(stem: str | os.PathLike[str]) -> FactoredBtf:
+    """Read what `write_atlas` wrote."""
+    places, said = read_exr_layers(Path(f"{stem}.components.exr"))
+    angles, also = read_exr_layers(Path(f"{stem}.weights.exr"))
+    names = sorted(places)
+    columns = np.concatenate([places[n][::-1] for n in names], axis=-1)
+    rows = np.stack([angles[n] for n in names], axis=-1)
+    polar = [tuple(map(float, p.split(","))) for p in also["fabricusd:directions"].split(";")]
+    h, w, rank = columns.shape
+    return FactoredBtf(
+        directions=np.array(polar),
+        factors=Factors(
+            rows=(rows.reshape(-1, 3, rank),),
+            columns=(columns.reshape(h * w, rank),),
+            delta_e=float(said["fabricusd:deltaE"]),
+        ),
+        size=(h, w),
+        per_thread=int(said["fabricusd:texelsPerThread"]),
+    )

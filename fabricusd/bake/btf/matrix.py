@@ -1,0 +1,166 @@
+"""The table that all three forms compress: places of the repeat by pairs of directions.
+
+The value is the apparent BRDF of appearance level `weave`, radiance over irradiance [1/sr], without
+the light's cosine. At that level a place matters only by its thread and tangent angle, so the table
+is a product: values at nodes of (set, thread, angle), times how much of each node a texel shows.
+Everything below is computed on the nodes, which are a few hundred, however large the repeat is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.appearance.compiled import true_repeat
+from fabricusd.appearance.coverage import GAP
+from fabricusd.appearance.surface import points_all
+from fabricusd.appearance.surface_tables import surface_tables
+from fabricusd.appearance.weave import lookup
+from fabricusd.bake.reflectance import refuse_conserving
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+
+Floats = NDArray[np.float64]
+
+RINGS = (
+    (0.0, 1),
+    (11.0, 6),
+    (23.0, 12),
+    (34.5, 18),
+    (46.0, 24),
+    (57.5, 30),
+    (68.0, 30),
+    (78.0, 30),
+)
+"""Inclination [degrees] and number of directions: 151, as measured BTFs have, none at the rim."""
+
+INSIDE = 4
+"""Samples along a texel's side."""
+
+LARGEST = 2**22
+"""Most texels of a repeat."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Btf:
+    """A table as a product of two.
+
+    directions : (d, 3) unit vectors, of light and of view alike
+    nodes : (d*d, 3, k) float32 - values by view * d + light, channel, node
+    texels : (h*w, k) float32 - share of each node in a texel, row 0 at v = 0
+    size : (h, w)
+    per_thread : texels along a thread's pitch
+    """
+
+    fabric: Fabric
+    directions: Floats
+    nodes: NDArray[np.float32]
+    texels: NDArray[np.float32]
+    size: tuple[int, int]
+    per_thread: int
+
+
+def ring_directions(rings: tuple[tuple[float, int], ...] = RINGS) -> Floats:
+    """(d, 3) unit vectors on rings of even azimuths."""
+    found = []
+    for inclination, count in rings:
+        theta = math.radians(inclination)
+        for k in range(count):
+            phi = 2.0 * math.pi * k / count
+            found.append(
+                (math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta))
+            )
+    return np.array(found)
+
+
+def btf_of(fabric: Fabric, *, per_thread: int = 16, directions: Floats | None = None) -> Btf:
+    """The table of one repeat of `fabric` with `per_thread` texels a thread each way.
+
+    Raises FabricError for a repeat of too many texels.
+    """
+    refuse_conserving(fabric)
+    ends, picks = true_repeat(fabric)
+    size = (picks * per_thread, ends * per_thread)
+    if size[0] * size[1] > LARGEST:
+        raise FabricError(
+            fabric.name, f"has a repeat of {size[1]} x {size[0]} texels; the most is {LARGEST}"
+        )
+    chosen = ring_directions() if directions is None else directions
+    keys, texels = _texels(fabric, size, per_thread)
+    return Btf(
+        fabric=fabric,
+        directions=chosen,
+        nodes=_nodes(fabric, keys, chosen),
+        texels=texels,
+        size=size,
+        per_thread=per_thread,
+    )
+
+
+def _spacing(fabric: Fabric) -> float:
+    """Between nodes [rad]: a third of the narrowest lobe, at least half a degree."""
+    narrowest = min(t.gamma_surface for t in fabric.thread_list)
+    return max(narrowest / 3.0, math.radians(0.5))
+
+
+def _texels(
+    fabric: Fabric, size: tuple[int, int], per_thread: int
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """(k, 3) set, thread and angle number of each node in use; (texels, k) shares."""
+    step, types = _spacing(fabric), len(fabric.threads)
+    count = 2 * math.ceil(0.5 * math.pi / step) + 1
+    place = (np.arange(INSIDE) + 0.5) / INSIDE
+    h, w = size
+    shares: dict[int, NDArray[np.float32]] = {}
+    for a in place:
+        for b in place:
+            x, y = np.meshgrid(np.arange(w) + a, np.arange(h) + b)
+            uv = np.stack((x.ravel(), y.ravel()), axis=1) / per_thread
+            hit = lookup(fabric, uv)
+            at = hit.angle / step + (count - 1) / 2
+            low = np.clip(np.floor(at).astype(np.int64), 0, count - 2)
+            upper = at - low
+            base = (hit.set.astype(np.int64) * types + hit.thread) * count
+            seen = hit.set != GAP
+            for offset, weight in ((0, 1.0 - upper), (1, upper)):
+                key = base + low + offset
+                for one in np.unique(key[seen & (weight > 1e-12)]):
+                    mine = seen & (key == one)
+                    column = shares.setdefault(int(one), np.zeros(h * w, np.float32))
+                    column[mine] += (weight[mine] / INSIDE**2).astype(np.float32)
+    used = sorted(shares)
+    keys = np.array([(k // count // types, k // count % types, k % count) for k in used], np.int64)
+    keys = keys.reshape(-1, 3)
+    if not used:
+        return keys, np.zeros((h * w, 0), np.float32)
+    return keys, np.stack([shares[k] for k in used], axis=1)
+
+
+def _nodes(fabric: Fabric, keys: NDArray[np.int64], directions: Floats) -> NDArray[np.float32]:
+    """(d*d, 3, k) values at the nodes."""
+    step, d = _spacing(fabric), len(directions)
+    middle = math.ceil(0.5 * math.pi / step)
+    tables = surface_tables(fabric)
+    real: Any = np.float64
+    view, light = np.divmod(np.arange(d * d), d)
+    wi = np.ascontiguousarray(directions[light].T)
+    wo = np.ascontiguousarray(directions[view].T)
+    out = np.empty((d * d, 3, len(keys)), np.float32)
+    values, zero = np.empty_like(wi), np.zeros(d * d)
+    for k, (which, thread, number) in enumerate(keys):
+        angle = min(max((number - middle) * step, -0.5 * math.pi), 0.5 * math.pi)
+        sets, threads = np.full(d * d, which, np.uint8), np.full(d * d, thread, np.int32)
+        points_all(real, tables, False, sets, threads, np.full(d * d, angle), zero, wi, wo, values)
+        out[:, :, k] = (values / wi[2]).T
+    return out
+
+
+def table(btf: Btf, rows: NDArray[Any], texels: NDArray[Any]) -> Floats:
+    """(n, 3) entries of the table: rows (n,) of direction pairs, texels (n,)."""
+    return np.asarray(
+        np.einsum("nck,nk->nc", btf.nodes[rows].astype(np.float64), btf.texels[texels])
+    )

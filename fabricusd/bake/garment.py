@@ -1,0 +1,285 @@
+"""What is baked: one UV layout a mesh, and how each fabric lies on it.
+
+A mesh that is drawn many times is baked once: copies with the same triangles, UVs and fabrics share
+a garment. Whatever cannot be baked is refused here, before any texel is computed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Binding, Fabric
+from fabricusd.reference.scene import FabricSurface, Mesh, Scene
+from fabricusd.reference.triangles import measured_scale, smooth_normals
+
+FIRST_TILE, LAST_TILE = 1001, 1109
+"""UDIM numbers that are baked: ten columns, eleven rows but for the last row's last column."""
+
+FLATTEST = 1e-14
+"""Twice the area in UV [units^2] below which a triangle has none: a square of 1e-7."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lay:
+    """How a fabric lies in UV: threads = matrix @ uv + offset, both float64.
+
+    along : (2, 2) float - unit directions in UV of growing U and V of the weave, as columns
+    """
+
+    fabric: Fabric
+    matrix: NDArray[np.float64]
+    offset: NDArray[np.float64]
+
+    @property
+    def along(self) -> NDArray[np.float64]:
+        """(2, 2) unit directions in UV along which U and V of the weave grow, as columns."""
+        columns = np.linalg.inv(self.matrix)
+        return np.asarray(columns / np.linalg.norm(columns, axis=0))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Garment:
+    """One mesh's triangles in UV, and what covers them.
+
+    points : (n, 3) float64 [m], triangles : (m, 3) int
+    normals : (m, 3, 3) float64 - unit, at the corners
+    uv : (m, 3, 2) float64
+    lays : the ways that fabrics lie on it; lay : (m,) int - which of them a triangle has
+    mirrored : (m,) bool - the UVs run clockwise there
+    copies : paths of all prims that share it
+    own_uv : False where the UVs are not those of the scene any more
+    """
+
+    name: str
+    points: NDArray[np.float64]
+    triangles: NDArray[Any]
+    normals: NDArray[np.float64]
+    uv: NDArray[np.float64]
+    lays: tuple[Lay, ...]
+    lay: NDArray[np.int32]
+    mirrored: NDArray[np.bool_]
+    copies: tuple[str, ...] = ()
+    notes: tuple[str, ...] = field(default=())
+    own_uv: bool = True
+
+    @property
+    def fingerprint(self) -> str:
+        """Changes whenever anything that is baked does."""
+        digest = hashlib.sha256()
+        for array in (self.uv, self.lay, self.points, self.triangles):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        for lay in self.lays:
+            digest.update(repr((lay.fabric, lay.matrix.tolist(), lay.offset.tolist())).encode())
+            digest.update(lay.fabric.weave.cells.tobytes())
+        return digest.hexdigest()
+
+
+def lay_of(binding: Binding, metres_per_uv: float) -> Lay:
+    """The affine map that `Binding.weave_coordinates` is."""
+    base, u, v = binding.weave_coordinates(
+        np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), metres_per_uv
+    )
+    return Lay(fabric=binding.fabric, matrix=np.stack((u - base, v - base), axis=1), offset=base)
+
+
+def garments(
+    scene: Scene,
+    mesh: str | None = None,
+    make: Callable[[Scene, Mesh], Garment | None] | None = None,
+) -> list[Garment]:
+    """One garment for each different mesh of `scene` that wears a fabric, or for `mesh` alone.
+
+    make : what turns a mesh into a garment, None where it wears no fabric; `garment_of` by default
+
+    Raises FabricError where a mesh has points or UVs that are not finite, UVs without area, no UVs,
+    or where nothing wears a fabric.
+    """
+    known = [m.path for m in scene.meshes]
+    if mesh is not None and mesh not in known:
+        raise FabricError(mesh, f"is no mesh of the scene; it must be one of {', '.join(known)}")
+    found: dict[str, Garment] = {}
+    for one in scene.meshes:
+        if mesh is not None and one.path != mesh:
+            continue
+        made = (make or garment_of)(scene, one)
+        if made is None:
+            continue
+        key = _shape_key(one)
+        if key in found:
+            first = found[key]
+            found[key] = replace(first, copies=(*first.copies, one.path))
+        else:
+            found[key] = made
+    if not found:
+        raise FabricError(
+            mesh or "the scene", "wears no fabric; bind one, or name one with --fabric"
+        )
+    return _with_names(list(found.values()))
+
+
+def _shape_key(mesh: Mesh) -> str:
+    """Equal for copies of one mesh, wherever they stand."""
+    digest = hashlib.sha256()
+    for array in (mesh.triangles, mesh.uv, mesh.material):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    edges = mesh.points[np.asarray(mesh.triangles)[:, 1]] - mesh.points[mesh.triangles[:, 0]]
+    lengths = np.linalg.norm(edges, axis=1)
+    digest.update(np.round(lengths / max(float(lengths.max()), 1e-30), 6).tobytes())
+    return digest.hexdigest()
+
+
+def _with_names(found: list[Garment]) -> list[Garment]:
+    """Short names for files, different from one another."""
+    taken: dict[str, int] = {}
+    named = []
+    for one in found:
+        tail = one.copies[0].replace(":", "/").rstrip("/").rsplit("/", 1)[-1]
+        name = "".join(c if c.isalnum() or c in "-_" else "_" for c in tail) or "mesh"
+        taken[name] = taken.get(name, 0) + 1
+        named.append(replace(one, name=name if taken[name] == 1 else f"{name}_{taken[name]}"))
+    return named
+
+
+def garment_of(scene: Scene, mesh: Mesh) -> Garment | None:
+    """A mesh in its own UVs, None where it wears no fabric; errors as for `garments`."""
+    material = np.asarray(mesh.material)
+    fabrics = [int(k) for k in np.unique(material) if isinstance(scene.materials[k], FabricSurface)]
+    if not fabrics and any(n.startswith(f"{mesh.path} has no UVs") for n in scene.notes):
+        raise missing_uv(mesh.path)
+    if not fabrics:
+        return None
+    if mesh.uv is None:
+        raise missing_uv(mesh.path)
+    worn = np.isin(material, fabrics)
+    tri, uv = np.asarray(mesh.triangles)[worn], np.asarray(mesh.uv, np.float64)[worn]
+    check_shape(mesh.path, mesh.points, tri, uv)
+    corners = mesh.points[tri]
+    turn = signed_area(uv)
+    flat = np.abs(turn) < FLATTEST
+    if flat.all():
+        raise FabricError(mesh.path, "has UVs without any area; unwrap it, or use --unwrap")
+    notes = []
+    if flat.any():
+        notes.append(f"{mesh.path} has {int(flat.sum())} triangles without area in UV, left out")
+    lays, lay = [], np.zeros(len(tri), np.int32)
+    for number, index in enumerate(fabrics):
+        surface = scene.materials[index]
+        assert isinstance(surface, FabricSurface)
+        mine = material[worn] == index
+        lays.append(lay_of(surface.binding, measured_scale(uv[mine], corners[mine])))
+        lay[mine] = number
+    normals = mesh.normals[worn] if mesh.normals is not None else smooth_normals(mesh.points, tri)
+    return Garment(
+        name="",
+        points=mesh.points,
+        triangles=tri[~flat],
+        normals=np.asarray(normals, np.float64)[~flat],
+        uv=uv[~flat],
+        lays=tuple(lays),
+        lay=lay[~flat],
+        mirrored=turn[~flat] < 0,
+        copies=(mesh.path,),
+        notes=tuple(notes),
+    )
+
+
+def fitted(garment: Garment) -> Garment:
+    """The garment with its UVs moved and scaled, alike along both axes, into the unit square.
+
+    The fabric stays where it was on the cloth. Half a percent is left free at each side.
+    """
+    low, high = garment.uv.min(axis=(0, 1)), garment.uv.max(axis=(0, 1))
+    span = float((high - low).max()) / 0.99
+    low = 0.5 * (low + high) - 0.5 * span
+    lays = tuple(
+        Lay(fabric=one.fabric, matrix=one.matrix * span, offset=one.offset + one.matrix @ low)
+        for one in garment.lays
+    )
+    return replace(garment, uv=(garment.uv - low) / span, lays=lays, own_uv=False)
+
+
+def missing_uv(path: str) -> FabricError:
+    """What is said about a mesh without UVs."""
+    return FabricError(
+        path, "has no UVs for its fabric; unwrap it, or use --unwrap with the axis of the grain"
+    )
+
+
+def signed_area(uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, 3, 2) -> (m,) twice the area in UV, negative where the UVs run clockwise."""
+    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def check_shape(
+    where: str, points: NDArray[np.float64], tri: NDArray[Any], uv: NDArray[np.float64]
+) -> None:
+    """Raise FabricError for points or UVs that are not finite, with their number and the first."""
+    for noun, bad in (
+        ("points", ~np.isfinite(points[tri]).all(axis=(1, 2))),
+        ("UVs", ~np.isfinite(uv).all(axis=(1, 2))),
+    ):
+        if bad.any():
+            raise FabricError(
+                where,
+                f"has {int(bad.sum())} of {len(tri)} triangles with {noun} that are not finite, "
+                f"the first is triangle {int(np.argmax(bad))}; they must be numbers",
+            )
+
+
+def tiles_of(garment: Garment, udim: bool) -> dict[int, tuple[int, int]]:
+    """UDIM numbers of the tiles that the UVs reach into, and their (column, row).
+
+    A border at exactly 1.0 belongs to the tile before it. Without `udim` all UVs must lie in the
+    first tile.
+    """
+    found: set[tuple[int, int]] = set()
+    low, high = garment.uv.min(axis=1), garment.uv.max(axis=1)
+    first = np.floor(low + 1e-9).astype(np.int64)
+    last = np.maximum(np.ceil(high - 1e-9).astype(np.int64) - 1, first)
+    for a, b in np.unique(np.concatenate((first, last), axis=1), axis=0).reshape(-1, 2, 2):
+        found |= {(x, y) for x in range(a[0], b[0] + 1) for y in range(a[1], b[1] + 1)}
+        if len(found) > LAST_TILE:
+            break
+    outside = sorted(
+        t for t in found if not (0 <= t[0] < 10 and 0 <= t[1] and _tile(t) <= LAST_TILE)
+    )
+    if outside:
+        raise FabricError(
+            garment.copies[0],
+            f"has UVs in tile column {outside[0][0]}, row {outside[0][1]}; they must lie in tiles "
+            f"{FIRST_TILE} to {LAST_TILE}",
+        )
+    if not udim and found != {(0, 0)}:
+        u, v = (float(garment.uv[..., k].max()) for k in range(2))
+        raise FabricError(
+            garment.copies[0],
+            f"has UVs up to ({u:.6g}, {v:.6g}), in {len(found)} tiles; they must lie from 0 to 1, "
+            "or ask for UDIM tiles with --udim, or for the unit square with --fit",
+        )
+    return {_tile(t): t for t in sorted(found, key=_tile)}
+
+
+def _tile(place: tuple[int, int]) -> int:
+    return FIRST_TILE + place[0] + 10 * place[1]
+
+
+def threads_per_uv(garment: Garment) -> float:
+    """The greatest number of threads along one UV unit, over all lays."""
+    return max(float(np.linalg.norm(lay.matrix, axis=1).max()) for lay in garment.lays)
+
+
+def resolution_for(garments: Sequence[Garment], texels_per_thread: float) -> int:
+    """The power of two with at least so many texels for the thinnest thread of `garments`."""
+    if not texels_per_thread > 0:
+        raise FabricError("--texels-per-thread", f"is {texels_per_thread}; it must be above 0")
+    need = max(threads_per_uv(g) for g in garments) * texels_per_thread
+    return 1 << max(6, math.ceil(math.log2(need)))

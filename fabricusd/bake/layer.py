@@ -1,0 +1,52 @@
+"""The baked mesh as a USD layer: the UVs that the textures are in, normals and tangents."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Usd, UsdGeom, Vt
+
+from fabricusd.bake.garment import Garment
+from fabricusd.bake.tangents import corner_tangents
+from fabricusd.files import whole_file
+
+
+def write_mesh_layer(path: str | os.PathLike[str], garment: Garment, up_axis: str) -> None:
+    """`garment` as `/<name>` in metres: indexed faceVarying `st`, `normals`, `tangents` (float4).
+
+    Tangents are of MikkTSpace's convention, the fourth number the bitangent's sign.
+    """
+    with whole_file(path) as temporary:
+        layer = Sdf.Layer.CreateAnonymous(".usdc")
+        stage = Usd.Stage.Open(layer)
+        UsdGeom.SetStageUpAxis(stage, up_axis)
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        name = garment.name if not garment.name[0].isdigit() else f"_{garment.name}"
+        mesh = UsdGeom.Mesh.Define(stage, "/" + name.replace("-", "_"))
+        stage.SetDefaultPrim(mesh.GetPrim())
+        mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(garment.points.astype(np.float32)))
+        count = len(garment.triangles)
+        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(count, 3, np.int32)))
+        indices = np.ascontiguousarray(garment.triangles, np.int32).ravel()
+        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(indices))
+        mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+        mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(mesh.GetPointsAttr().Get()))
+        primvars = UsdGeom.PrimvarsAPI(mesh)
+        types = Sdf.ValueTypeNames
+        _primvar(primvars, "st", types.TexCoord2fArray, Vt.Vec2fArray, garment.uv)
+        _primvar(primvars, "normals", types.Normal3fArray, Vt.Vec3fArray, garment.normals)
+        tangents = corner_tangents(garment)
+        _primvar(primvars, "tangents", types.Float4Array, Vt.Vec4fArray, tangents)
+        layer.Export(str(temporary))
+
+
+def _primvar(primvars: Any, name: str, kind: Any, array: Any, corners: NDArray[Any]) -> None:
+    """An indexed faceVarying primvar of (m, 3, c) corners."""
+    flat = np.ascontiguousarray(corners.reshape(-1, corners.shape[-1]), np.float32)
+    values, index = np.unique(flat, axis=0, return_inverse=True)
+    one = primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.faceVarying)
+    one.Set(array.FromNumpy(np.ascontiguousarray(values)))
+    one.SetIndices(Vt.IntArray.FromNumpy(index.reshape(-1).astype(np.int32)))

@@ -1,0 +1,82 @@
+"""What was made, of what, and how: the manifest beside the textures."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numba
+import numpy as np
+import OpenImageIO
+
+from fabricusd import __version__
+from fabricusd.bake.scratch import sha256
+from fabricusd.files import whole_file
+
+if TYPE_CHECKING:
+    from fabricusd.bake.bake import Baked, Settings
+
+
+def write_json(path: Path, value: Any) -> None:
+    """A JSON file, whole, whose bytes depend on the value alone."""
+    with whole_file(path) as temporary:
+        temporary.write_text(
+            json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False) + "\n", "utf-8"
+        )
+
+
+def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any]:
+    """Everything that a loader or a reader of the textures has to know, for JSON."""
+    return {
+        "fabricusd": __version__,
+        "versions": {
+            "python": ".".join(map(str, sys.version_info[:3])),
+            "numpy": np.__version__,
+            "numba": numba.__version__,
+            "OpenImageIO": OpenImageIO.VERSION_STRING,
+        },
+        "scene": {"file": scene.name, "sha256": sha256(scene)},
+        "settings": asdict(settings),
+        "resolution": result.resolution,
+        "maps": {
+            one.name: {
+                "meaning": one.meaning,
+                "channels": list(one.channels),
+                "color_space": "lin_rec709" if one.color else "raw",
+                "type": "float" if one.exact else "half",
+            }
+            for one in result.maps
+        },
+        "garments": {
+            one.name: {
+                "mesh": f"{one.name}.usdc",
+                "uv_of_the_scene": one.own_uv,
+                "prims": list(one.copies),
+                "fingerprint": one.fingerprint,
+                "triangles": len(one.triangles),
+                "mirrored_triangles": int(one.mirrored.sum()),
+                "error": result.errors[one.name].as_dict(),
+                "lays": [
+                    {
+                        "fabric": lay.fabric.name,
+                        "threads_per_uv": lay.matrix.tolist(),
+                        "offset": lay.offset.tolist(),
+                    }
+                    for lay in one.lays
+                ],
+                "files": {
+                    name: {
+                        str(number): {"file": file, "sha256": sha256(result.folder / file)}
+                        for number, file in files.items()
+                    }
+                    for name, files in result.files[one.name].items()
+                },
+            }
+            for one in result.garments
+        },
+        "btf": result.btf,
+        "notes": result.notes,
+    }

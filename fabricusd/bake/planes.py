@@ -1,0 +1,21 @@
+"""Which means a texel holds: the numbers of its planes."""
+
+AZIMUTHS = 16
+PARTS = 4
+
+# Planes. Those of a set come twice, weft first. All but COVER are means over the whole texel, gaps
+# counting as 0, so that they stay linear; maps divide by the cover where they mean "of the thread".
+COVER = 0
+SHARE = 1  # 8: cover of each set in PARTS by its tangent angle: falling gently or steeply along its
+#            axis, rising gently or steeply. A hump has all four; their mean angle is none of them.
+ANGLE, ANGLE_2 = 9, 17  # 8 each, as SHARE: tangent angle [rad] and its square, times the share
+TINT = 25  # 6: the thread's `A`, three channels for each set, times the set's share
+SLOPE = 31  # 2: of the height along U and V
+SLOPE_2 = 33  # 3: UU, VV, UV
+HEIGHT = 36  # [m]
+LOBE_2 = 37  # 2: squared slope width of the surface lobe along U, along V
+SURFACE, VOLUME, FUZZ = 39, 40, 43  # reflectances, see `reflectance`; VOLUME has three channels
+FRESNEL = 44
+LIT = 45  # share of the chosen light that arrives
+HORIZON = 46  # AZIMUTHS: squared sine of the horizon
+PLANES = HORIZON + AZIMUTHS

@@ -1,0 +1,192 @@
+"""A baked set under any light and view: the loader of our own maps.
+
+Each thread set of a texel is re-lit from the share that it covers, its `A`, and the mean and
+standard deviation of its tangent angle, taken as even around the mean - which a straight piece of
+a tangent curve is. So a fine level gives the appearance level `weave`, the coarsest nearly `far`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import ArrayLike, NDArray
+
+from fabricusd.appearance.coverage import coverage
+from fabricusd.appearance.far import NOTHING, normalization
+from fabricusd.appearance.real import KERNEL
+from fabricusd.appearance.segment import along_set, seen_along, segment
+from fabricusd.appearance.surface_tables import surface_tables
+from fabricusd.appearance.thread_terms import GAMMA_SURFACE, MODEL, THESIS
+from fabricusd.bake.maps import GAP_ID
+from fabricusd.bake.planes import PARTS
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+from fabricusd.files import readable_file
+from fabricusd.reference.images import read_mip_level
+
+Floats = NDArray[np.float64]
+
+PER_SET = ("thread", "share", "angle", "spread")
+
+NEEDED = (
+    "thread_id",
+    *(f"{noun}_{what}" for noun in ("weft", "warp") for what in PER_SET),
+)
+"""Maps that are re-lit."""
+
+MOST_NODES = 64
+"""Tangent angles that a texel's spread is cut into at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class BakedSet:
+    """A folder of textures, by its manifest."""
+
+    folder: Path
+    manifest: dict[str, Any]
+
+    @classmethod
+    def load(cls, folder: str | Path) -> BakedSet:
+        """Read the manifest of `folder`; FabricError where there is none."""
+        path = readable_file(Path(folder) / "manifest.json")
+        try:
+            return cls(Path(folder), json.loads(path.read_text("utf-8")))
+        except ValueError as error:
+            raise FabricError(str(path), f"is no JSON: {error}") from error
+
+    def read(self, garment: str, name: str, level: int = 0, tile: int = 1001) -> NDArray[Any]:
+        """(h, w, c) float32 of one map's level."""
+        files = self.manifest["garments"].get(garment, {}).get("files", {})
+        if str(tile) not in files.get(name, {}):
+            raise FabricError(
+                str(self.folder),
+                f"holds no map '{name}' of '{garment}' in tile {tile}; it must be one of "
+                f"{', '.join(files) or 'none'}",
+            )
+        return read_mip_level(self.folder / files[name][str(tile)]["file"], level)
+
+    def relight(
+        self,
+        garment: str,
+        fabrics: Sequence[Fabric],
+        wi: ArrayLike,
+        wo: ArrayLike,
+        *,
+        level: int = 0,
+        tile: int = 1001,
+    ) -> Floats:
+        """(h, w, 3) radiance per unit `L_i dwi` towards wo, black outside the layout.
+
+        fabrics : of each lay, as the manifest counts them
+        wi, wo : (3,) unit vectors in UV axes: x along u, y along v, z out of the cloth
+        """
+        maps = {name: self.read(garment, name, level, tile) for name in NEEDED}
+        lay = self.read(garment, "lay", level, tile)[..., 0]
+        out = np.zeros((*lay.shape, 3))
+        for k, (fabric, said) in enumerate(
+            zip(fabrics, self.manifest["garments"][garment]["lays"], strict=True)
+        ):
+            mine = lay == k
+            columns = np.linalg.inv(np.array(said["threads_per_uv"]))
+            along = columns / np.linalg.norm(columns, axis=0)
+            turned = [
+                np.array([*(along.T @ np.asarray(w, np.float64)[:2]), np.asarray(w)[2]])
+                for w in (wi, wo)
+            ]
+            out[mine] = relight({n: a[mine] for n, a in maps.items()}, fabric, *turned)
+        return out
+
+
+def relight(
+    maps: Mapping[str, NDArray[Any]], fabric: Fabric, wi: ArrayLike, wo: ArrayLike
+) -> Floats:
+    """(n, 3) radiance per unit `L_i dwi` of texels whose maps NEEDED are (n, channels).
+
+    wi, wo : (3,) unit vectors in the weave's frame, x along U, y along V
+    """
+    types = len(fabric.threads)
+    area = coverage(fabric).type_area
+    share = area / np.maximum(area.sum(axis=1, keepdims=True), 1e-30)
+    ids = np.asarray(maps["thread_id"][:, 0])
+    sets = np.stack(
+        [
+            np.concatenate(
+                [maps[f"{noun}_{what}"][:, :PARTS] for what in PER_SET], axis=1, dtype=np.float64
+            )
+            for noun in ("weft", "warp")
+        ],
+        axis=1,
+    )
+    kinds = np.where(ids == GAP_ID, -1, ids).astype(np.int64)
+    out = np.zeros((len(ids), 3))
+    i, o = (np.asarray(w, np.float64) for w in (wi, wo))
+    _relight(surface_tables(fabric), share, types, sets, kinds, i, o, out)
+    return out
+
+
+@njit(parallel=True, **KERNEL)
+def _relight(  # type: ignore[no-untyped-def]
+    tables, share, types, sets, kinds, wi, wo, out
+):
+    """sets (n, 2, 16): `A` and share; shares, angles and deviations of the parts.
+
+    kinds (n,) : thread ids, -1 for none
+    """
+    R = np.float64
+    precision = tables.overlap_precision
+    q = normalization(R, tables, wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
+    if wi[2] <= 0.0 or wo[2] <= 0.0 or q <= NOTHING:
+        return
+    for k in prange(out.shape[0]):
+        for j in range(2):
+            if sets[k, j, 3] <= 0.0:
+                continue
+            a_i, b_i, s_i, a_o, b_o, s_o, u = along_set(
+                R, j, precision, wi[0], wi[1], wi[2], wo[0], wo[1], wo[2]
+            )
+            for kind in range(types):
+                # The thread under the centre speaks for its set where there is one.
+                weight = share[j, kind]
+                if kinds[k] >= 0 and kinds[k] // types == j:
+                    weight = 1.0 if kinds[k] % types == kind else 0.0
+                row = tables.threads[kind]
+                for part in range(PARTS):
+                    covered = weight * sets[k, j, 4 + part]
+                    if covered <= 0.0:
+                        continue
+                    middle, spread = sets[k, j, 8 + part], sets[k, j, 12 + part]
+                    surface, volume = _stretch(
+                        R, tables, row, middle, math.sqrt(3.0) * spread,
+                        a_i, b_i, wi[2], s_i, a_o, b_o, wo[2], s_o, u,
+                    )  # fmt: skip
+                    for channel in range(3):
+                        value = surface + volume * sets[k, j, channel]
+                        out[k, channel] += covered / q * value
+
+
+@njit(**KERNEL)
+def _stretch(  # type: ignore[no-untyped-def]
+    R, tables, row, middle, reach, a_i, b_i, iz, s_i, a_o, b_o, oz, s_o, u
+):
+    """Surface and volume term of a thread whose angle goes evenly `reach` to both sides."""
+    nodes = int(min(MOST_NODES, max(1.0, math.ceil(3.0 * reach / row[GAMMA_SURFACE]))))
+    first, second = 0.0, 0.0
+    for node in range(nodes):
+        angle = middle + reach * ((2 * node + 1) / nodes - 1.0)
+        angle = min(max(angle, -0.5 * math.pi), 0.5 * math.pi)
+        c, s = math.cos(angle), math.sin(angle)
+        surface, volume = segment(
+            R, row[MODEL] == THESIS, row, tables.overlap_precision,
+            c, s, a_i, b_i, iz, a_o, b_o, oz,
+        )  # fmt: skip
+        p = seen_along(R, c, s, a_i, iz, s_i, a_o, oz, s_o, u) / nodes
+        first += p * surface
+        second += p * volume
+    return first, second

@@ -1,0 +1,120 @@
+"""What was asked, what was reached and what it cost: JSON, and a page with pictures."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.bake.manifest import write_json
+from fabricusd.files import whole_file
+from fabricusd.reference.images import read_mip_level, write_png
+
+if TYPE_CHECKING:
+    from fabricusd.bake.bake import Baked, Settings
+
+PICTURE = 256
+"""Texels of a map that the page shows, the middle of its finest level."""
+
+_STYLE = """body{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:70em;color:#222}
+table{border-collapse:collapse}td,th{padding:.2em .8em;text-align:left;border-bottom:1px solid #ddd}
+figure{display:inline-block;margin:.4em;width:160px;vertical-align:top;font-size:12px}
+img{width:160px;image-rendering:pixelated;background:#444}"""
+
+
+def report_of(result: Baked, settings: Settings) -> dict[str, Any]:
+    """Asked, reached and cost, for JSON."""
+    sizes = {
+        name: sum((result.folder / f).stat().st_size for f in files.values())
+        for maps in result.files.values()
+        for name, files in maps.items()
+    }
+    return {
+        "asked": {"max_error": settings.max_error or None, "resolution": settings.resolution},
+        "reached": {name: error.as_dict() for name, error in result.errors.items()},
+        "within": result.reached(settings.max_error) if settings.max_error else None,
+        "cost": {
+            "resolution": result.resolution,
+            "seconds": round(result.seconds, 2),
+            "bytes": sum(sizes.values()),
+            "bytes_per_map": sizes,
+        },
+        "btf": result.btf,
+        "notes": result.notes,
+    }
+
+
+def write_report(result: Baked, settings: Settings) -> None:
+    """`report.json`, `report.html`, and the pictures that it shows in `report/`."""
+    said = report_of(result, settings)
+    write_json(result.folder / "report.json", said)
+    pictures = result.folder / "report"
+    pictures.mkdir(exist_ok=True)
+    figures = []
+    for garment, maps in result.files.items():
+        for name, files in maps.items():
+            file = next(iter(files.values()))
+            picture = pictures / f"{garment}.{name}.png"
+            write_png(picture, as_picture(read_mip_level(result.folder / file), name))
+            figures.append(
+                f'<figure><img src="report/{escape(picture.name)}" alt="{escape(name)}">'
+                f"<figcaption>{escape(name)}</figcaption></figure>"
+            )
+    with whole_file(result.folder / "report.html") as temporary:
+        temporary.write_text(_page(said, figures), "utf-8")
+
+
+def _page(said: dict[str, Any], figures: list[str]) -> str:
+    asked = said["asked"]["max_error"]
+    rows = "".join(
+        f"<tr><td>{escape(name)}</td><td>{e['point']:.2f}</td><td>{e['texel']:.2f}</td>"
+        f"<td>{e['bound']:.2f}</td></tr>"
+        for name, e in said["reached"].items()
+    )
+    forms = "".join(
+        f"<tr><td>{escape(fabric)}</td><td>{r['form']}</td><td>{r['megabytes']:.2f}</td>"
+        f"<td>{max(r['rank'])}</td><td>{r['delta_e']:.2f}</td><td>{r['delta_e_between']:.2f}</td></tr>"
+        for fabric, records in said["btf"].items()
+        for r in records
+    )
+    notes = "".join(f"<li>{escape(n)}</li>" for n in said["notes"])
+    cost = said["cost"]
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Bake</title>'
+        f"<style>{_STYLE}</style><h1>Bake</h1>"
+        f"<p>Asked: {'no bound' if asked is None else f'delta E {asked:g}'}. "
+        f"Made: {cost['resolution']} texels a side, {cost['bytes'] / 1e6:.1f} MB "
+        f"in {cost['seconds']:.1f} s.</p>"
+        "<table><tr><th>garment<th>delta E 2000 at points<th>of texels<th>stated bound</tr>"
+        f"{rows}</table>"
+        + (
+            "<h2>BTF</h2><table><tr><th>fabric<th>form<th>MB<th>rank<th>delta E<th>between"
+            f" directions</tr>{forms}</table>"
+            if forms
+            else ""
+        )
+        + (f"<h2>Notes</h2><ul>{notes}</ul>" if notes else "")
+        + f"<h2>Maps</h2>{''.join(figures)}</html>\n"
+    )
+
+
+def as_picture(pixels: NDArray[Any], name: str) -> NDArray[np.uint8]:
+    """(h, w, 3) uint8 of a map's middle: directions as colours, the rest from its least value to
+    its greatest."""
+    h, w = pixels.shape[:2]
+    y, x = max(0, (h - PICTURE) // 2), max(0, (w - PICTURE) // 2)
+    part = np.asarray(pixels[y : y + PICTURE, x : x + PICTURE, :3], np.float64)
+    if name in ("normal", "tangent"):
+        part = 0.5 * part + 0.5
+    else:
+        low, high = float(part.min()), float(part.max())
+        part = (part - min(low, 0.0)) / max(high - min(low, 0.0), 1e-12)
+        if part.shape[2] == 3:
+            part = part ** (1 / 2.2)
+    if part.shape[2] == 1:
+        part = np.repeat(part, 3, axis=2)
+    elif part.shape[2] == 2:
+        part = np.concatenate((part, np.zeros_like(part[..., :1])), axis=2)
+    return np.asarray(np.rint(np.clip(part, 0.0, 1.0) * 255), np.uint8)

@@ -1,0 +1,153 @@
+"""`fabricusd bake`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import Any
+
+from fabricusd.errors import FabricError
+
+EPILOG = """example:
+  fabricusd bake towel.obj --fabric linen_plain --resolution 4096 -o baked
+  fabricusd bake coat.usda --mesh /Coat/Front --texels-per-thread 4 --udim -o baked
+  fabricusd bake towel.obj --fabric velvet --maps base_color normal opacity -o baked"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to bake, how finely, into which maps."""
+    parser.add_argument("scene", metavar="SCENE", nargs="?", help="USD, OBJ, GLB or PLY file")
+    parser.add_argument("--fabric", metavar="FILE[:/PRIM]", help="for meshes that name none")
+    parser.add_argument("--mesh", metavar="PATH", help="bake this mesh alone")
+    parser.add_argument("-o", "--output", metavar="DIR", help="folder for the textures")
+    finely = parser.add_mutually_exclusive_group()
+    finely.add_argument("--resolution", type=int, metavar="N", help="texels a side (default 1024)")
+    finely.add_argument("--texels-per-thread", type=float, metavar="X", help="resolution by this")
+    parser.add_argument("--maps", nargs="+", metavar="MAP", help="these alone (default: all)")
+    parser.add_argument("--list-maps", action="store_true", help="print their names and stop")
+    parser.add_argument("--udim", action="store_true", help="UVs lie in tiles 1001 to 1109")
+    layout = parser.add_mutually_exclusive_group()
+    layout.add_argument("--fit", action="store_true", help="scale the UVs into the unit square")
+    layout.add_argument(
+        "--unwrap", choices=("x", "y", "z"), help="make new UVs, the warp along this world axis"
+    )
+    parser.add_argument("--light", metavar="X,Y,Z", help="direction to a light, for map 'shadow'")
+    parser.add_argument(
+        "--shadow", default="peak", choices=("peak", "horizon", "traced"), help="of that light"
+    )
+    parser.add_argument(
+        "--level", default="weave", choices=("weave", "thread"), help="threads flat or round"
+    )
+    parser.add_argument(
+        "--max-error",
+        type=float,
+        metavar="DE",
+        help="mean delta E 2000 to reach; --resolution is then the most (default 4096)",
+    )
+    parser.add_argument(
+        "--btf",
+        nargs="+",
+        metavar="FORM",
+        help="also the fabrics' BTF: ubo, ubo-joint, factored, atlas",
+    )
+    parser.add_argument("--resume", action="store_true", help="go on with a bake that was stopped")
+    parser.add_argument("--workers", type=int, metavar="N", help="default: all processors")
+    parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
+    parser.add_argument("--no-clobber", action="store_true", help="never bake into a full folder")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Bake; print the names of the files."""
+    from pathlib import Path
+
+    from fabricusd.bake.bake import Settings, bake, plan
+    from fabricusd.bake.maps import REGISTRY
+
+    if options.list_maps:
+        for one in REGISTRY.values():
+            print(f"{one.name:18} {one.meaning}")
+        return 0
+    if not options.scene or not options.output:
+        raise FabricError("bake", "needs a SCENE and -o DIR; see 'fabricusd bake --help'")
+    out = Path(options.output)
+    if options.no_clobber and (out / "manifest.json").exists():
+        raise FabricError(str(out), "holds a bake; it must be a new folder with --no-clobber")
+    settings = Settings(
+        resolution=options.resolution
+        or (0 if options.texels_per_thread else 4096 if options.max_error else 1024),
+        texels_per_thread=options.texels_per_thread or 0.0,
+        maps=tuple(options.maps) if options.maps else None,
+        light=_light(options.light),
+        shadow=options.shadow,
+        level=options.level,
+        udim=options.udim,
+        fit=options.fit,
+        unwrap=options.unwrap or "",
+        max_error=_positive(options.max_error),
+        btf=tuple(options.btf or ()),
+    )
+    if options.dry_run:
+        for line in plan(options.scene, settings, fabric=options.fabric, mesh=options.mesh):
+            print(line)
+        return 0
+    result = bake(
+        options.scene, out, settings, fabric=options.fabric, mesh=options.mesh,
+        resume=options.resume, workers=options.workers, progress=_progress(options),
+    )  # fmt: skip
+    if not options.quiet:
+        for note in result.notes:
+            print(f"fabricusd: {note}", file=sys.stderr)
+    if not result.finished:
+        print("fabricusd: stopped; --resume goes on from here", file=sys.stderr)
+        return 130
+    for maps in result.files.values():
+        for files in maps.values():
+            for name in files.values():
+                print(out / name)
+    print(out / "manifest.json")
+    print(out / "report.html")
+    if options.verbose:
+        print(f"fabricusd: baked in {result.seconds:.1f} s", file=sys.stderr)
+    if settings.max_error and not result.reached(settings.max_error):
+        worst = max(e.point for e in result.errors.values())
+        print(
+            f"fabricusd: reaches delta E {worst:.3g} at {result.resolution} texels; "
+            f"{settings.max_error:g} was asked for",
+            file=sys.stderr,
+        )
+        return 1
+    return 0
+
+
+def _positive(value: float | None) -> float:
+    if value is None:
+        return 0.0
+    if not value > 0:
+        raise FabricError("--max-error", f"is {value:g}; it must be above 0")
+    return value
+
+
+def _light(text: str | None) -> tuple[float, float, float] | None:
+    if text is None:
+        return None
+    try:
+        x, y, z = (float(word) for word in text.split(","))
+    except ValueError:
+        raise FabricError(
+            f"--light '{text}'", "is no direction; write three numbers: X,Y,Z"
+        ) from None
+    if not z > 0:
+        raise FabricError(f"--light '{text}'", f"has z {z:g}; it must be above 0, over the cloth")
+    return x, y, z
+
+
+def _progress(options: argparse.Namespace) -> Any:
+    """A line that is written over, on a terminal only."""
+    if options.quiet or not sys.stderr.isatty():
+        return None
+
+    def show(noun: str, total: int, done: int) -> None:
+        end = "\n" if done == total else ""
+        print(f"\r{noun} {done}/{total}", end=end, file=sys.stderr, flush=True)
+
+    return show

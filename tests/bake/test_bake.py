@@ -1,0 +1,264 @@
+"""A bake from a scene to a folder: what it leaves behind, whole, and how it goes on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bake.meshes import write_quad
+
+from fabricusd.bake import bake as module
+from fabricusd.bake.bake import Settings, bake, plan
+from fabricusd.bake.relight import BakedSet
+from fabricusd.bake.scratch import Scratch
+from fabricusd.cli.main import main
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Binding
+from fabricusd.reference.images import read_mip_level
+from fabricusd.schema import load
+
+MAPS = ("normal", "thread_id", "lay", "base_color")
+SMALL = Settings(resolution=512, maps=MAPS)
+
+
+def sums(folder: Path) -> dict[str, str]:
+    return {
+        p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.glob("*.exr"))
+    }
+
+
+@pytest.fixture(scope="module")
+def square(tmp_path_factory):
+    return write_quad(tmp_path_factory.mktemp("scene") / "square.obj")
+
+
+@pytest.fixture(scope="module")
+def linen():
+    return Binding(fabric=load("linen_plain"), threads_per_uv=(64.0, 64.0))
+
+
+@pytest.fixture(scope="module")
+def whole(square, linen, tmp_path_factory):
+    out = tmp_path_factory.mktemp("whole")
+    return bake(square, out, SMALL, fabric=linen)
+
+
+def test_textures_are_mip_mapped_and_the_scratch_is_gone(whole):
+    name = whole.files[whole.garments[0].name]["normal"][1001]
+    levels = [read_mip_level(whole.folder / name, k) for k in range(10)]
+    assert [a.shape[0] for a in levels] == [512 >> k for k in range(10)]
+    with pytest.raises(FabricError, match="no level 10"):
+        read_mip_level(whole.folder / name, 10)
+    assert not (whole.folder / ".bake").exists()
+
+
+def test_the_manifest_names_what_was_made_of_what(whole, square):
+    said = json.loads((whole.folder / "manifest.json").read_text())
+    assert said["scene"]["sha256"] == hashlib.sha256(square.read_bytes()).hexdigest()
+    files = next(iter(said["garments"].values()))["files"]
+    assert set(files) == set(MAPS)
+    for tiles in files.values():
+        for one in tiles.values():
+            data = (whole.folder / one["file"]).read_bytes()
+            assert hashlib.sha256(data).hexdigest() == one["sha256"]
+    report = json.loads((whole.folder / "report.json").read_text())
+    assert report["cost"]["resolution"] == 512
+    assert "<h1>Bake</h1>" in (whole.folder / "report.html").read_text()
+
+
+def test_the_number_of_workers_does_not_show(whole, square, linen, tmp_path):
+    bake(square, tmp_path, SMALL, fabric=linen, workers=1)
+    assert sums(tmp_path) == sums(whole.folder)
+
+
+def test_a_set_is_relit_from_its_folder(square, linen, tmp_path):
+    result = bake(square, tmp_path, Settings(resolution=128), fabric=linen)
+    baked = BakedSet.load(tmp_path)
+    name = result.garments[0].name
+    picture = baked.relight(name, [linen.fabric], (0, 0, 1), (0, 0, 1), level=2)
+    assert picture.shape == (32, 32, 3)
+    assert picture.min() >= 0
+    assert picture.mean() > 0.01
+    with pytest.raises(FabricError, match="holds no map"):
+        baked.read(name, "nothing")
+
+
+def test_a_stopped_bake_goes_on_and_ends_bit_identical(whole, square, linen, tmp_path, monkeypatch):
+    written = []
+    original = module.b.write_block
+
+    def failing(path, *rest):
+        if len(written) == 2:
+            raise FabricError(str(path), "cannot be written: No space left on device")
+        written.append(path)
+        original(path, *rest)
+
+    monkeypatch.setattr(module.b, "write_block", failing)
+    with pytest.raises(FabricError, match="No space left"):
+        bake(square, tmp_path, SMALL, fabric=linen, workers=1)
+    assert not list(tmp_path.glob("*.exr"))
+    again = []
+    monkeypatch.setattr(
+        module.b, "write_block", lambda path, *rest: (again.append(path), original(path, *rest))
+    )
+    bake(square, tmp_path, SMALL, fabric=linen, resume=True)
+    assert len(again) == 2
+    assert sums(tmp_path) == sums(whole.folder)
+
+
+def test_a_block_that_was_damaged_is_made_again(whole, square, linen, tmp_path, monkeypatch):
+    def stop(*_):
+        raise FabricError("texture", "stopped")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "write_mip_exr", stop)
+        with pytest.raises(FabricError, match="stopped"):
+            bake(square, tmp_path, SMALL, fabric=linen)
+    block = next((tmp_path / ".bake").glob("*/0_0.block"))
+    block.write_bytes(block.read_bytes()[:-1000])
+    bake(square, tmp_path, SMALL, fabric=linen, resume=True)
+    assert sums(tmp_path) == sums(whole.folder)
+
+
+def test_another_job_does_not_resume(square, linen, tmp_path):
+    Scratch(tmp_path, "another", resume=False)
+    with pytest.raises(FabricError, match="leave --resume out"):
+        bake(square, tmp_path, SMALL, fabric=linen, resume=True)
+
+
+@pytest.mark.slow
+def test_killed_at_random_moments_it_ends_bit_identical(whole, square, tmp_path):
+    """kill -9 thirty times over the whole of a bake; only whole textures are ever seen."""
+    program = (
+        "import sys\n"
+        "from fabricusd.bake.bake import Settings, bake\n"
+        "from fabricusd.fabric import Binding\n"
+        "from fabricusd.schema import load\n"
+        "linen = Binding(fabric=load('linen_plain'), threads_per_uv=(64.0, 64.0))\n"
+        f"settings = Settings(resolution=512, maps={MAPS!r})\n"
+        "print('ready', flush=True)\n"
+        "bake(sys.argv[1], sys.argv[2], settings, fabric=linen, resume=True)\n"
+    )
+    rng = np.random.default_rng(0)
+    truth = sums(whole.folder)
+    kills, target = 0, 30
+    root = Path(__file__).resolve().parents[2]
+    folder = tmp_path / "0"
+    while kills < target:
+        process = subprocess.Popen(
+            [sys.executable, "-c", program, str(square), str(folder)],
+            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": str(root)},
+        )  # fmt: skip
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(float(rng.uniform(0.0, 2.0)))
+        running = process.poll() is None
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        process.stdout.close()
+        kills += running
+        seen = sums(folder) if folder.exists() else {}
+        assert all(truth[name] == value for name, value in seen.items())
+        if not running:
+            assert seen == truth
+            folder = tmp_path / str(kills)
+    bake(
+        square, folder, SMALL, resume=True,
+        fabric=Binding(fabric=load("linen_plain"), threads_per_uv=(64.0, 64.0)),
+    )  # fmt: skip
+    assert sums(folder) == truth
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (Settings(resolution=1000), "is 1000; it must be a power of two"),
+        (Settings(resolution=32), "is 32"),
+        (Settings(resolution=0, texels_per_thread=1e9), "bake fewer threads"),
+        (Settings(maps=("colour",)), "is unknown"),
+    ],
+)
+def test_settings_that_cannot_be_are_refused_before_anything_is_written(
+    square, linen, tmp_path, settings, words
+):
+    with pytest.raises(FabricError, match=words):
+        bake(square, tmp_path / "out", settings, fabric=linen)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_is_a_file_or_not_ours_is_refused(square, linen, tmp_path):
+    file = tmp_path / "file"
+    file.write_text("")
+    with pytest.raises(FabricError, match="is a file"):
+        bake(square, file, SMALL, fabric=linen)
+    with pytest.raises(FabricError, match="cannot be made"):
+        bake(square, file / "below", SMALL, fabric=linen)
+
+
+def test_a_disk_that_is_too_small_is_refused_before_the_work(square, linen, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "bytes_needed", lambda *_: 10**18)
+    with pytest.raises(FabricError, match="GB left; the bake needs"):
+        bake(square, tmp_path, SMALL, fabric=linen)
+
+
+def test_udim_tiles_have_numbered_files(tmp_path, linen):
+    scene = write_quad(tmp_path / "wide.obj", np.array([[0, 0], [2, 0], [2, 1], [0, 1]]))
+    result = bake(
+        scene, tmp_path / "out", Settings(resolution=64, maps=("opacity",), udim=True),
+        fabric=linen,
+    )  # fmt: skip
+    files = next(iter(result.files.values()))["opacity"]
+    assert set(files) == {1001, 1002}
+    assert all(f".{number}.exr" in name for number, name in files.items())
+
+
+def test_few_texels_per_thread_are_said_and_prefiltered(square, tmp_path):
+    dense = Binding(fabric=load("linen_plain"), threads_per_uv=(4096.0, 4096.0))
+    settings = Settings(resolution=64, maps=("opacity",))
+    result = bake(square, tmp_path, settings, fabric=dense)
+    assert any("texels per thread" in note for note in result.notes)
+    name = next(iter(result.files.values()))["opacity"][1001]
+    assert np.ptp(read_mip_level(result.folder / name)) == 0.0
+
+
+def test_an_error_asked_for_chooses_the_resolution(square, linen, tmp_path):
+    settings = Settings(resolution=1024, maps=("opacity",), max_error=6.0)
+    result = bake(square, tmp_path, settings, fabric=linen)
+    assert 64 <= result.resolution <= 1024
+    assert result.reached(6.0)
+
+
+def test_the_command_says_when_a_bound_is_not_reached(square, tmp_path, capsys):
+    out = str(tmp_path / "out")
+    common = ["bake", str(square), "--fabric", "linen_plain", "--maps", "opacity", "-o", out]
+    assert main([*common, "--max-error", "0.01", "--resolution", "64"]) == 1
+    shown = capsys.readouterr()
+    assert "0.01 was asked for" in shown.err
+    assert "manifest.json" in shown.out
+    assert main([*common, "--no-clobber"]) == 2
+
+
+def test_a_dry_run_writes_nothing(square, linen, tmp_path, capsys):
+    assert "64 texels" not in plan(square, SMALL, fabric=linen)[0]
+    out = tmp_path / "out"
+    assert main(["bake", str(square), "--fabric", "linen_plain", "-n", "-o", str(out)]) == 0
+    assert "texels per thread" in capsys.readouterr().out
+    assert not out.exists()
+    assert main(["bake", "--list-maps"]) == 0
+    assert "base_color" in capsys.readouterr().out
+
+
+def test_the_towel_is_baked(shared_data, tmp_path):
+    settings = Settings(resolution=256, fit=True, maps=("normal", "opacity"))
+    result = bake(shared_data / "towel.obj", tmp_path, settings, fabric="linen_plain")
+    assert result.finished
+    assert len(list(tmp_path.glob("*.exr"))) == 2

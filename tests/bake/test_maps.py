@@ -1,0 +1,217 @@
+"""What the maps hold, at every level."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bake.meshes import quad_scene
+
+from fabricusd.appearance.compiled import true_repeat
+from fabricusd.appearance.coverage import coverage
+from fabricusd.appearance.surface import evaluate
+from fabricusd.appearance.weave import lookup
+from fabricusd.bake import blocks as b
+from fabricusd.bake import moments as m
+from fabricusd.bake.accuracy import (
+    PAIRS,
+    delta_e,
+    display,
+    pairs_between,
+    swatch_error,
+)
+from fabricusd.bake.garment import garments
+from fabricusd.bake.maps import REGISTRY, chosen_maps
+from fabricusd.bake.reflectance import reflectance_table
+from fabricusd.bake.relight import NEEDED, relight
+from fabricusd.errors import FabricError
+from fabricusd.schema import load
+
+PRESETS = (
+    "linen_plain",
+    "silk_crepe_de_chine",
+    "polyester_satin_charmeuse",
+    "polyester_satin_charmeuse_back",
+    "silk_shot",
+    "velvet",
+)
+
+
+def baked(fabric, threads=8.0, resolution=128, **options):
+    """Every map of a square: name -> list of levels."""
+    settings = {k: options.pop(k) for k in ("level", "light") if k in options}
+    one = garments(quad_scene(fabric, threads, **options))[0]
+    sheet = b.sheet_of(one, (m.recipe(fabric, **settings),), 1001, (0, 0), resolution, 4)
+    maps = chosen_maps(None, light="light" in settings)
+    found, _, _ = b.bake_block(sheet, maps, 0, 0)
+    return {t.name: levels for t, levels in zip(maps, found, strict=True)}, sheet
+
+
+def test_every_map_is_finite_and_has_a_meaning():
+    for name in ("linen_plain", "velvet"):
+        maps, _ = baked(load(name))
+        for key, levels in maps.items():
+            assert REGISTRY[key].meaning
+            assert [a.shape[0] for a in levels] == [128 >> k for k in range(8)]
+            assert all(np.isfinite(a).all() for a in levels), key
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_coarsest_level_holds_the_fabrics_own_shares(name):
+    fabric = load(name)
+    maps, _ = baked(fabric, threads=float(np.lcm.reduce(true_repeat(fabric)) * 2))
+    share = coverage(fabric)
+    top = maps["opacity"][-1][0, 0, 0]
+    assert top == pytest.approx(1.0 - share.gap, abs=0.01)
+    for which, noun in enumerate(("weft", "warp")):
+        assert maps[f"{noun}_thread"][-1][0, 0, 3] == pytest.approx(share.area[which], abs=0.01)
+        assert maps[f"{noun}_share"][-1][0, 0].sum() == pytest.approx(share.area[which], abs=0.01)
+
+
+def test_mean_albedo_is_the_reflectance_of_level_far():
+    fabric = load("linen_plain")
+    maps, _ = baked(fabric)
+    z, weight = np.polynomial.legendre.leggauss(32)
+    z = 0.5 * (z + 1)
+    phi = (np.arange(64) + 0.5) * 2 * np.pi / 64
+    flat = np.sqrt(1 - z * z)[:, None]
+    wi = np.stack(np.broadcast_arrays(flat * np.cos(phi), flat * np.sin(phi), z[:, None]), axis=-1)
+    value = evaluate(fabric, wi.reshape(-1, 3), (0.0, 0.0, 1.0)).reshape(32, 64, 3)
+    true = np.einsum("k,kac->c", 0.5 * weight, value) * 2 * np.pi / 64
+    assert np.allclose(maps["albedo"][-1][0, 0], true, rtol=0.02)
+
+
+def test_normals_are_those_of_the_height_map():
+    # Long floats without gaps: no step of the height between neighbours along a thread.
+    fabric = load("linen_plain")
+    maps, _ = baked(fabric, threads=4.0, resolution=256)
+    # Quarter of a mm a texel in reality: slopes need the cloth's own scale.
+    step = fabric.warp.pitch * 4.0 / 256 * 1e3
+    height = maps["height"][0][..., 0].astype(np.float64)
+    normal = maps["normal"][0].astype(np.float64)
+    ids = maps["thread_id"][0][..., 0]
+    full = maps["opacity"][0][..., 0] == 1
+    middle = (slice(1, -1), slice(1, -1))
+    same = full[middle] & (ids[middle] != 255)
+    for shift in (-1, 1):
+        for axis in (0, 1):
+            same &= (np.roll(ids, shift, axis) == ids)[middle]
+            same &= (np.roll(full, shift, axis))[middle]
+    du = (height[1:-1, 2:] - height[1:-1, :-2]) / (2 * step)
+    dv = (height[:-2, 1:-1] - height[2:, 1:-1]) / (2 * step)
+    got = -normal[middle][..., :2] / normal[middle][..., 2:]
+    error = np.abs(got - np.stack((du, dv), axis=-1))[same]
+    assert same.mean() > 0.3
+    assert np.quantile(error, 0.95) < 0.03
+
+
+def test_a_turned_grain_turns_the_tangents():
+    fabric = load("silk_shot")
+    straight, _ = baked(fabric)
+    turned, _ = baked(fabric, rotation=np.pi / 2)
+    a, c = straight["tangent"][-1][0, 0], turned["tangent"][-1][0, 0]
+    assert abs(float(a[0] * c[0] + a[1] * c[1])) < 0.05
+
+
+def test_a_mip_normal_is_the_mean_slope_and_not_the_mean_normal():
+    """A symmetric hump has no mean slope; what its slopes do instead is in their variance."""
+    fabric = load("linen_plain")
+    maps, _ = baked(fabric)
+    assert np.allclose(maps["normal"][-1][0, 0], (0, 0, 1), atol=2e-3)
+    fine = maps["normal"][0].astype(np.float64).mean(axis=(0, 1))
+    assert np.linalg.norm(fine) < 0.98
+    # Slopes of linen are even from -25 to 25 degrees in angle: E[tan^2] over both sets' shares.
+    psi = np.radians(np.linspace(-25, 25, 4001))
+    share = coverage(fabric).area
+    expected = np.mean(np.tan(psi) ** 2) * share / share.sum()
+    assert np.allclose(maps["slope_variance"][-1][0, 0, :2], expected, rtol=0.03)
+
+
+def test_shadows_cross_the_repeats_border():
+    """Repeat after repeat looks alike: no seam where the table ends."""
+    fabric = load("linen_plain")
+    maps, _ = baked(fabric, threads=8.0, resolution=128)
+    seen = maps["visibility"][0][..., 0].astype(np.float64)
+    shift = 128 * 2 // 8
+    inside = np.abs(seen - np.roll(seen, shift, axis=1))
+    assert inside.mean() < 0.005
+    assert seen.min() < 0.95
+    # The twin: half a repeat on, other threads lie there.
+    assert np.abs(seen - np.roll(seen, shift // 2, axis=1)).mean() > 0.01
+
+
+def test_a_low_light_casts_longer_shadows():
+    fabric = load("linen_plain")
+    high, _ = baked(fabric, light=(0.2, 0.1, 1.0))
+    low, _ = baked(fabric, light=(1.0, 0.1, 0.3))
+    assert low["shadow"][-1][0, 0, 0] < high["shadow"][-1][0, 0, 0] - 0.05
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_relit_set_is_within_its_stated_bound_on_pairs_held_back(name):
+    fabric = load(name)
+    one = garments(quad_scene(fabric, 16.0))[0]
+    sheet = b.sheet_of(one, (m.recipe(fabric),), 1001, (0, 0), 256, 4)
+    stated = swatch_error(sheet)
+    held_back = swatch_error(sheet, pairs=pairs_between(20, skip=PAIRS))
+    assert held_back.worst_pair <= stated.bound
+    assert stated.texel < 0.5
+
+
+def test_the_bound_bites_when_the_maps_are_of_another_fabric():
+    fabric = load("linen_plain")
+    other = replace(
+        fabric,
+        threads={n: replace(t, albedo=(0.2, 0.1, 0.1)) for n, t in fabric.threads.items()},
+    )
+    one = garments(quad_scene(fabric, 16.0))[0]
+    right = b.sheet_of(one, (m.recipe(fabric),), 1001, (0, 0), 256, 4)
+    wrong = b.sheet_of(one, (m.recipe(other),), 1001, (0, 0), 256, 4)
+    assert swatch_error(wrong).worst_pair > 5 * swatch_error(right).bound
+
+
+@pytest.mark.parametrize(
+    ("name", "bound"),
+    [("linen_plain", 0.5), ("velvet", 0.5), ("silk_shot", 1.0), ("silk_crepe_de_chine", 1.5)],
+)
+def test_the_coarsest_level_relit_is_level_far(name, bound):
+    fabric = load(name)
+    maps, _ = baked(fabric)
+    top = {k: maps[k][-1].reshape(1, -1) for k in NEEDED}
+    top["thread_id"] = np.full_like(top["thread_id"], 255)
+    found = [
+        delta_e(
+            display(relight(top, fabric, wi, wo), wi),
+            display(evaluate(fabric, wi, wo), wi),
+        )[0]
+        for wi, wo in zip(*pairs_between(40), strict=True)
+    ]
+    assert np.mean(found) < bound
+
+
+def test_ids_and_coordinates_are_those_of_the_texels_centre_at_every_level():
+    fabric = load("polyester_satin_charmeuse")
+    maps, _ = baked(fabric, threads=10.0)
+    for level in range(5):
+        weave = maps["weave_coordinate"][level]
+        size = len(weave)
+        y, x = np.mgrid[0:size, 0:size] + 0.5
+        true = np.stack((x, size - y), axis=-1) / size * 10.0
+        assert np.allclose(weave, np.mod(true, 5.0), atol=1e-5)
+        hit = lookup(fabric, true.reshape(-1, 2))
+        ids = maps["thread_id"][level].ravel()
+        expected = np.where(hit.gap, 255, hit.thread + 2 * (hit.set == 1))
+        assert (ids == expected).mean() > 0.995
+
+
+def test_a_model_that_is_not_baked_is_refused():
+    with pytest.raises(FabricError, match="conserving"):
+        reflectance_table(replace(load("linen_plain"), model="conserving"))
+
+
+def test_unknown_maps_and_a_shadow_without_a_light_are_refused():
+    with pytest.raises(FabricError, match="must be one of thread_id"):
+        chosen_maps(("colour",), light=False)
+    with pytest.raises(FabricError, match="needs a light"):
+        chosen_maps(("shadow",), light=False)
