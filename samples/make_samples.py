@@ -199,7 +199,7 @@ def make_drape(folder: Path, *, cells: int = 74, factor: int = 3, steps: int = 4
     """A cloth that hangs over a drum; 98 568 triangles at the usual size."""
     path = folder / "drape.usda"
     stage = new_scene(path)
-    size, radius, height = 0.88, 0.25, 0.42
+    size, radius, height = 0.78, 0.25, 0.42
     line = np.linspace(-size / 2, size / 2, cells + 1)
     x, z = np.meshgrid(line, line[::-1], indexing="ij")
     turn = math.radians(20)
