@@ -64,7 +64,7 @@ def lobe_densities(R, psi0, tangent, surface, volume, theta_o, t, b, n):
     deviations [rad].
     """
     cos_theta = math.sqrt(b * b + n * n)
-    inverse = R(1) / max(cos_theta, R(1e-6))
+    inverse = R(1) / max(cos_theta, R(1e-9))
     theta = atan2(R, t, cos_theta)
     low, high = theta_range(R, psi0)
     mean = min(max(-theta_o, low), high)

@@ -81,12 +81,12 @@ def test_the_mean_of_conserving_weave_over_shared_nodes_is_far(name):
 def test_the_mean_of_weave_over_places_is_far(name, model):
     fabric = with_model(PRESETS[name], model)
     # Steep pile seen edge on: few places carry much of the value.
-    places = spread_places(300_000 if name == "velvet" else 60_000)
+    places = spread_places(300_000 if name == "velvet" or model == "conserving" else 60_000)
     over_places, far = np.zeros(3), np.zeros(3)
     for wi, wo in zip(WI[:4], WO[:4], strict=True):
         value = surface.evaluate(fabric, wi, wo, uv=places, level="weave", multiple=False)
         over_places += value.mean(axis=0)
-        far += surface.evaluate(fabric, wi, wo, max_error=6e-4, multiple=False)[0]
+        far += surface.evaluate(fabric, wi, wo, max_error=2.5e-4, multiple=False)[0]
     assert over_places == pytest.approx(far, rel=1e-3)
 
 
