@@ -89,9 +89,9 @@ def test_the_mean_of_weave_over_places_is_far(name, model):
         value = surface.evaluate(fabric, wi, wo, uv=places, level="weave", multiple=False)
         over_places += value.mean(axis=0)
         far += law_value(R, law, FAR, 0, 0, 0.0, 0.0, *wi, *wo)
-    # Where pile is cut at 85 degrees the conserving integrand has a corner: MODEL section 7's 0.2 %.
-    pile = name == "velvet" and model == "conserving"
-    assert over_places == pytest.approx(far, rel=2.5e-3 if pile else 1e-3)
+    # The conserving integrand has corners, on pile at 85 degrees too: MODEL section 7's 0.2 %.
+    corners = model == "conserving"
+    assert over_places == pytest.approx(far, rel=2e-3 if corners else 1e-3)
 
 
 @pytest.mark.parametrize(("name", "model"), [(n, m) for n in PRESETS for m in MODELS])
