@@ -22,7 +22,7 @@ from fabricusd.appearance.law import (
     surface_law,
 )
 from fabricusd.appearance.levels import point_value, point_values
-from fabricusd.appearance.quadrature import curve_nodes
+from fabricusd.appearance.quadrature import POINTS, Rule, curve_nodes
 from fabricusd.appearance.shadow import METHODS, compile_shadow
 from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.weave import lookup
@@ -80,14 +80,18 @@ def test_the_mean_of_conserving_weave_over_shared_nodes_is_far(name):
 @pytest.mark.parametrize(("name", "model"), [(n, m) for n in PRESETS for m in MODELS])
 def test_the_mean_of_weave_over_places_is_far(name, model):
     fabric = with_model(PRESETS[name], model)
-    # Steep pile seen edge on: few places carry much of the value.
-    places = spread_places(300_000 if name == "velvet" or model == "conserving" else 60_000)
+    # Narrow lobes and steep pile: few places carry much of the value.
+    few = name in ("velvet", "polyester_satin_charmeuse")
+    places = spread_places(300_000 if few else 60_000)
+    law = surface_law(fabric, precision=np.float64, rule=Rule(POINTS, 0.03), multiple=False)
     over_places, far = np.zeros(3), np.zeros(3)
     for wi, wo in zip(WI[:4], WO[:4], strict=True):
         value = surface.evaluate(fabric, wi, wo, uv=places, level="weave", multiple=False)
         over_places += value.mean(axis=0)
-        far += surface.evaluate(fabric, wi, wo, max_error=2.5e-4, multiple=False)[0]
-    assert over_places == pytest.approx(far, rel=1e-3)
+        far += law_value(R, law, FAR, 0, 0, 0.0, 0.0, *wi, *wo)
+    # The conserving integrand has corners, on pile at 85 degrees too: MODEL section 7's 0.2 %.
+    corners = model == "conserving"
+    assert over_places == pytest.approx(far, rel=2e-3 if corners else 1e-3)
 
 
 @pytest.mark.parametrize(("name", "model"), [(n, m) for n in PRESETS for m in MODELS])
