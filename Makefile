@@ -30,10 +30,10 @@ test: $(STAMP)  ## Run every test, the linters and the type checker.
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 quick: $(STAMP)  ## Run the tests that take under ten seconds each.
-	$(BIN)/python -m pytest -m 'not slow'
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'not slow'
 
 lint: $(STAMP)  ## Format, and mend what the linter can.
 	$(BIN)/ruff format .

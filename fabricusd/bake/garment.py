@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,9 @@ from fabricusd.reference.triangles import measured_scale, smooth_normals
 
 FIRST_TILE, LAST_TILE = 1001, 1109
 """UDIM numbers that are baked: ten columns, eleven rows but for the last row's last column."""
+
+NOT_BAKED = ("weave", "back", "documentation")
+"""Fields of a fabric that are digested apart, or do not show in a texture."""
 
 FLATTEST = 1e-14
 """Twice the area in UV [units^2] below which a triangle has none: a square of 1e-7."""
@@ -77,9 +80,19 @@ class Garment:
         for array in (self.uv, self.lay, self.points, self.triangles):
             digest.update(np.ascontiguousarray(array).tobytes())
         for lay in self.lays:
-            digest.update(repr((lay.fabric, lay.matrix.tolist(), lay.offset.tolist())).encode())
-            digest.update(lay.fabric.weave.cells.tobytes())
+            # Not repr(lay.fabric): how numpy prints the weave depends on what else is imported.
+            cloth = lay.fabric
+            parts = [getattr(cloth, f.name) for f in fields(cloth) if f.name not in NOT_BAKED]
+            words = (parts, cloth.weave.cells.shape, lay.matrix.tolist(), lay.offset.tolist())
+            digest.update(repr(words).encode())
+            digest.update(cloth.weave.cells.tobytes())
         return digest.hexdigest()
+
+
+def twice_areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3) normals of triangles with (n, 3, 3) corners, each twice as long as the area."""
+    edges = corners[:, 1:] - corners[:, :1]
+    return np.asarray(np.cross(edges[:, 0], edges[:, 1]), np.float64)
 
 
 def lay_of(binding: Binding, metres_per_uv: float) -> Lay:
@@ -174,7 +187,7 @@ def garment_of(scene: Scene, mesh: Mesh) -> Garment | None:
         surface = scene.materials[index]
         assert isinstance(surface, FabricSurface)
         mine = material[worn] == index
-        lays.append(lay_of(surface.binding, measured_scale(uv[mine], corners[mine])))
+        lays.append(lay_of(surface.binding, measured_scale(uv[mine], twice_areas(corners[mine]))))
         lay[mine] = number
     normals = mesh.normals[worn] if mesh.normals is not None else smooth_normals(mesh.points, tri)
     return Garment(

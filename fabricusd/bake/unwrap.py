@@ -11,7 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.bake.garment import FLATTEST, Garment, Lay, check_shape, lay_of, signed_area
+from fabricusd.bake.garment import (
+    FLATTEST,
+    Garment,
+    Lay,
+    check_shape,
+    lay_of,
+    signed_area,
+    twice_areas,
+)
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
 from fabricusd.reference.scene import FabricSurface, Mesh, Scene
@@ -49,7 +57,7 @@ def unwrapped(axis: str, binding: Binding | None, scene: Scene, mesh: Mesh) -> G
     keep = np.abs(signed_area(uv)) >= FLATTEST
     tri, material, uv = tri[keep], material[keep], uv[keep]
     corners = mesh.points[tri]
-    metres = measured_scale(uv, corners)
+    metres = measured_scale(uv, twice_areas(corners))
     shells = _shells(uv)
     lays: list[Lay] = []
     lay = np.zeros(len(tri), np.int32)

@@ -138,3 +138,11 @@ def test_texels_per_thread_choose_the_resolution():
     assert resolution_for(found, 4.0) == 512
     with pytest.raises(FabricError, match="above 0"):
         resolution_for(found, 0.0)
+
+
+def test_the_fingerprint_does_not_depend_on_how_numpy_prints():
+    scene = quad_scene(Fabric())
+    one = garments(scene)[0]
+    before = one.fingerprint
+    with np.printoptions(legacy="1.13"):
+        assert one.fingerprint == before
