@@ -19,7 +19,8 @@ import resource, sys, time
 start = time.perf_counter()
 from pxr import Usd
 import numpy as np
-value = Usd.Stage.Open(sys.argv[1]).GetPrimAtPath("/F").GetAttribute("grid").Get()
+stage = Usd.Stage.Open(sys.argv[1])
+value = stage.GetPrimAtPath("/F").GetAttribute("grid").Get()
 if sys.argv[2] == "string[]":
     value = np.frombuffer("".join(value).encode(), np.uint8)
 assert np.asarray(value).size == int(sys.argv[3])
@@ -42,11 +43,12 @@ def main() -> None:
                 path = Path(name) / f"{kind[:-2]}{suffix}"
                 layer = Sdf.Layer.CreateNew(str(path))
                 prim = Sdf.CreatePrimInLayer(layer, "/F")
+                prim.specifier = Sdf.SpecifierDef
                 Sdf.AttributeSpec(prim, "grid", Sdf.ValueTypeNames.Find(kind)).default = value
                 layer.Save()
                 done = subprocess.run(
                     [sys.executable, "-c", READ, str(path), kind, str(SIZE * SIZE)],
-                    capture_output=True, text=True, check=True,
+                    stdout=subprocess.PIPE, text=True, check=True,
                 )  # fmt: skip
                 size = path.stat().st_size / 1e6
                 print(f"{kind:9} {suffix}  {size:5.1f} MB  {done.stdout.strip()}")
