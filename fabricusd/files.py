@@ -10,6 +10,8 @@ from pathlib import Path
 
 from fabricusd.errors import FabricError
 
+_PARTIAL = ".partial-"
+
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str], *, clobber: bool = True) -> Iterator[Path]:
@@ -29,7 +31,7 @@ def whole_file(path: str | os.PathLike[str], *, clobber: bool = True) -> Iterato
         )
     try:
         handle, name = tempfile.mkstemp(
-            prefix=f".{target.stem}.", suffix=target.suffix, dir=target.parent
+            prefix=f".{target.stem}{_PARTIAL}", suffix=target.suffix, dir=target.parent
         )
     except OSError as error:
         raise FabricError(str(target), f"cannot be written: {error.strerror}") from error
@@ -46,6 +48,12 @@ def whole_file(path: str | os.PathLike[str], *, clobber: bool = True) -> Iterato
         raise FabricError(str(target), f"cannot be written: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def remove_partial_files(folder: Path) -> None:
+    """Remove what `whole_file` left in `folder` when its process was killed."""
+    for path in folder.glob(f".*{_PARTIAL}*"):
+        path.unlink(missing_ok=True)
 
 
 def readable_file(path: str | os.PathLike[str]) -> Path:

@@ -20,7 +20,7 @@ from fabricusd.bake import moments as m
 from fabricusd.bake.maps import TextureMap
 from fabricusd.bake.planes import PLANES
 from fabricusd.errors import FabricError
-from fabricusd.files import whole_file
+from fabricusd.files import remove_partial_files, whole_file
 
 FOLDER = ".bake"
 
@@ -44,6 +44,7 @@ class Scratch:
             if not resume and self.folder.exists():
                 shutil.rmtree(self.folder)
             self.folder.mkdir(parents=True, exist_ok=True)
+            remove_partial_files(out)
         except OSError as error:
             raise FabricError(str(out), f"cannot be written: {error.strerror}") from error
         if not held.is_file():

@@ -23,6 +23,7 @@ from fabricusd.bake.scratch import Scratch
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
+from fabricusd.files import whole_file
 from fabricusd.reference.images import read_mip_level
 from fabricusd.schema import load
 
@@ -31,8 +32,9 @@ SMALL = Settings(resolution=512, maps=MAPS)
 
 
 def sums(folder: Path) -> dict[str, str]:
+    """Of the textures; not of the hidden files that a killed bake was still writing."""
     return {
-        p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.glob("*.exr"))
+        p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(folder.glob("[!.]*.exr"))
     }
 
 
@@ -171,12 +173,22 @@ def test_killed_at_random_moments_it_ends_bit_identical(whole, square, tmp_path)
         assert all(truth[name] == value for name, value in seen.items())
         if not running:
             assert seen == truth
+            assert not list(folder.glob(".*"))
             folder = tmp_path / str(kills)
     bake(
         square, folder, SMALL, resume=True,
         fabric=Binding(fabric=load("linen_plain"), threads_per_uv=(64.0, 64.0)),
     )  # fmt: skip
     assert sums(folder) == truth
+    assert not list(folder.glob(".*"))
+
+
+def test_what_a_kill_left_half_written_is_removed(whole, square, linen, tmp_path):
+    killed = whole_file(tmp_path / "square_obj.lay.exr")
+    killed.__enter__().write_bytes(b"half")
+    bake(square, tmp_path, SMALL, fabric=linen, resume=True)
+    assert sums(tmp_path) == sums(whole.folder)
+    assert not list(tmp_path.glob(".*"))
 
 
 @pytest.mark.parametrize(
