@@ -24,6 +24,7 @@ COMMANDS = {
     "bake": "make textures of a fabric on a garment",
     "render": "path-trace a scene for look-dev review",
     "compare": "measure how far one picture is from another",
+    "chart": "measure speed against accuracy, and draw it",
     "plugin-path": "print the folder that PXR_PLUGINPATH_NAME needs",
     "demo": "author, check and print every preset into a folder",
 }

@@ -1,0 +1,11 @@
+"""The panels, in the order of the page. To add one: a module with a PANEL, and its line here."""
+
+from __future__ import annotations
+
+from fabricusd.chart import reflectance, zoom
+from fabricusd.chart.panel import Panel
+
+PANELS: tuple[Panel, ...] = (
+    reflectance.PANEL,
+    zoom.PANEL,
+)
