@@ -32,7 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the look; print the names of the files."""
-    from fabricusd.preview.materials import Settings, write_materials
+    from fabricusd.preview.materials import write_materials
+    from fabricusd.preview.recipes import Settings
 
     def say(line: str) -> None:
         print(f"fabricusd: {line}", file=sys.stderr)

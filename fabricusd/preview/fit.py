@@ -169,7 +169,8 @@ def _albedo(values: Floats) -> Floats:
 
 def _delta_e(got: Floats, target: Floats) -> Floats:
     """(n,) difference of the display colours under a light of irradiance pi."""
-    return np.asarray(delta_e_2000((np.pi * got)[None], (np.pi * target)[None])[0])
+    pictures = [(np.pi * values)[None].astype(np.float32) for values in (got, target)]
+    return np.asarray(delta_e_2000(*pictures)[0])
 
 
 @dataclass(frozen=True)

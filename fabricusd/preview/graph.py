@@ -11,7 +11,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Value:
-    """A constant. kind : a MaterialX type, "float", "color3", "vector3", "boolean", "string", ..."""
+    """A constant. kind : a MaterialX type, "float", "color3", "vector3", "boolean", ..."""
 
     kind: str
     value: float | int | bool | str | tuple[float, ...]
@@ -82,9 +82,7 @@ class Builder:
     def __init__(self) -> None:
         self.nodes: dict[str, Node] = {}
 
-    def add(
-        self, name: str, category: str, kind: str, identifier: str, **inputs: Source
-    ) -> Link:
+    def add(self, name: str, category: str, kind: str, identifier: str, **inputs: Source) -> Link:
         """A node, added once for each name."""
         output = {"UsdPrimvarReader_float2": "result", "UsdUVTexture": "rgb"}.get(identifier, "out")
         self.nodes.setdefault(name, Node(name, category, kind, identifier, inputs))

@@ -144,9 +144,7 @@ def _write_looks(
             recipe = recipes[wearer.maps.name, wearer.lay, variant]
             where = scope.AppendChild(recipe.name)
             if not stage.GetPrimAtPath(where):
-                write_material(
-                    stage, where, list(recipe.graphs), dict(recipe.parameters), folder
-                )
+                write_material(stage, where, list(recipe.graphs), dict(recipe.parameters), folder)
         fabric = wearer.maps.lays[wearer.lay].fabric
         if fabric is not None and not wearer.worn:
             where = scope.AppendChild(prim_name(fabric.name))
@@ -165,6 +163,7 @@ def _fill(
             write_binding(prim, scope.AppendChild(prim_name(lay.fabric.name)), binding_of(lay))
     elif wearer.worn:
         prim.RemoveAPI("FabricBindingAPI")
+        prim.CreateRelationship("fabric:binding", custom=False).SetTargets([])
     if variant != "off":
         recipe = recipes[wearer.maps.name, wearer.lay, variant]
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(

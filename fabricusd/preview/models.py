@@ -75,7 +75,9 @@ def specular(
     ax = np.clip(s.alpha_rough, SMALLEST, 1.0)
     ay = np.clip(s.alpha_smooth, SMALLEST, 1.0)
     mean = np.sqrt(ax * ay)
-    d = 1.0 / (np.pi * ax * ay * ((h[..., 0] / ax) ** 2 + (h[..., 1] / ay) ** 2 + h[..., 2] ** 2) ** 2)
+    d = 1.0 / (
+        np.pi * ax * ay * ((h[..., 0] / ax) ** 2 + (h[..., 1] / ay) ** 2 + h[..., 2] ** 2) ** 2
+    )
     a2 = mean * mean
     lambda_i = np.sqrt(a2 + (1.0 - a2) * cos_i**2)
     lambda_o = np.sqrt(a2 + (1.0 - a2) * cos_o**2)
@@ -135,7 +137,12 @@ def zeltner(s: Surface, wi: Floats, wo: Floats, cos_o: Floats) -> tuple[Floats, 
     o = y * (0.000654023 + (-0.0207818 + 0.119681 * y) * y) / (1.26264 + y * (-1.92021 + y))
     albedo = np.exp(-0.5 * ((x - m) / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi)) + o
     a = (2.58126 * x + 0.813703 * y) * y / (1.0 + 0.310327 * x * x + 2.60994 * x * y)
-    b = np.sqrt(1.0 - x) * (y - 1.0) * y**3 / (0.0000254053 + 1.71228 * x - 1.71506 * x * y + 1.34174 * y * y)
+    b = (
+        np.sqrt(1.0 - x)
+        * (y - 1.0)
+        * y**3
+        / (0.0000254053 + 1.71228 * x - 1.71506 * x * y + 1.34174 * y * y)
+    )
     flat = wo[..., :2]
     length = np.linalg.norm(flat, axis=-1)
     unit = np.where(
@@ -161,7 +168,21 @@ def conty_kulla(
     d = (2.0 + inverse) * sin2 ** (0.5 * inverse) / (2.0 * np.pi)
     value = d / (4.0 * (cos_i + cos_o - cos_i * cos_o)) * cos_i
     x, y = cos_o, roughness
-    top = 13.673 - 68.78018 * x + 799.08825 * y - 905.00061 * x * y + 60.28956 * x * x + 1086.96473 * y * y
-    low = 1.0 + 61.57746 * x + 442.78211 * y + 2597.49308 * x * y + 121.81241 * x * x + 3045.55075 * y * y
+    top = (
+        13.673
+        - 68.78018 * x
+        + 799.08825 * y
+        - 905.00061 * x * y
+        + 60.28956 * x * x
+        + 1086.96473 * y * y
+    )
+    low = (
+        1.0
+        + 61.57746 * x
+        + 442.78211 * y
+        + 2597.49308 * x * y
+        + 121.81241 * x * x
+        + 3045.55075 * y * y
+    )
     albedo = np.clip(top / low, 0.0, 1.0)
     return (s.fuzz_weight * value)[..., None] * s.fuzz_color, 1.0 - s.fuzz_weight * albedo

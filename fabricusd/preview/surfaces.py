@@ -11,7 +11,8 @@ from fabricusd.preview.graph import Builder, Graph, Link, Node, Parameter, Sourc
 from fabricusd.preview.look import Look
 
 Inputs = Mapping[str, Texture | Value]
-"""For each map of MAPS its texture, or a constant."""
+"""For each map of MAPS its texture, or a constant. `normal` is coded, (n + 1)/2, as every reader of
+normal maps expects; the others are what the bake holds."""
 
 MAPS = {
     "base_color": "color3",
@@ -85,21 +86,16 @@ def _frame(b: Builder, read: _Maps) -> dict[str, Source]:
     """Normal and tangent in the world; the tangent runs along the rougher axis, so that is the
     map's direction turned by a quarter."""
     space = Value("string", "world")
-    coded = b.math("normal_half", "multiply", "vector3", read("normal"), _one(0.5))
-    coded = b.math("normal_code", "add", "vector3", coded, _one(0.5))
     normal = b.add(
-        "world_normal", "normalmap", "vector3", "ND_normalmap_float", **{"in": coded}
+        "world_normal", "normalmap", "vector3", "ND_normalmap_float", **{"in": read("normal")}
     )
     t = b.add("mesh_tangent", "tangent", "vector3", "ND_tangent_vector3", space=space)
     s = b.add("mesh_bitangent", "bitangent", "vector3", "ND_bitangent_vector3", space=space)
     parts = []
     for axis in (0, 1):
-        parts.append(
-            b.add(
-                f"tangent_{'xy'[axis]}", "extract", "float", "ND_extract_vector3",
-                **{"in": read("tangent"), "index": Value("integer", axis)},
-            )
-        )  # fmt: skip
+        inputs: dict[str, Source] = {"in": read("tangent"), "index": Value("integer", axis)}
+        name = f"tangent_{'xy'[axis]}"
+        parts.append(b.add(name, "extract", "float", "ND_extract_vector3", **inputs))
     minus = b.math("tangent_minus_y", "multiply", "float", parts[1], _one(-1.0))
     first = b.math("tangent_u", "multiply", "vector3", t, minus, short=True)
     second = b.math("tangent_v", "multiply", "vector3", s, parts[0], short=True)
@@ -114,10 +110,8 @@ def _base(b: Builder, read: _Maps) -> Link:
     scaled = b.math(
         "base_scaled", "multiply", "color3", read("base_color"), Parameter("base_color_scale")
     )
-    return b.add(
-        "base", "clamp", "color3", "ND_clamp_color3FA",
-        **{"in": scaled, "low": _one(0.0), "high": _one(1.0)},
-    )  # fmt: skip
+    inputs: dict[str, Source] = {"in": scaled, "low": _one(0.0), "high": _one(1.0)}
+    return b.add("base", "clamp", "color3", "ND_clamp_color3FA", **inputs)
 
 
 def _fourth_root(b: Builder, value: Link) -> Link:
@@ -252,15 +246,15 @@ def preview(maps: Inputs, look: Look, opaque: bool) -> Graph:
         fallback=Value("vector2", (0.0, 0.0)),
     )  # fmt: skip
 
-    def read(name: str, output: str, scale: tuple[float, ...]) -> Source:
+    def read(name: str, output: str, scale: tuple[float, ...], bias: float = 0.0) -> Source:
         source = maps[name]
         if isinstance(source, Value):
-            return _scaled(source, scale)
+            return _scaled(source, scale, bias)
         made = b.add(
             f"Preview_{name}", "", "", "UsdUVTexture", file=source, st=st,
             wrapS=Value("token", "clamp"), wrapT=Value("token", "clamp"),
             sourceColorSpace=Value("token", "raw"), scale=Value("float4", scale),
-            bias=Value("float4", (0.0, 0.0, 0.0, 0.0)),
+            bias=Value("float4", (bias, bias, bias, 0.0)),
         )  # fmt: skip
         return Link(made.node, output)
 
@@ -270,7 +264,7 @@ def preview(maps: Inputs, look: Look, opaque: bool) -> Graph:
         "metallic": _one(0.0),
         "roughness": read("roughness_along", "r", (look.smooth_scale,) * 4),
         "ior": _one(look.specular_ior),
-        "normal": read("normal", "rgb", (1.0, 1.0, 1.0, 1.0)),
+        "normal": read("normal", "rgb", (2.0, 2.0, 2.0, 1.0), -1.0),
     }
     if not opaque:
         inputs["opacity"] = read("opacity", "r", (1.0, 1.0, 1.0, 1.0))
@@ -278,10 +272,10 @@ def preview(maps: Inputs, look: Look, opaque: bool) -> Graph:
     return Graph(tuple(b.nodes.values()), "Preview", "surface", "")
 
 
-def _scaled(value: Value, scale: tuple[float, ...]) -> Value:
-    """A constant times a reader's scale."""
+def _scaled(value: Value, scale: tuple[float, ...], bias: float) -> Value:
+    """A constant as a reader's scale and bias would give it."""
     held = value.value
     if isinstance(held, tuple):
-        return Value(value.kind, tuple(x * k for x, k in zip(held, scale, strict=False)))
+        return Value(value.kind, tuple(x * k + bias for x, k in zip(held, scale, strict=False)))
     assert isinstance(held, float)
     return Value(value.kind, held * scale[0])

@@ -47,9 +47,7 @@ def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
         axis=1,
     )  # fmt: skip
     # Where a texel spans whole repeats all texels are alike, and one stands for them.
-    _, first, counts = np.unique(
-        np.round(rows, 2), axis=0, return_index=True, return_counts=True
-    )
+    _, first, counts = np.unique(np.round(rows, 2), axis=0, return_index=True, return_counts=True)
     rows = rows[first]
     return TexelSample(
         base=rows[:, :3],

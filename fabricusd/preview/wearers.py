@@ -119,9 +119,7 @@ def _instance(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
     root = prim
     while root.IsInstanceProxy():
         root = root.GetParent()
-    meshes = [
-        p for p in Usd.PrimRange(root, Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)
-    ]
+    meshes = [p for p in Usd.PrimRange(root, Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
     if len(meshes) > 1:
         notes.append(
             f"{prim.GetPath()} is in an instance with other meshes, which cannot be changed one by "

@@ -28,7 +28,10 @@ _PREVIEW_TYPES = {
     "r": Sdf.ValueTypeNames.Float,
     "surface": Sdf.ValueTypeNames.Token,
 }
-_PREVIEW_INPUTS = {"diffuseColor": Sdf.ValueTypeNames.Color3f, "normal": Sdf.ValueTypeNames.Normal3f}
+_PREVIEW_INPUTS = {
+    "diffuseColor": Sdf.ValueTypeNames.Color3f,
+    "normal": Sdf.ValueTypeNames.Normal3f,
+}
 
 
 def write_material(
