@@ -99,9 +99,8 @@ def fit(kind: str, texels: TexelSample, fabric: Fabric) -> Fitted:
     frames = _frames(texels)
     locals_ = (np.einsum("kab,nb->kna", frames, wi), np.einsum("kab,nb->kna", frames, wo))
     free = _free(kind)
-    start = _start(texels, target)
+    start = _start(target)
     low, high = (np.concatenate([np.atleast_1d(f.bound(end)) for f in free]) for end in (0, 1))
-    x0 = np.clip(_pack(start, free), low + 1e-6, high - 1e-6)
 
     def far(x: Floats) -> Floats:
         return forward(kind, _unpack(x, free, start), texels, *locals_)
@@ -109,7 +108,7 @@ def fit(kind: str, texels: TexelSample, fabric: Fabric) -> Fitted:
     root = np.cbrt(np.pi * target + DARK)
     albedo_root = np.cbrt(_albedo(target) + DARK)
 
-    def residual(x: Floats) -> Floats:
+    def residual(x: Floats, x0: Floats) -> Floats:
         got = far(x)
         return np.concatenate(
             (
@@ -119,7 +118,15 @@ def fit(kind: str, texels: TexelSample, fabric: Fabric) -> Fitted:
             )
         )
 
-    found = least_squares(residual, x0, bounds=(low, high), x_scale=0.1, max_nfev=40)
+    tries = []
+    for first in (start, replace(start, specular_ior=3.0, fuzz_weight=0.02)):
+        x0 = np.clip(_pack(first, free), low + 1e-6, high - 1e-6)
+        tries.append(
+            least_squares(
+                residual, x0, bounds=(low, high), x_scale=0.1, max_nfev=40, kwargs={"x0": x0}
+            )
+        )
+    found = min(tries, key=lambda one: float(one.cost))
     look = _unpack(found.x, free, start)
     got, plain = far(found.x), forward(kind, Look(), texels, *locals_)
     error = _delta_e(got, target)
@@ -202,11 +209,12 @@ def _free(kind: str) -> tuple[_Free, ...]:
     )
 
 
-def _start(texels: TexelSample, target: Floats) -> Look:
-    """Where the search begins. The fuzz keeps the hue that the cloth has over all directions."""
+def _start(target: Floats) -> Look:
+    """Where the search begins, with little reflection and much fuzz; a second one begins the other
+    way round. The fuzz keeps the hue that the cloth has over all directions."""
     color = target.mean(axis=0)
     color = tuple(float(c) for c in color / max(float(color.max()), 1e-9))
-    return Look(specular_ior=1.8, fuzz_weight=0.25, fuzz_color=color, fuzz_roughness=0.4)
+    return Look(specular_ior=1.4, fuzz_weight=0.3, fuzz_color=color, fuzz_roughness=0.4)
 
 
 def _pack(look: Look, free: tuple[_Free, ...]) -> Floats:

@@ -87,8 +87,8 @@ def test_a_fit_returns_the_surface_that_made_the_data(kind, monkeypatch):
 
 def test_a_fit_to_cloth_is_nearer_than_the_textures_alone():
     found = fit("openpbr", texels(base=np.array([[0.05, 0.2, 0.25]])), load("linen_plain"))
-    assert found.delta_e < 0.7 * found.start_delta_e
-    assert found.albedo < 0.15
+    assert found.delta_e < 0.8 * found.start_delta_e
+    assert found.albedo < 0.2
 
 
 def test_half_the_cover_is_half_the_light():
