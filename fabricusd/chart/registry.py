@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from fabricusd.chart import reflectance, zoom
+from fabricusd.chart import baked, pictures, reflectance, shadows, zoom
 from fabricusd.chart.panel import Panel
 
 PANELS: tuple[Panel, ...] = (
     reflectance.PANEL,
+    pictures.PANEL,
     zoom.PANEL,
+    shadows.PANEL,
+    *baked.PANELS,
 )
