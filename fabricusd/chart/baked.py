@@ -32,9 +32,9 @@ def bakes(quick: bool) -> tuple[Row, ...]:
 
 def _bake(folder: Path, preset: str, form: str, bound: float, quick: bool) -> Row:
     fabric, seconds = load(preset), []
-    for _ in range(1 if quick else 3):
+    for _ in range(1 if quick else 2):
         start = time.process_time()
-        record = write_btf(fabric, folder, (form,), max_error=bound, per_thread=4 if quick else 16)[
+        record = write_btf(fabric, folder, (form,), max_error=bound, per_thread=4 if quick else 8)[
             0
         ]
         seconds.append(time.process_time() - start)

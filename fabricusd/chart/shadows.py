@@ -85,7 +85,7 @@ def run(quick: bool) -> list[Row]:
 
 def _rows(fabric: Fabric, quick: bool) -> list[Row]:
     double = compile_fabric(fabric, precision=np.float64)
-    uv = places_on_threads(fabric, 300 if quick else 4000)
+    uv = places_on_threads(fabric, 300 if quick else 1500)
     exact = shares(fabric, uv, double, compile_shadow(fabric, "traced", precision=np.float64))
     cloth, shadows = compile_fabric(fabric), _shadows(fabric, quick)
     many = np.resize(uv, (2000 if quick else 50_000, 2))
