@@ -50,8 +50,8 @@ def write_json(path: Path, charts: Charts, seconds: float, quick: bool) -> None:
         temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
-def markdown(charts: Charts, images: str, command: str) -> str:
-    """The page: a picture, the front, and who is dominated by whom, for each panel."""
+def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: str) -> str:
+    """The page: a picture, the front, and who is dominated by whom, for each panel; the sheets."""
     parts = [
         "# Speed against accuracy\n",
         f"Made by `{command}`: every method in one process on one machine, in turns. Cost is given "
@@ -68,6 +68,10 @@ def markdown(charts: Charts, images: str, command: str) -> str:
             f"![{panel.title}]({images}{name}.png)\n",
             *_tables(rows),
         ]
+    if sheets:
+        parts.append("## The thesis's pictures\n")
+    for name, about in sheets.items():
+        parts += [f"{about}.\n", f"![{name}]({images}{name}.png)\n"]
     return "\n".join(parts)
 
 

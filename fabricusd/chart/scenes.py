@@ -87,3 +87,29 @@ def one_cylinder(fabric: Fabric) -> Scene:
         lights=[sky(0.3), sun((0.5, 0.6, 1.0), 2.0, 5.0)],
         camera=facing(2 * RADIUS, 2 * RADIUS),
     )
+
+
+def curtain(size: float = 0.42, cells: int = 120) -> Mesh:
+    """A square of cloth that hangs from its upper edge in folds that deepen downwards, facing +z.
+
+    u runs along the folded width and v upwards, in metres on the cloth.
+    """
+    line = np.linspace(-0.5, 0.5, cells + 1)
+    s, t = np.meshgrid(line, line, indexing="ij")
+    depth = 0.012 + 0.03 * (0.5 - t)
+    z = depth * (np.sin(19.0 * s + 1.3 * t) + 0.4 * np.sin(41.0 * s - 2.0 * t))
+    points = np.stack((size * s, size * t, z), axis=-1)
+    step = np.linalg.norm(np.diff(points, axis=0), axis=-1)
+    along = np.concatenate((np.zeros((1, cells + 1)), np.cumsum(step, axis=0)))
+    uv = np.stack((along - along[cells // 2], size * t), axis=-1)
+    index = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
+    a, b = index[:-1, :-1].ravel(), index[1:, :-1].ravel()
+    c, d = index[1:, 1:].ravel(), index[:-1, 1:].ravel()
+    triangles = np.concatenate([np.stack((a, b, c), 1), np.stack((a, c, d), 1)])
+    return Mesh(
+        path="/curtain",
+        points=points.reshape(-1, 3),
+        triangles=triangles,
+        uv=uv.reshape(-1, 2)[triangles],
+        material=np.zeros(len(triangles), int),
+    )

@@ -13,7 +13,7 @@ def waves(*parts: tuple[int, int, float]) -> np.ndarray:
     """A mean of 1 and cosines of (cycles along x, along y, amplitude), at pixel centres."""
     line = 2 * np.pi * (np.arange(SIZE) + 0.5) / SIZE
     y, x = np.meshgrid(line, line, indexing="ij")
-    return 1.0 + sum(a * np.cos(kx * x + ky * y) for kx, ky, a in parts)
+    return np.ones_like(x) + sum(a * np.cos(kx * x + ky * y) for kx, ky, a in parts)
 
 
 def spectrum(*parts: tuple[int, int, float]) -> np.ndarray:
