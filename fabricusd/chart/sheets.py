@@ -145,7 +145,7 @@ def _bright(beauty: NDArray[Any]) -> Any:
 
 SHEETS: dict[str, tuple[str, Callable[[Path, bool], list[Path]]]] = {
     "cylinders": (
-        "Figure 5.6: linen, crêpe de Chine and satin on a cylinder, their filament threads upright, "
+        "Figure 5.6: linen, crêpe de Chine and satin on a cylinder, filament threads upright, "
         "round and aslant; the ticks are where the tangent curve puts the highlights",
         cylinder_sheet,
     ),

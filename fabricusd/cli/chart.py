@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-EPILOG = """writes charts.csv, charts.json, charts.md, and a PNG and an SVG of each panel into DIR; sheets
-are the thesis's pictures remade, and part of a chart that is neither quick nor of some panels
+EPILOG = """writes charts.csv, charts.json, charts.md, and a PNG and an SVG of each panel into DIR;
+sheets are the thesis's pictures remade, and part of a chart that is neither quick nor partial
 
 example:
   fabricusd chart -o charts --quick
