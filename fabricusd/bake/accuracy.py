@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.accuracy import spread_pairs
 from fabricusd.appearance.surface import evaluate
-from fabricusd.bake import blocks as b
+from fabricusd.bake.blocks import bake_block
 from fabricusd.bake.maps import REGISTRY
 from fabricusd.bake.raster import NOBODY, owners
 from fabricusd.bake.relight import NEEDED, relight
+from fabricusd.bake.sheet import Sheet, texel_start, texel_step
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -78,7 +79,7 @@ def delta_e(a: Floats, reference: Floats) -> Floats:
     return np.asarray(colour.difference.delta_E_CIE2000(lab[0], lab[1]), np.float64)
 
 
-def fullest_block(sheet: b.Sheet) -> tuple[int, int, int]:
+def fullest_block(sheet: Sheet) -> tuple[int, int, int]:
     """(bx, by, lay) of the block near the middle that one lay covers most of."""
     middle = sheet.across // 2
     best, found = -1, (middle, middle, 0)
@@ -87,24 +88,22 @@ def fullest_block(sheet: b.Sheet) -> tuple[int, int, int]:
         key=lambda p: abs(p[0] - middle) + abs(p[1] - middle),
     )
     for x, y in order[:64]:
-        size = sheet.block
-        window = (x * size, y * size, (x + 1) * size, (y + 1) * size)
-        owner, _ = owners(sheet.corners, sheet.garment.lay, window, 0, sheet.resolution)
+        owner, _ = owners(sheet.corners, sheet.garment.lay, sheet.window(x, y), 0, sheet.resolution)
         counts = np.bincount(owner[owner != NOBODY], minlength=len(sheet.garment.lays))
         if counts.max() > best:
             best, found = int(counts.max()), (x, y, int(counts.argmax()))
-        if best == size * size:
+        if best == sheet.block**2:
             break
     return found
 
 
 def swatch_error(
-    sheet: b.Sheet, *, level: int = 0, pairs: tuple[Floats, Floats] | None = None, seed: int = 0
+    sheet: Sheet, *, level: int = 0, pairs: tuple[Floats, Floats] | None = None, seed: int = 0
 ) -> SwatchError:
     """Error of a sheet's fullest block at mip `level`, computed as it would be written."""
     bx, by, lay = fullest_block(sheet)
     maps = [REGISTRY[name] for name in (*NEEDED, "lay")]
-    found, _, _ = b.bake_block(sheet, maps, bx, by)
+    found, _, _ = bake_block(sheet, maps, bx, by)
     at_level = {t.name: found[k][level] for k, t in enumerate(maps)}
     mine = np.argwhere(at_level["lay"][..., 0] == lay)
     if not len(mine):
@@ -112,8 +111,8 @@ def swatch_error(
     rng = np.random.default_rng(seed)
     chosen = mine[rng.integers(0, len(mine), TEXELS)]
     texels = {n: a[chosen[:, 0], chosen[:, 1]] for n, a in at_level.items()}
-    step = b.texel_step(sheet, lay, 1 << level)
-    start = b.texel_start(sheet, lay, bx * sheet.block, by * sheet.block)
+    step = texel_step(sheet, lay, 1 << level)
+    start = texel_start(sheet, lay, bx * sheet.block, by * sheet.block)
     fabric = sheet.garment.lays[lay].fabric
     inside = (np.arange(INSIDE) + rng.random((TEXELS, 2, INSIDE))) / INSIDE
     x = chosen[:, 1, None, None] + inside[:, 0, :, None]

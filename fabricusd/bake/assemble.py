@@ -13,6 +13,7 @@ from fabricusd import __version__
 from fabricusd.bake import blocks as b
 from fabricusd.bake.maps import TextureMap
 from fabricusd.bake.scratch import Scratch, bands, upper_levels
+from fabricusd.bake.sheet import Sheet
 from fabricusd.reference.images import write_mip_exr
 from fabricusd.reference.workers import Batches
 
@@ -22,7 +23,7 @@ Progress = Callable[[str, int, int], Any]
 
 def compute(
     scratch: Scratch,
-    sheets: Sequence[b.Sheet],
+    sheets: Sequence[Sheet],
     maps: Sequence[TextureMap],
     folder: Path,
     udim: bool,
@@ -46,7 +47,7 @@ def compute(
     return Batches(workers, one_block).run(len(jobs), report)
 
 
-def file_name(sheet: b.Sheet, one: TextureMap, udim: bool) -> Path:
+def file_name(sheet: Sheet, one: TextureMap, udim: bool) -> Path:
     """A texture's name: garment, map, and the tile's number where there are tiles."""
     number = f".{sheet.number}" if udim else ""
     return Path(f"{sheet.garment.name}.{one.name}{number}.exr")
@@ -54,7 +55,7 @@ def file_name(sheet: b.Sheet, one: TextureMap, udim: bool) -> Path:
 
 def assemble(
     scratch: Scratch,
-    sheets: Sequence[b.Sheet],
+    sheets: Sequence[Sheet],
     maps: Sequence[TextureMap],
     folder: Path,
     udim: bool,
@@ -81,7 +82,7 @@ def assemble(
 
 def _write_texture(
     scratch: Scratch,
-    sheet: b.Sheet,
+    sheet: Sheet,
     maps: Sequence[TextureMap],
     folder: Path,
     udim: bool,

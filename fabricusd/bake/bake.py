@@ -13,8 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from fabricusd import __version__
-from fabricusd.bake import blocks as b
-from fabricusd.bake import moments as m
 from fabricusd.bake.accuracy import SwatchError, swatch_error
 from fabricusd.bake.assemble import Progress, assemble, compute, file_name
 from fabricusd.bake.btf.write import MAX_ERROR, write_btf
@@ -26,12 +24,14 @@ from fabricusd.bake.garment import (
     threads_per_uv,
     tiles_of,
 )
-from fabricusd.bake.layer import write_mesh_layer
 from fabricusd.bake.manifest import manifest_of, write_json
 from fabricusd.bake.maps import TextureMap, chosen_maps
+from fabricusd.bake.mesh_layer import write_mesh_layer
 from fabricusd.bake.overlaps import refuse_overlaps
+from fabricusd.bake.recipe import Recipe, recipe
 from fabricusd.bake.report import write_report
 from fabricusd.bake.scratch import Scratch, bytes_needed
+from fabricusd.bake.sheet import Sheet, sheets_of
 from fabricusd.bake.unwrap import unwrapped
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
@@ -141,13 +141,10 @@ def bake(
     if settings.max_error:
         resolution = resolution_within(settings.max_error, found, tiles, recipes, resolution)
     sheets = [
-        b.sheet_of(
-            one, tuple(recipes[lay.fabric] for lay in one.lays), number, place, resolution,
-            settings.margin,
-        )
+        sheet
         for one, places in zip(found, tiles, strict=True)
-        for number, place in places.items()
-    ]  # fmt: skip
+        for sheet in _sheets(one, recipes, places, resolution, settings.margin)
+    ]
     result = Baked(
         folder=folder,
         resolution=resolution,
@@ -180,7 +177,7 @@ def bake(
     return result
 
 
-def _measure(result: Baked, sheets: Sequence[b.Sheet], settings: Settings) -> None:
+def _measure(result: Baked, sheets: Sequence[Sheet], settings: Settings) -> None:
     """The error of each garment's first sheet, and the BTFs of its fabrics."""
     for sheet in sheets:
         if sheet.garment.name not in result.errors:
@@ -197,7 +194,7 @@ def resolution_within(
     max_error: float,
     found: Sequence[Garment],
     tiles: Sequence[dict[int, tuple[int, int]]],
-    recipes: dict[Fabric, m.Recipe],
+    recipes: dict[Fabric, Recipe],
     largest: int,
 ) -> int:
     """The least power of two up to `largest` at which every garment meets `max_error`.
@@ -207,18 +204,24 @@ def resolution_within(
     resolution = 64
     while resolution < largest:
         if all(
-            swatch_error(
-                b.sheet_of(
-                    one, tuple(recipes[lay.fabric] for lay in one.lays),
-                    *next(iter(places.items())), resolution, MARGIN,
-                )
-            ).point
-            <= max_error
+            swatch_error(_sheets(one, recipes, places, resolution, MARGIN)[0]).point <= max_error
             for one, places in zip(found, tiles, strict=True)
-        ):  # fmt: skip
+        ):
             return resolution
         resolution *= 2
     return largest
+
+
+def _sheets(
+    one: Garment,
+    recipes: dict[Fabric, Recipe],
+    places: dict[int, tuple[int, int]],
+    resolution: int,
+    margin: int,
+) -> list[Sheet]:
+    return sheets_of(
+        one, tuple(recipes[lay.fabric] for lay in one.lays), places, resolution, margin
+    )
 
 
 def plan(
@@ -292,12 +295,12 @@ def _coarse(found: Sequence[Garment], resolution: int) -> list[str]:
     return notes
 
 
-def _recipes(found: Sequence[Garment], settings: Settings) -> dict[Fabric, m.Recipe]:
-    made: dict[Fabric, m.Recipe] = {}
+def _recipes(found: Sequence[Garment], settings: Settings) -> dict[Fabric, Recipe]:
+    made: dict[Fabric, Recipe] = {}
     for one in found:
         for lay in one.lays:
             if lay.fabric not in made:
-                made[lay.fabric] = m.recipe(
+                made[lay.fabric] = recipe(
                     lay.fabric, level=settings.level, light=settings.light, method=settings.shadow
                 )
     return made

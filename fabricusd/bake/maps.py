@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.coverage import GAP, WARP, WEFT
 from fabricusd.bake import planes as m
+from fabricusd.bake.garment import Lay
+from fabricusd.bake.recipe import Recipe
 from fabricusd.errors import FabricError
 
 Planes = NDArray[np.float32]
@@ -46,6 +48,20 @@ class Texels:
     hit: tuple[NDArray[Any], NDArray[Any]]
     types: int
     lay: int
+
+    @classmethod
+    def of_planes(cls, planes: Planes, recipe: Recipe, lay: Lay) -> Texels:
+        """Texels without a place: for maps that depend on the planes alone."""
+        nothing: NDArray[Any] = np.empty(0, np.int32)
+        return cls(
+            planes=planes,
+            usual=recipe.mean,
+            along=lay.along,
+            weave=np.empty((0, 2)),
+            hit=(nothing, nothing),
+            types=len(lay.fabric.threads),
+            lay=-1,
+        )
 
     def mean(self, plane: int, count: int = 1) -> Planes:
         """(n, count) planes of what the threads show, gaps left out."""

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.bake import blocks as b
-from fabricusd.bake import moments as m
+from fabricusd.bake.blocks import composed, sizes
+from fabricusd.bake.layers import ComputedLayer, Layer, Place
 from fabricusd.bake.maps import TextureMap
 from fabricusd.bake.planes import PLANES
+from fabricusd.bake.sheet import Sheet
 from fabricusd.errors import FabricError
 from fabricusd.files import remove_partial_files, whole_file
 
@@ -51,13 +52,13 @@ class Scratch:
             with whole_file(held) as temporary:
                 temporary.write_text(key)
 
-    def block(self, sheet: b.Sheet, bx: int, by: int) -> Path:
+    def block(self, sheet: Sheet, bx: int, by: int) -> Path:
         """Where a block is kept."""
         folder = self.folder / f"{sheet.garment.name}.{sheet.number}"
         folder.mkdir(exist_ok=True)
         return folder / f"{bx}_{by}.block"
 
-    def drop(self, sheet: b.Sheet) -> None:
+    def drop(self, sheet: Sheet) -> None:
         """Forget the blocks of a sheet whose textures are all done."""
         shutil.rmtree(self.folder / f"{sheet.garment.name}.{sheet.number}", ignore_errors=True)
 
@@ -82,22 +83,22 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def bytes_needed(sheets: Sequence[b.Sheet], maps: Sequence[TextureMap]) -> int:
+def bytes_needed(sheets: Sequence[Sheet], maps: Sequence[TextureMap]) -> int:
     """What the blocks of all sheets take."""
     total = 0
     for sheet in sheets:
-        one = sum(count for row in b.sizes(sheet, maps) for _, count in row)
+        one = sum(count for row in sizes(sheet, maps) for _, count in row)
         total += one * sheet.across**2
     return total
 
 
 def read_tops(
-    scratch: Scratch, sheet: b.Sheet, maps: Sequence[TextureMap]
+    scratch: Scratch, sheet: Sheet, maps: Sequence[TextureMap]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """(lays, PLANES, n, n) planes of the texel that each block shrinks to, (lays, n, n) owned."""
     lays, n = len(sheet.garment.lays), sheet.across
     planes, owned = np.empty((lays, PLANES, n, n), np.float32), np.empty((lays, n, n), np.float32)
-    last = b.sizes(sheet, maps)[-1][-1] if maps else (0, 0)
+    last = sizes(sheet, maps)[-1][-1] if maps else (0, 0)
     count = lays * PLANES
     for by in range(n):
         for bx in range(n):
@@ -110,7 +111,7 @@ def read_tops(
 
 
 def bands(
-    scratch: Scratch, sheet: b.Sheet, one: TextureMap, level: int, places: list[tuple[int, int]]
+    scratch: Scratch, sheet: Sheet, one: TextureMap, level: int, places: list[tuple[int, int]]
 ) -> Iterator[NDArray[Any]]:
     """Rows of a level that lies inside the blocks, from the top, in heights that tiles like."""
     side = sheet.block >> level
@@ -131,20 +132,23 @@ def bands(
 
 
 def upper_levels(
-    scratch: Scratch, sheet: b.Sheet, maps: Sequence[TextureMap]
+    scratch: Scratch, sheet: Sheet, maps: Sequence[TextureMap]
 ) -> list[list[NDArray[Any]]]:
     """[map][level] the levels above the blocks' own, whole."""
     planes, owned = read_tops(scratch, sheet, maps)
-    stacks = {k: (planes[k], owned[k]) for k in range(len(planes)) if owned[k].any()}
+    window = (0, 0, sheet.resolution, sheet.resolution)
+    layers: dict[int, Layer] = {
+        k: ComputedLayer(
+            Place(sheet=sheet, lay=k, window=window, level=sheet.levels - 1), planes[k], owned[k]
+        )
+        for k in range(len(planes))
+        if owned[k].any()
+    }
     found: list[list[NDArray[Any]]] = [[] for _ in maps]
-    size, level = sheet.across, sheet.levels - 1
+    size = sheet.across
     while size > 1:
-        stacks = {k: m.halve(*stack) for k, stack in stacks.items()}
-        size, level = size // 2, level + 1
-        layers = {
-            k: (*stack, *b.centres(sheet, k, (0, 0, sheet.resolution, sheet.resolution), level))
-            for k, stack in stacks.items()
-        }
-        for k, one in enumerate(maps):
-            found[k].append(b.compose(sheet, one, layers, size))
+        layers = {k: layer.halved() for k, layer in layers.items()}
+        size //= 2
+        for k, values in enumerate(composed(maps, layers, size)):
+            found[k].append(values)
     return found

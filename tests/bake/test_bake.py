@@ -96,7 +96,7 @@ def test_a_set_is_relit_from_its_folder(square, linen, tmp_path):
 
 def test_a_stopped_bake_goes_on_and_ends_bit_identical(whole, square, linen, tmp_path, monkeypatch):
     written = []
-    original = module.b.write_block
+    original = assemble.b.write_block
 
     def failing(path, *rest):
         if len(written) == 2:
@@ -104,13 +104,13 @@ def test_a_stopped_bake_goes_on_and_ends_bit_identical(whole, square, linen, tmp
         written.append(path)
         original(path, *rest)
 
-    monkeypatch.setattr(module.b, "write_block", failing)
+    monkeypatch.setattr(assemble.b, "write_block", failing)
     with pytest.raises(FabricError, match="No space left"):
         bake(square, tmp_path, SMALL, fabric=linen, workers=1)
     assert not list(tmp_path.glob("*.exr"))
     again = []
     monkeypatch.setattr(
-        module.b, "write_block", lambda path, *rest: (again.append(path), original(path, *rest))
+        assemble.b, "write_block", lambda path, *rest: (again.append(path), original(path, *rest))
     )
     bake(square, tmp_path, SMALL, fabric=linen, resume=True)
     assert len(again) == 2

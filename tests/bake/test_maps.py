@@ -12,8 +12,6 @@ from fabricusd.appearance.compiled import true_repeat
 from fabricusd.appearance.coverage import coverage
 from fabricusd.appearance.surface import evaluate
 from fabricusd.appearance.weave import lookup
-from fabricusd.bake import blocks as b
-from fabricusd.bake import moments as m
 from fabricusd.bake.accuracy import (
     PAIRS,
     delta_e,
@@ -21,10 +19,13 @@ from fabricusd.bake.accuracy import (
     pairs_between,
     swatch_error,
 )
+from fabricusd.bake.blocks import bake_block
 from fabricusd.bake.garment import garments
 from fabricusd.bake.maps import REGISTRY, chosen_maps
+from fabricusd.bake.recipe import recipe
 from fabricusd.bake.reflectance import reflectance_table
 from fabricusd.bake.relight import NEEDED, relight
+from fabricusd.bake.sheet import sheets_of
 from fabricusd.errors import FabricError
 from fabricusd.schema import load
 
@@ -42,9 +43,9 @@ def baked(fabric, threads=8.0, resolution=128, **options):
     """Every map of a square: name -> list of levels."""
     settings = {k: options.pop(k) for k in ("level", "light") if k in options}
     one = garments(quad_scene(fabric, threads, **options))[0]
-    sheet = b.sheet_of(one, (m.recipe(fabric, **settings),), 1001, (0, 0), resolution, 4)
+    sheet = sheets_of(one, (recipe(fabric, **settings),), {1001: (0, 0)}, resolution, 4)[0]
     maps = chosen_maps(None, light="light" in settings)
-    found, _, _ = b.bake_block(sheet, maps, 0, 0)
+    found, _, _ = bake_block(sheet, maps, 0, 0)
     return {t.name: levels for t, levels in zip(maps, found, strict=True)}, sheet
 
 
@@ -152,7 +153,7 @@ def test_a_low_light_casts_longer_shadows():
 def test_a_relit_set_is_within_its_stated_bound_on_pairs_held_back(name):
     fabric = load(name)
     one = garments(quad_scene(fabric, 16.0))[0]
-    sheet = b.sheet_of(one, (m.recipe(fabric),), 1001, (0, 0), 256, 4)
+    sheet = sheets_of(one, (recipe(fabric),), {1001: (0, 0)}, 256, 4)[0]
     stated = swatch_error(sheet)
     held_back = swatch_error(sheet, pairs=pairs_between(20, skip=PAIRS))
     assert held_back.worst_pair <= stated.bound
@@ -166,8 +167,8 @@ def test_the_bound_bites_when_the_maps_are_of_another_fabric():
         threads={n: replace(t, albedo=(0.2, 0.1, 0.1)) for n, t in fabric.threads.items()},
     )
     one = garments(quad_scene(fabric, 16.0))[0]
-    right = b.sheet_of(one, (m.recipe(fabric),), 1001, (0, 0), 256, 4)
-    wrong = b.sheet_of(one, (m.recipe(other),), 1001, (0, 0), 256, 4)
+    right = sheets_of(one, (recipe(fabric),), {1001: (0, 0)}, 256, 4)[0]
+    wrong = sheets_of(one, (recipe(other),), {1001: (0, 0)}, 256, 4)[0]
     assert swatch_error(wrong).worst_pair > 5 * swatch_error(right).bound
 
 
