@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fabricusd import __version__
-from fabricusd.bake import blocks as b
+from fabricusd.bake.blocks import Layers, composed
+from fabricusd.bake.kept import Kept, block_is_sound, kept, read_top
+from fabricusd.bake.layers import ComputedLayer, Place
 from fabricusd.bake.maps import TextureMap
-from fabricusd.bake.scratch import Scratch, bands, upper_levels
+from fabricusd.bake.planes import PLANES
+from fabricusd.bake.scratch import Scratch
 from fabricusd.bake.sheet import Sheet
 from fabricusd.reference.images import write_mip_exr
 from fabricusd.reference.workers import Batches
@@ -37,11 +41,13 @@ def compute(
             continue
         jobs += [(sheet, x, y) for y in range(sheet.across) for x in range(sheet.across)]
 
+    ways = {id(sheet): kept(sheet, maps) for sheet in sheets}
+
     def one_block(_: int, k: int) -> None:
         sheet, x, y = jobs[k]
         path = scratch.block(sheet, x, y)
-        if not b.block_is_sound(path):
-            b.write_block(path, *b.bake_block(sheet, maps, x, y))
+        if not block_is_sound(path):
+            ways[id(sheet)].write(path, x, y)
 
     report = partial(progress, "blocks", len(jobs)) if progress else None
     return Batches(workers, one_block).run(len(jobs), report)
@@ -72,7 +78,7 @@ def assemble(
         if not todo:
             continue
         task = partial(_write_texture, scratch, sheet, maps, folder, udim, todo)
-        task = partial(task, upper_levels(scratch, sheet, maps))
+        task = partial(task, uppermost(scratch, sheet))
         report = partial(progress, "textures", len(todo)) if progress else None
         if not Batches(workers, task).run(len(todo), report):
             return False
@@ -87,17 +93,17 @@ def _write_texture(
     folder: Path,
     udim: bool,
     todo: Sequence[int],
-    upper: list[list[Any]],
+    upper: Layers,
     _worker: int,
     job: int,
 ) -> None:
     """One texture, from the blocks and the levels above them."""
     k = todo[job]
-    one, places = maps[k], b.sizes(sheet, maps)[k]
+    one, way = maps[k], kept(sheet, maps)
     levels: list[Any] = [
-        partial(bands, scratch, sheet, one, level, places) for level in range(sheet.levels)
+        partial(bands, scratch, sheet, way, k, level) for level in range(sheet.levels)
     ]
-    levels += [partial(_whole, level) for level in upper[k]]
+    levels += [partial(_whole, level) for level in upper_levels(one, upper, sheet.across)]
     metadata = {
         "fabricusd:map": one.name,
         "fabricusd:meaning": one.meaning,
@@ -111,3 +117,44 @@ def _write_texture(
 
 def _whole(level: np.ndarray[Any, Any]) -> Any:
     return iter((level,))
+
+
+def bands(scratch: Scratch, sheet: Sheet, way: Kept, k: int, level: int) -> Iterator[NDArray[Any]]:
+    """Rows of a map's level that lies inside the blocks, from the top, in heights for tiles."""
+    waiting: list[NDArray[Any]] = []
+    for by in range(sheet.across):
+        row = [
+            way.values(scratch.block(sheet, x, by), x, by, k, level) for x in range(sheet.across)
+        ]
+        waiting.append(np.concatenate(row, axis=1))
+        if len(waiting) * (sheet.block >> level) >= 64 or by == sheet.across - 1:
+            yield np.ascontiguousarray(np.concatenate(waiting))
+            waiting = []
+
+
+def uppermost(scratch: Scratch, sheet: Sheet) -> Layers:
+    """Layers of the level at which each block is one texel."""
+    lays, n = len(sheet.garment.lays), sheet.across
+    planes, owned = np.empty((lays, PLANES, n, n), np.float32), np.empty((lays, n, n), np.float32)
+    for by in range(n):
+        for bx in range(n):
+            found = read_top(scratch.block(sheet, bx, by), sheet)
+            planes[:, :, by, bx], owned[:, by, bx] = found
+    window = (0, 0, sheet.resolution, sheet.resolution)
+    return {
+        k: ComputedLayer(
+            Place(sheet=sheet, lay=k, window=window, level=sheet.levels - 1), planes[k], owned[k]
+        )
+        for k in range(lays)
+        if owned[k].any()
+    }
+
+
+def upper_levels(one: TextureMap, layers: Layers, size: int) -> list[NDArray[Any]]:
+    """The levels of a map above the blocks' own, whole; layers : as `uppermost` gives them"""
+    found = []
+    while size > 1:
+        layers = {k: layer.halved() for k, layer in layers.items()}
+        size //= 2
+        found.append(composed(one, layers, size))
+    return found

@@ -24,13 +24,14 @@ from fabricusd.bake.garment import (
     threads_per_uv,
     tiles_of,
 )
+from fabricusd.bake.kept import kept
 from fabricusd.bake.manifest import manifest_of, write_json
 from fabricusd.bake.maps import TextureMap, chosen_maps
 from fabricusd.bake.mesh_layer import write_mesh_layer
 from fabricusd.bake.overlaps import refuse_overlaps
 from fabricusd.bake.recipe import Recipe, recipe
 from fabricusd.bake.report import write_report
-from fabricusd.bake.scratch import Scratch, bytes_needed
+from fabricusd.bake.scratch import Scratch
 from fabricusd.bake.sheet import Sheet, sheets_of
 from fabricusd.bake.unwrap import unwrapped
 from fabricusd.errors import FabricError
@@ -154,7 +155,7 @@ def bake(
         notes=[*read.notes, *(n for g in found for n in g.notes), *_coarse(found, resolution)],
     )
     scratch = Scratch(folder, _key(found, settings, resolution, maps), resume=resume)
-    _check_space(folder, bytes_needed(sheets, maps))
+    _check_space(folder, sum(kept(sheet, maps).bytes_needed for sheet in sheets))
     count = worker_count(workers)
     result.finished = all(
         step(scratch, sheets, maps, folder, settings.udim, count, progress)

@@ -7,6 +7,7 @@ and computes those alone that the layout's border cuts.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,7 +26,9 @@ from fabricusd.bake.sheet import Sheet, Window, texel_start, texel_step
 Planes = NDArray[np.float32]
 
 LOOKED_UP = -1
-"""Instead of a row of own planes: the table holds the texel."""
+"""Instead of a column of own planes: the table holds the texel."""
+
+NONE: Planes = np.empty((PLANES, 0), np.float32)
 
 
 class Layer(Protocol):
@@ -46,12 +49,11 @@ class Layer(Protocol):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Centres:
     """What lies at the texels' centres: weave coordinates (h, w, 2) modulo the repeat, set and
-    thread type (h, w) there, and the phase of a table's raster (h, w) int32."""
+    thread type (h, w) there."""
 
     weave: NDArray[np.float64]
     sets: NDArray[np.uint8]
     threads: NDArray[np.int32]
-    phases: NDArray[np.int32]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,24 +74,36 @@ class Place:
         """The same place one level coarser."""
         return Place(sheet=self.sheet, lay=self.lay, window=self.window, level=self.level + 1)
 
-    def centres(self, counts: tuple[int, int] = (1, 1)) -> Centres:
-        """What lies at the texels' centres; counts : phases along U and V."""
+    @cached_property
+    def centres(self) -> Centres:
+        """What lies at the texels' centres."""
         n = self.size
         found = Centres(
             weave=np.empty((n, n, 2)),
             sets=np.empty((n, n), np.uint8),
             threads=np.empty((n, n), np.int32),
-            phases=np.empty((n, n), np.int32),
         )
-        repeat = true_repeat(self.sheet.garment.lays[self.lay].fabric)
         _centres(
-            self.sheet.recipes[self.lay].cloth, texel_start(self.sheet, self.lay, *self.window[:2]),
-            texel_step(self.sheet, self.lay, 1 << self.level), np.array(repeat, np.float64),
-            counts, found.weave, found.sets, found.threads, found.phases,
+            self.sheet.recipes[self.lay].cloth, *self._raster(), found.weave, found.sets,
+            found.threads,
         )  # fmt: skip
         return found
 
-    def texels(self, planes: Planes, centres: Centres, mine: NDArray[np.bool_] | None) -> Texels:
+    def phases(self, counts: tuple[int, int]) -> NDArray[np.int32]:
+        """(h, w) entries of a table with `counts` phases along U and V."""
+        found = np.empty((self.size, self.size), np.int32)
+        _phases(*self._raster(), *counts, found)
+        return found
+
+    def _raster(self) -> tuple[NDArray[np.float64], ...]:
+        """(2,) weave coordinates of the first texel's corner, (2, 2) step, (2,) repeat."""
+        return (
+            texel_start(self.sheet, self.lay, *self.window[:2]),
+            texel_step(self.sheet, self.lay, 1 << self.level),
+            np.array(true_repeat(self.sheet.garment.lays[self.lay].fabric), np.float64),
+        )
+
+    def texels(self, planes: Planes, mine: NDArray[np.bool_] | None) -> Texels:
         """What a map is a function of. planes : (PLANES, n) of the texels in `mine`, or of all"""
         lay = self.sheet.garment.lays[self.lay]
         chosen: Any = slice(None) if mine is None else mine
@@ -97,8 +111,8 @@ class Place:
             planes=planes,
             usual=self.sheet.recipes[self.lay].mean,
             along=lay.along,
-            weave=centres.weave[chosen].reshape(-1, 2),
-            hit=(centres.sets[chosen].ravel(), centres.threads[chosen].ravel()),
+            weave=self.centres.weave[chosen].reshape(-1, 2),
+            hit=(self.centres.sets[chosen].ravel(), self.centres.threads[chosen].ravel()),
             types=len(lay.fabric.threads),
             lay=self.lay,
         )
@@ -109,7 +123,6 @@ class ComputedLayer:
 
     def __init__(self, place: Place, planes: Planes, owned: NDArray[np.float32]) -> None:
         self.place, self.planes, self.owned = place, planes, owned
-        self.centres = place.centres()
 
     @classmethod
     def finest(cls, place: Place, owned: NDArray[np.float32]) -> ComputedLayer:
@@ -128,7 +141,7 @@ class ComputedLayer:
     def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
         """(n, channels) of a map."""
         planes = self.planes.reshape(PLANES, -1) if mine is None else self.planes[:, mine]
-        return one.function(self.place.texels(planes, self.centres, mine))
+        return one.function(self.place.texels(planes, mine))
 
     def halved(self) -> ComputedLayer:
         """The next coarser level."""
@@ -142,21 +155,23 @@ class ComputedLayer:
 class TableLayer:
     """Texels looked up by phase; those that are owned in part have planes of their own.
 
-    rows : (h, w) int32 - a texel's column of `own` (PLANES, n), LOOKED_UP where it has none
+    own : (PLANES, n) - of the texels whose owned share is neither 0 nor 1, row by row
     """
 
     def __init__(
-        self,
-        place: Place,
-        table: CellTable,
-        owned: NDArray[np.float32],
-        rows: NDArray[np.int32] | None = None,
-        own: Planes | None = None,
+        self, place: Place, table: CellTable, owned: NDArray[np.float32], own: Planes = NONE
     ) -> None:
-        self.place, self.table, self.owned = place, table, owned
-        self.rows = np.full(owned.shape, LOOKED_UP, np.int32) if rows is None else rows
-        self.own = np.empty((PLANES, 0), np.float32) if own is None else own
-        self.centres = place.centres(self.cell.counts)
+        self.place, self.table, self.owned, self.own = place, table, owned, own
+
+    @cached_property
+    def phases(self) -> NDArray[np.int32]:
+        """(h, w) entries of the table."""
+        return self.place.phases(self.cell.counts)
+
+    @cached_property
+    def rows(self) -> NDArray[np.int32]:
+        """(h, w) columns of `own`, LOOKED_UP where a texel has none."""
+        return numbered(cut_texels(self.owned))
 
     @property
     def cell(self) -> CellLevel:
@@ -166,13 +181,13 @@ class TableLayer:
     def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
         """(n, channels) of a map."""
         if one.exact:
-            return one.function(self.place.texels(self.own, self.centres, mine))
+            return one.function(self.place.texels(self.own, mine))
         lay, sheet = self.place.lay, self.place.sheet
         chosen: Any = slice(None) if mine is None else mine
         known = self.cell.values(one, sheet.recipes[lay], sheet.garment.lays[lay])
-        found = _gathered(known, self.centres.phases[chosen].ravel())
-        rows = self.rows[chosen].ravel()
+        found = _gathered(known, self.phases[chosen].ravel())
         if self.own.shape[1]:
+            rows = self.rows[chosen].ravel()
             cut = rows != LOOKED_UP
             texels = Texels.of_planes(
                 self.own[:, rows[cut]], sheet.recipes[lay], sheet.garment.lays[lay]
@@ -182,24 +197,19 @@ class TableLayer:
 
     def halved(self) -> TableLayer:
         """The next coarser level."""
-        n = self.owned.shape[0] // 2
-        owned = self.owned.reshape(n, 2, n, 2).sum(axis=(1, 3)) * np.float32(0.25)
-        cut = (owned > 0) & (owned < 1)
-        rows = np.full((n, n), LOOKED_UP, np.int32)
-        rows[cut] = np.arange(np.count_nonzero(cut))
-        own = np.empty((PLANES, np.count_nonzero(cut)), np.float32)
-        _cut_texels(
-            np.argwhere(cut), self.owned, self.rows, self.own, self.centres.phases,
-            self.cell.planes, own,
-        )  # fmt: skip
-        return TableLayer(self.place.halved(), self.table, owned, rows, own)
+        owned = shares(self.owned, 1)
+        places = np.argwhere(cut_texels(owned))
+        own = np.empty((PLANES, len(places)), np.float32)
+        if len(places):
+            _cut_planes(places, self.owned, self.rows, self.own, self.phases, self.cell.planes, own)
+        return TableLayer(self.place.halved(), self.table, owned, own)
 
     def planes_at(self, j: int, i: int) -> Planes:
         """(PLANES,) of one texel."""
         row = self.rows[j, i]
         if row != LOOKED_UP:
             return self.own[:, row]
-        return self.cell.planes[:, self.centres.phases[j, i]]
+        return self.cell.planes[:, self.phases[j, i]]
 
 
 def layer_of(place: Place, owned: NDArray[np.float32]) -> Layer:
@@ -217,28 +227,52 @@ def _gathered(known: NDArray[Any], phases: NDArray[np.int32]) -> NDArray[Any]:
     return packed.take(phases).view(known.dtype).reshape(-1, channels)
 
 
+def shares(owned: NDArray[np.float32], levels: int) -> NDArray[np.float32]:
+    """(h, w) owned shares so many levels coarser; exact, being multiples of a power of 1/4."""
+    n, size = owned.shape[0] >> levels, 1 << levels
+    return owned.reshape(n, size, n, size).mean(axis=(1, 3), dtype=np.float32)
+
+
+def cut_texels(owned: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Where a texel is owned in part."""
+    return (owned > 0) & (owned < 1)
+
+
+def numbered(cut: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """(h, w) number of each texel in `cut`, row by row, LOOKED_UP elsewhere."""
+    rows = np.full(cut.shape, LOOKED_UP, np.int32)
+    rows[cut] = np.arange(np.count_nonzero(cut))
+    return rows
+
+
 @njit(**LEAN)
-def _centres(  # type: ignore[no-untyped-def]
-    cloth, start, step, repeat, counts, weave, sets, threads, phases
-):
+def _phases(start, step, repeat, along, down, out):  # type: ignore[no-untyped-def]
+    """Phases, `along` of them along U and `down` along V, of texels; see `_centres`."""
+    for j in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            u = (start[0] + step[0, 0] * (i + 0.5) + step[0, 1] * (j + 0.5)) / repeat[0]
+            v = (start[1] + step[1, 0] * (i + 0.5) + step[1, 1] * (j + 0.5)) / repeat[1]
+            a = np.int32((u - np.floor(u)) * along)
+            b = np.int32((v - np.floor(v)) * down)
+            out[j, i] = min(b, down - 1) * along + min(a, along - 1)
+
+
+@njit(**LEAN)
+def _centres(cloth, start, step, repeat, weave, sets, threads):  # type: ignore[no-untyped-def]
     """Fill what `Centres` holds; start, step as `moments.texels`, repeat (2,) float64."""
     for j in range(sets.shape[0]):
         for i in range(sets.shape[1]):
-            x, y = i + 0.5, j + 0.5
-            u = start[0] + step[0, 0] * x + step[0, 1] * y
-            v = start[1] + step[1, 0] * x + step[1, 1] * y
+            u = start[0] + step[0, 0] * (i + 0.5) + step[0, 1] * (j + 0.5)
+            v = start[1] + step[1, 0] * (i + 0.5) + step[1, 1] * (j + 0.5)
             u -= repeat[0] * np.floor(u / repeat[0])
             v -= repeat[1] * np.floor(v / repeat[1])
             weave[j, i, 0], weave[j, i, 1] = u, v
             sets[j, i], threads[j, i], _, _, _, _ = find(np.float32, cloth, u, v)
-            a = min(max(int(u / repeat[0] * counts[0]), 0), counts[0] - 1)
-            b = min(max(int(v / repeat[1] * counts[1]), 0), counts[1] - 1)
-            phases[j, i] = b * counts[0] + a
 
 
 @njit(**LEAN)
-def _cut_texels(places, owned, rows, own, phases, table, out):  # type: ignore[no-untyped-def]
-    """Planes of texels (n, 2), the owned share of their four texels one level finer."""
+def _cut_planes(places, owned, rows, own, phases, table, out):  # type: ignore[no-untyped-def]
+    """Planes of texels (n, 2) from what is owned of their four texels one level finer."""
     R = np.float32
     for k in range(places.shape[0]):
         weight = R(0)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fabricusd.bake.manifest import write_json
 from fabricusd.files import whole_file
-from fabricusd.reference.images import read_mip_level, write_png
+from fabricusd.reference.images import read_middle, write_png
 
 if TYPE_CHECKING:
     from fabricusd.bake.bake import Baked, Settings
@@ -57,7 +57,7 @@ def write_report(result: Baked, settings: Settings) -> None:
         for name, files in maps.items():
             file = next(iter(files.values()))
             picture = pictures / f"{garment}.{name}.png"
-            write_png(picture, as_picture(read_mip_level(result.folder / file), name))
+            write_png(picture, as_picture(read_middle(result.folder / file, PICTURE), name))
             figures.append(
                 f'<figure><img src="report/{escape(picture.name)}" alt="{escape(name)}">'
                 f"<figcaption>{escape(name)}</figcaption></figure>"
@@ -101,11 +101,9 @@ def _page(said: dict[str, Any], figures: list[str]) -> str:
 
 
 def as_picture(pixels: NDArray[Any], name: str) -> NDArray[np.uint8]:
-    """(h, w, 3) uint8 of a map's middle: directions as colours, the rest from its least value to
-    its greatest."""
-    h, w = pixels.shape[:2]
-    y, x = max(0, (h - PICTURE) // 2), max(0, (w - PICTURE) // 2)
-    part = np.asarray(pixels[y : y + PICTURE, x : x + PICTURE, :3], np.float64)
+    """(h, w, 3) uint8 of a map: directions as colours, the rest from its least value to its
+    greatest."""
+    part = np.asarray(pixels[..., :3], np.float64)
     if name in ("normal", "tangent"):
         part = 0.5 * part + 0.5
     else:

@@ -154,3 +154,22 @@ def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.f
     if buffer.has_error or level >= max(buffer.nmiplevels, 1):
         raise FabricError(str(path), f"has no level {level}: {buffer.geterror()}")
     return np.asarray(buffer.get_pixels(oiio.FLOAT), np.float32)
+
+
+def read_middle(path: str | os.PathLike[str], most: int) -> NDArray[np.float32]:
+    """(h, w, c) float32 middle of a square texture of `write_mip_exr`, at most `most` a side.
+
+    most : a multiple of 64; no other tile is read
+    """
+    source: Any = oiio.ImageInput.open(str(readable_file(path)))
+    if source is None:
+        raise FabricError(str(path), f"cannot be read: {oiio.geterror()}")
+    side = source.spec().width
+    size = min(side, most)
+    begin = (side - size) // 2 // 64 * 64
+    end = begin + size
+    channels = source.spec().nchannels
+    pixels = source.read_tiles(begin, end, begin, end, 0, 1, 0, channels, oiio.FLOAT)
+    if pixels is None:
+        raise FabricError(str(path), f"cannot be read: {source.geterror()}")
+    return np.asarray(pixels, np.float32).reshape(size, size, -1)

@@ -10,12 +10,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from bake.meshes import write_quad
 
-from fabricusd.bake import assemble
+from fabricusd.bake import assemble, cell_table, kept
 from fabricusd.bake import bake as module
 from fabricusd.bake.bake import Settings, bake, plan
 from fabricusd.bake.relight import BakedSet
@@ -96,7 +97,7 @@ def test_a_set_is_relit_from_its_folder(square, linen, tmp_path):
 
 def test_a_stopped_bake_goes_on_and_ends_bit_identical(whole, square, linen, tmp_path, monkeypatch):
     written = []
-    original = assemble.b.write_block
+    original = kept.write_block
 
     def failing(path, *rest):
         if len(written) == 2:
@@ -104,13 +105,13 @@ def test_a_stopped_bake_goes_on_and_ends_bit_identical(whole, square, linen, tmp
         written.append(path)
         original(path, *rest)
 
-    monkeypatch.setattr(assemble.b, "write_block", failing)
+    monkeypatch.setattr(kept, "write_block", failing)
     with pytest.raises(FabricError, match="No space left"):
         bake(square, tmp_path, SMALL, fabric=linen, workers=1)
     assert not list(tmp_path.glob("*.exr"))
     again = []
     monkeypatch.setattr(
-        assemble.b, "write_block", lambda path, *rest: (again.append(path), original(path, *rest))
+        kept, "write_block", lambda path, *rest: (again.append(path), original(path, *rest))
     )
     bake(square, tmp_path, SMALL, fabric=linen, resume=True)
     assert len(again) == 2
@@ -129,6 +130,20 @@ def test_a_block_that_was_damaged_is_made_again(whole, square, linen, tmp_path, 
     block.write_bytes(block.read_bytes()[:-1000])
     bake(square, tmp_path, SMALL, fabric=linen, resume=True)
     assert sums(tmp_path) == sums(whole.folder)
+
+
+def test_maps_of_sheets_without_tables_are_kept_in_blocks(square, linen, tmp_path, monkeypatch):
+    """The way of cloths whose repeat is too large for a table; it ends in the same layout."""
+    monkeypatch.setattr(cell_table, "MOST_PHASES", 0)
+    result = bake(square, tmp_path / "a", SMALL, fabric=linen)
+    again = bake(square, tmp_path / "b", SMALL, fabric=linen, workers=1)
+    assert sums(again.folder) == sums(result.folder)
+    name = result.files[result.garments[0].name]
+    monkeypatch.undo()
+    looked_up = bake(square, tmp_path / "c", SMALL, fabric=linen)
+    for texture in MAPS:
+        a, c = (read_mip_level(r.folder / name[texture][1001], 2) for r in (result, looked_up))
+        assert np.abs(a - c).mean() < 0.02
 
 
 def test_another_job_does_not_resume(square, linen, tmp_path):
@@ -218,7 +233,7 @@ def test_a_folder_that_is_a_file_or_not_ours_is_refused(square, linen, tmp_path)
 
 
 def test_a_disk_that_is_too_small_is_refused_before_the_work(square, linen, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "bytes_needed", lambda *_: 10**18)
+    monkeypatch.setattr(module.shutil, "disk_usage", lambda _: SimpleNamespace(free=1000))
     with pytest.raises(FabricError, match="GB left; the bake needs"):
         bake(square, tmp_path, SMALL, fabric=linen)
 

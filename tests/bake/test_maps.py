@@ -21,11 +21,14 @@ from fabricusd.bake.accuracy import (
 )
 from fabricusd.bake.blocks import bake_block
 from fabricusd.bake.garment import garments
+from fabricusd.bake.layers import Place, TableLayer, layer_of
 from fabricusd.bake.maps import REGISTRY, chosen_maps
+from fabricusd.bake.moments import texels
+from fabricusd.bake.planes import COVER, HORIZON, PLANES, SHARE
 from fabricusd.bake.recipe import recipe
 from fabricusd.bake.reflectance import reflectance_table
 from fabricusd.bake.relight import NEEDED, relight
-from fabricusd.bake.sheet import sheets_of
+from fabricusd.bake.sheet import sheets_of, texel_start, texel_step
 from fabricusd.errors import FabricError
 from fabricusd.schema import load
 
@@ -216,3 +219,48 @@ def test_unknown_maps_and_a_shadow_without_a_light_are_refused():
         chosen_maps(("colour",), light=False)
     with pytest.raises(FabricError, match="needs a light"):
         chosen_maps(("shadow",), light=False)
+
+
+@pytest.mark.parametrize(("name", "threads"), [("linen_plain", 64.0), ("velvet", 90.0)])
+def test_looked_up_texels_are_those_computed_one_by_one(name, threads):
+    """Means of many texels, since those that are computed have the noise of 16 samples."""
+    fabric = load(name)
+    uv = np.array([[0.1, 0.1], [0.55, 0.1], [0.6, 0.8], [0.1, 0.9]])
+    one = garments(quad_scene(fabric, threads, uv=uv, rotation=0.3))[0]
+    looked_up = sheets_of(one, (recipe(fabric),), {1001: (0, 0)}, 256, 4)[0]
+    assert looked_up.tables[0] is not None
+    computed = replace(looked_up, tables=(None,))
+    maps = chosen_maps(None, light=False)
+    found = [bake_block(sheet, maps, 0, 0) for sheet in (looked_up, computed)]
+    for k, one_map in enumerate(maps):
+        for level in range(9):
+            a, c = (blocks[0][k][level].astype(np.float64) for blocks in found)
+            if one_map.exact:
+                assert np.array_equal(a, c)
+            elif one_map.name not in ("tangent", "anisotropy", "roughness_along"):
+                assert np.abs(a - c).mean() < 0.02 + 0.2 * c.std(), (one_map.name, level)
+    assert np.allclose(found[0][1], found[1][1], rtol=0.02, atol=0.01)
+    assert np.array_equal(found[0][2], found[1][2])
+
+
+def test_a_texel_of_the_table_is_the_mean_over_its_own_area():
+    """Against a thousand samples, at half a texel a thread and at six."""
+    fabric = load("polyester_satin_charmeuse")
+    made = recipe(fabric)
+    for threads in (0.5, 6.0):
+        one = garments(quad_scene(fabric, 1024.0 / threads, rotation=0.2))[0]
+        sheet = sheets_of(one, (made,), {1001: (0, 0)}, 1024, 4)[0]
+        place = Place(sheet=sheet, lay=0, window=sheet.window(1, 1))
+        owned = np.ones((256, 256), np.float32)
+        got = layer_of(place, owned)
+        assert isinstance(got, TableLayer)
+        for j, i in np.random.default_rng(0).integers(0, 256, (20, 2)):
+            step = texel_step(sheet, 0)
+            start = texel_start(sheet, 0, 256 + i, 256 + j)
+            true = np.empty((PLANES, 1, 1), np.float32)
+            nobody, sums = np.zeros((1, 1), np.int32), np.empty(PLANES, np.float32)
+            texels(made, step, step, start, (i, j), nobody, 0, 32, sums, true)
+            error = np.abs(got.planes_at(j, i) - true[:, 0, 0])
+            assert error[COVER] < 0.05
+            assert error[SHARE : SHARE + 8].max() < 0.08
+            assert error[HORIZON:].max() < 0.08
