@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,35 +14,49 @@ from numpy.typing import NDArray
 
 from fabricusd import __version__
 from fabricusd.bake.blocks import Layers, composed
+from fabricusd.bake.encoding import FORMATS, encoding_of
 from fabricusd.bake.kept import Kept, block_is_sound, kept, read_top
 from fabricusd.bake.layers import ComputedLayer, Place
 from fabricusd.bake.maps import TextureMap
 from fabricusd.bake.planes import PLANES
 from fabricusd.bake.scratch import Scratch
 from fabricusd.bake.sheet import Sheet
-from fabricusd.reference.images import write_mip_exr
+from fabricusd.reference.images import write_16_bit, write_mip_exr
 from fabricusd.reference.workers import Batches
 
 Progress = Callable[[str, int, int], Any]
 """Told what is counted, how many there are, and how many are done."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Files:
+    """Where textures go and what they are called."""
+
+    folder: Path
+    udim: bool
+    file_format: str
+
+    def path(self, sheet: Sheet, one: TextureMap) -> Path:
+        """A texture: garment, map, and the tile's number where there are tiles."""
+        number = f".{sheet.number}" if self.udim else ""
+        name = f"{sheet.garment.name}.{one.name}{number}{FORMATS[self.file_format]}"
+        return self.folder / name
+
+
 def compute(
     scratch: Scratch,
     sheets: Sequence[Sheet],
     maps: Sequence[TextureMap],
-    folder: Path,
-    udim: bool,
+    files: Files,
     workers: int,
     progress: Progress | None,
 ) -> bool:
     """Every block that is not there yet; False where interrupted."""
     jobs = []
     for sheet in sheets:
-        if all(scratch.is_done(folder / file_name(sheet, one, udim)) for one in maps):
+        if all(scratch.is_done(files.path(sheet, one)) for one in maps):
             continue
         jobs += [(sheet, x, y) for y in range(sheet.across) for x in range(sheet.across)]
-
     ways = {id(sheet): kept(sheet, maps) for sheet in sheets}
 
     def one_block(_: int, k: int) -> None:
@@ -53,32 +69,20 @@ def compute(
     return Batches(workers, one_block).run(len(jobs), report)
 
 
-def file_name(sheet: Sheet, one: TextureMap, udim: bool) -> Path:
-    """A texture's name: garment, map, and the tile's number where there are tiles."""
-    number = f".{sheet.number}" if udim else ""
-    return Path(f"{sheet.garment.name}.{one.name}{number}.exr")
-
-
 def assemble(
     scratch: Scratch,
     sheets: Sequence[Sheet],
     maps: Sequence[TextureMap],
-    folder: Path,
-    udim: bool,
+    files: Files,
     workers: int,
     progress: Progress | None,
 ) -> bool:
     """Every texture that is not there yet; False where interrupted."""
     for sheet in sheets:
-        todo = [
-            k
-            for k, one in enumerate(maps)
-            if not scratch.is_done(folder / file_name(sheet, one, udim))
-        ]
+        todo = [k for k, one in enumerate(maps) if not scratch.is_done(files.path(sheet, one))]
         if not todo:
             continue
-        task = partial(_write_texture, scratch, sheet, maps, folder, udim, todo)
-        task = partial(task, uppermost(scratch, sheet))
+        task = partial(_write_texture, scratch, sheet, maps, files, todo, uppermost(scratch, sheet))
         report = partial(progress, "textures", len(todo)) if progress else None
         if not Batches(workers, task).run(len(todo), report):
             return False
@@ -90,8 +94,7 @@ def _write_texture(
     scratch: Scratch,
     sheet: Sheet,
     maps: Sequence[TextureMap],
-    folder: Path,
-    udim: bool,
+    files: Files,
     todo: Sequence[int],
     upper: Layers,
     _worker: int,
@@ -100,19 +103,27 @@ def _write_texture(
     """One texture, from the blocks and the levels above them."""
     k = todo[job]
     one, way = maps[k], kept(sheet, maps)
+    path, note = files.path(sheet, one), ""
     levels: list[Any] = [
         partial(bands, scratch, sheet, way, k, level) for level in range(sheet.levels)
     ]
-    levels += [partial(_whole, level) for level in upper_levels(one, upper, sheet.across)]
     metadata = {
         "fabricusd:map": one.name,
         "fabricusd:meaning": one.meaning,
-        "oiio:ColorSpace": "lin_rec709" if one.color else "Raw",
         "Software": f"fabricusd {__version__}",
     }
-    path = folder / file_name(sheet, one, udim)
-    write_mip_exr(path, levels, sheet.resolution, one.channels, one.kind, metadata)
-    scratch.mark_done(path)
+    if files.file_format == "exr":
+        metadata["oiio:ColorSpace"] = "lin_rec709" if one.color else "Raw"
+        levels += [partial(_whole, level) for level in upper_levels(one, upper, sheet.across)]
+        write_mip_exr(path, levels, sheet.resolution, one.channels, one.kind, metadata)
+    else:
+        encoding = encoding_of(one, levels[0]())
+        note = json.dumps(encoding.as_dict())
+        metadata["oiio:ColorSpace"] = "sRGB" if one.color else "Raw"
+        metadata["fabricusd:encoding"] = note
+        rows = (encoding.encoded(band) for band in levels[0]())
+        write_16_bit(path, rows, sheet.resolution, len(one.channels), metadata)
+    scratch.mark_done(path, note)
 
 
 def _whole(level: np.ndarray[Any, Any]) -> Any:

@@ -26,8 +26,9 @@ from fabricusd.bake.moments import samples_for, spans_repeats, texels
 from fabricusd.bake.planes import PLANES
 from fabricusd.bake.recipe import Recipe
 
-FINEST, COARSEST = 16, 8
-"""Phases along a texel's side: its centre is then found within 1/32, at worst 1/16 of a texel."""
+FINEST, COARSEST = 15, 9
+"""Phases along a texel's side: its centre is found within 1/30, at worst 1/18 of a texel. Odd, so
+that the centres of a raster that divides the thread's pitch lie on phases, not between two."""
 
 PER_THREAD = 16
 """Phases along a thread's pitch, where a texel spans several."""

@@ -55,13 +55,22 @@ class Scratch:
 
     def is_done(self, file: Path) -> bool:
         """Whether a texture is there, as it was when it was marked."""
-        mark = self.folder / f"{file.name}.done"
-        return mark.is_file() and file.is_file() and mark.read_text() == sha256(file)
+        mark = self._mark(file)
+        if not mark.is_file() or not file.is_file():
+            return False
+        return mark.read_text().partition("\n")[0] == sha256(file)
 
-    def mark_done(self, file: Path) -> None:
-        """Remember that a texture is finished."""
-        with whole_file(self.folder / f"{file.name}.done") as temporary:
-            temporary.write_text(sha256(file))
+    def mark_done(self, file: Path, note: str = "") -> None:
+        """Remember that a texture is finished, and a note about it."""
+        with whole_file(self._mark(file)) as temporary:
+            temporary.write_text(f"{sha256(file)}\n{note}")
+
+    def note(self, file: Path) -> str:
+        """What was noted about a finished texture."""
+        return self._mark(file).read_text().partition("\n")[2]
+
+    def _mark(self, file: Path) -> Path:
+        return self.folder / f"{file.name}.done"
 
     def close(self) -> None:
         """Remove the folder: the job is done."""
