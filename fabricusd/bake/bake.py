@@ -44,6 +44,7 @@ from fabricusd.fabric import Binding, Fabric
 from fabricusd.reference.read import as_binding, read_scene
 from fabricusd.reference.scene import Scene
 from fabricusd.reference.workers import worker_count
+from fabricusd.schema import save_all
 
 MARGIN = 16
 """Texels that a shell is continued beyond its border: enough for four mip levels without a seam."""
@@ -205,6 +206,7 @@ def bake(
         write_mesh_layer(folder / f"{one.name}.usdc", one, read.up_axis)
     _measure(result, sheets, settings)
     result.seconds = time.perf_counter() - began
+    save_all([lay.fabric for one in found for lay in one.lays], folder / "fabrics.usda")
     write_json(folder / "manifest.json", manifest_of(result, settings, Path(scene)))
     write_report(result, settings)
     scratch.close()

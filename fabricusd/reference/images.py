@@ -40,10 +40,16 @@ def write_exr(
     _write(path, spec, data)
 
 
-def write_png(path: str | os.PathLike[str], pixels: NDArray[np.uint8]) -> None:
-    """(h, w, 3) uint8 sRGB code values to a PNG, whole or not at all."""
-    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], oiio.UINT8)
-    spec.attribute("oiio:ColorSpace", "sRGB")
+def write_png(
+    path: str | os.PathLike[str],
+    pixels: NDArray[np.uint8] | NDArray[np.uint16],
+    *,
+    color_space: str = "sRGB",
+) -> None:
+    """(h, w, c) uint8 or uint16 code values to a PNG, whole or not at all; "raw" for data."""
+    kind = oiio.UINT16 if pixels.dtype == np.uint16 else oiio.UINT8
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind)
+    spec.attribute("oiio:ColorSpace", color_space)
     _write(path, spec, np.ascontiguousarray(pixels))
 
 
