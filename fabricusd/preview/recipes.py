@@ -42,10 +42,16 @@ class Settings:
 
     surfaces : MaterialX surfaces, names of `surfaces.GRAPHS`; USD takes the first, the document all
     fitted : whether the parameters are sought; otherwise the textures stand as they are
+    usdz : a package of the look to write as well
+    u3m : a folder for a U3M swatch of each fabric as well
+    osl : whether each fabric is written as an OSL shader beside the look
     """
 
     surfaces: tuple[str, ...] = ("openpbr",)
     fitted: bool = True
+    usdz: Path | None = None
+    osl: bool = False
+    u3m: Path | None = None
 
 
 @dataclass(kw_only=True)
