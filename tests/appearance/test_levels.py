@@ -23,7 +23,7 @@ from fabricusd.appearance.law import (
 )
 from fabricusd.appearance.levels import point_value, point_values
 from fabricusd.appearance.quadrature import POINTS, Rule, curve_nodes
-from fabricusd.appearance.shadow import METHODS, compile_shadow
+from fabricusd.appearance.shadow import METHODS, compile_shadow, mean_lit, shadowing
 from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.weave import lookup
 from fabricusd.fabric import MODELS
@@ -162,13 +162,17 @@ def test_a_gap_reflects_nothing_and_a_thread_does(level, model):
 
 @pytest.mark.parametrize("level", ["weave", "thread"])
 @pytest.mark.parametrize("shadow", METHODS)
-def test_shadowing_only_darkens(level, shadow):
+def test_shadowing_multiplies_by_the_light_that_arrives_over_its_mean(level, shadow):
     fabric = PRESETS["polyester_satin_charmeuse"]
     places, wi = spread_places(400), random_directions(400, 4)
     open_sky = surface.evaluate(fabric, wi, VIEWS["normal"], uv=places, level=level)
     shadowed = surface.evaluate(fabric, wi, VIEWS["normal"], uv=places, level=level, shadow=shadow)
-    assert (shadowed <= open_sky * (1 + 1e-12)).all()
-    assert (shadowed.sum() < open_sky.sum()) == (shadow != "none")
+    g = shadowing(fabric, wi, places, shadow, level=level)
+    tables = compile_shadow(fabric, shadow, level=level, precision=np.float64)
+    mean = np.array([mean_lit(R, tables, *w) for w in wi])
+    assert shadowed == pytest.approx(open_sky * (g / mean)[:, None], rel=1e-9)
+    assert (g.sum() < len(g)) == (shadow != "none")
+    assert (mean.min() < 1) == (shadow in ("horizon", "traced"))
 
 
 def test_level_far_has_no_place_and_takes_no_shadow():
