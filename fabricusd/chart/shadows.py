@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
 
 import numba
@@ -72,12 +73,12 @@ def rms(x: Floats) -> float:
     return math.sqrt(float((x * x).mean()))
 
 
-def run(quick: bool) -> list[Row]:
-    """A group for each woven preset."""
+def run(quick: bool, names: Sequence[str] = ()) -> list[Row]:
+    """A group for each woven preset, or for those of `names`."""
     before = numba.get_num_threads()
     numba.set_num_threads(1)
     try:
-        names = (WOVEN[0], WOVEN[2]) if quick else WOVEN
+        names = names or ((WOVEN[0], WOVEN[2]) if quick else WOVEN)
         return [row for name in names for row in _rows(load(name), quick)]
     finally:
         numba.set_num_threads(before)

@@ -22,6 +22,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--panel", action="append", metavar="NAME", help="this one alone, or these")
     parser.add_argument("--sheet", action="append", metavar="NAME", help="this sheet, or these")
     parser.add_argument("--list-panels", action="store_true", help="print their names and stop")
+    parser.add_argument("--stability", metavar="MD", help="where formulas fail, instead of charts")
+    parser.add_argument(
+        "--choice", metavar="JSON", help="make this machine's table that render --max-error reads"
+    )
     parser.add_argument("--page", metavar="MD", help="write the page here instead")
 
 
@@ -32,6 +36,12 @@ def run(options: argparse.Namespace) -> int:
     from fabricusd.chart.sheets import SHEETS
     from fabricusd.errors import FabricError
 
+    if options.choice:
+        from fabricusd.chart.choice import write_table
+
+        write_table(Path(options.choice), options.quick)
+        print(options.choice)
+        return 0
     if options.list_panels:
         for panel in PANELS:
             print(f"{panel.name:12} {panel.title}")
@@ -45,6 +55,13 @@ def run(options: argparse.Namespace) -> int:
         if not options.quiet:
             print(f"fabricusd: {line}", file=sys.stderr)
 
+    if options.stability:
+        from fabricusd.chart.stability import write_stability
+
+        Path(options.output).mkdir(parents=True, exist_ok=True)
+        for path in write_stability(Path(options.stability), Path(options.output)):
+            print(path)
+        return 0
     page = Path(options.page) if options.page else None
     for path in make_charts(
         Path(options.output), quick=options.quick, names=options.panel, sheets=options.sheet,

@@ -1,0 +1,103 @@
+"""The method that a bound on the error asks for, from a table of measured fronts.
+
+The table, `choice.json`, ships with the package: costs are of the machine it was made on, so only
+their ratios count. `fabricusd chart --choice FILE` makes another. Cloth that is no preset is taken
+to be as hard as the hardest one.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fabricusd.errors import FabricError
+from fabricusd.files import readable_file, whole_file
+
+TABLE = Path(__file__).with_name("choice.json")
+
+Front = Mapping[str, tuple[float, float]]
+"""Method -> (cost, error)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """A method, what it costs and how far it is off, and why it was taken, for people."""
+
+    method: str
+    cost: float
+    error: float
+    why: str
+
+
+@cache
+def read_table(path: Path = TABLE) -> dict[str, Front]:
+    """Preset -> front of its shadowing methods; FabricError for a file that is no such table."""
+    try:
+        content: dict[str, Any] = json.loads(readable_file(path).read_text(encoding="utf-8"))
+        return {
+            name: {method: (float(c), float(e)) for method, (c, e) in front.items()}
+            for name, front in content["shadows"].items()
+        }
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise FabricError(str(path), f"is no table of choices: {error}") from None
+
+
+def front_of(name: str, table: Mapping[str, Front]) -> Front:
+    """A preset's front; for any other cloth the worst of each method over the presets."""
+    if name in table:
+        return table[name]
+    methods = set.intersection(*(set(front) for front in table.values()))
+    return {
+        m: tuple(max(front[m][k] for front in table.values()) for k in (0, 1))  # type: ignore[misc]
+        for m in methods
+    }
+
+
+def cheapest(front: Front, max_error: float) -> Choice:
+    """The cheapest method whose error is at most `max_error`; the nearest where none is."""
+    if not max_error > 0:
+        raise FabricError("--max-error", f"is {max_error:g}; it must be above 0")
+    least = min(cost for cost, _ in front.values())
+    good = {m: x for m, x in front.items() if x[1] <= max_error}
+    method = min(good, key=lambda m: good[m]) if good else min(front, key=lambda m: front[m][1])
+    cost, error = front[method]
+    cheaper = [m for m, x in front.items() if x[0] < cost and m != method]
+    why = f"error {error:.2g}, {cost / least:.2g} times the cheapest"
+    if not good:
+        why += f"; none is within {max_error:g}, this is the nearest"
+    elif cheaper:
+        misses = ", ".join(f"{m} {front[m][1]:.2g}" for m in sorted(cheaper))
+        why += f"; cheaper ones are off by more: {misses}"
+    return Choice(method=method, cost=cost, error=error, why=why)
+
+
+def choose_shadow(names: Sequence[str], max_error: float, path: Path = TABLE) -> Choice:
+    """The shadowing method for a picture of cloths of these names, which all take the same one.
+
+    Error: rms difference of the share of light from the marched height field.
+    """
+    table = read_table(path)
+    choices = [cheapest(front_of(name, table), max_error) for name in names or ("",)]
+    return max(choices, key=lambda c: c.cost)
+
+
+def write_table(path: Path, quick: bool = True) -> None:
+    """Measure every woven preset's shadowing methods, and write the table."""
+    from fabricusd.appearance.shadow import METHODS
+    from fabricusd.chart import shadows
+    from fabricusd.chart.panel import Row
+
+    found: dict[str, dict[str, tuple[float, float]]] = {}
+    rows: list[Row] = shadows.run(quick, shadows.WOVEN)
+    for row in rows:
+        if row.method in METHODS:
+            cost, error = float(f"{row.cost:.3g}"), float(f"{row.error:.3g}")
+            found.setdefault(row.group, {})[row.method] = (cost, error)
+    # On pile every method gives 1.
+    found["velvet"] = {m: (found[shadows.WOVEN[0]][m][0], 0.0) for m in METHODS}
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps({"shadows": found}, indent=1) + "\n", encoding="utf-8")
