@@ -45,12 +45,18 @@ def write_materials(
     overwrite, a scene that was not baked.
     """
     settings = settings or Settings()
-    unknown = [s for s in settings.surfaces if s not in GRAPHS]
+    known = (*GRAPHS, "hair")
+    unknown = [s for s in settings.surfaces if s not in known]
     if unknown:
         raise FabricError(
-            f"surface '{unknown[0]}'", f"is unknown; it must be of {', '.join(GRAPHS)}"
+            f"surface '{unknown[0]}'", f"is unknown; it must be of {', '.join(known)}"
         )
     folder = read_bake_folder(bake)
+    nameless = [lay.name for one in folder.garments for lay in one.lays if lay.fabric is None]
+    if "hair" in settings.surfaces and nameless:
+        raise FabricError(
+            f"fabric '{nameless[0]}'", "is not in the folder; surface 'hair' needs it, bake again"
+        )
     path = Path(out) if out is not None else folder.path / "look.usda"
     _check_target(path, clobber)
     made = Written()
