@@ -20,7 +20,7 @@ NEEDED = ("base_color", "roughness_along", "roughness_across", "normal", "tangen
 
 
 def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
-    """At most KINDS kinds of texels of the lay `number`, None where the bake lacks a map that the fit needs."""
+    """Kinds of texels of the lay `number`; None where the bake lacks a map that a fit needs."""
     if any(name not in maps.textures for name in NEEDED):
         return None
     tile = next(iter(maps.textures["base_color"]))
