@@ -14,7 +14,6 @@ from numba import njit
 
 from fabricusd.appearance.footprint import level_weights, pick_level
 from fabricusd.appearance.real import INLINE, KERNEL, LEAN
-from fabricusd.reference.counter import four_uniform
 from fabricusd.reference.embree import (
     DX,
     DY,
@@ -45,6 +44,7 @@ from fabricusd.reference.hit_frames import (
 from fabricusd.reference.lights import KIND, VISIBLE, choose_light, hit_light, sample_light
 from fabricusd.reference.preview_surface import emission_at
 from fabricusd.reference.scene import DOME
+from fabricusd.reference.sobol import four_numbers
 from fabricusd.reference.triangles import RATE, RECORD
 from fabricusd.reference.triangles import T as TANGENTS
 from fabricusd.reference.wave import (
@@ -88,7 +88,7 @@ MIS, LIGHT_ONLY, SURFACE_ONLY, UNIFORM = range(4)
 
 AUTO_LEVEL = 3
 NUMBERS_PER_STEP = 4
-"""Counters that a step of a path may use, see `counter.four_uniform`."""
+"""Places that a step of a path may use, see `sobol.four_numbers`."""
 
 QUEUES = 6
 """Queues of a material: three levels, two sides."""
@@ -97,7 +97,7 @@ QUEUES = 6
 @njit(**LEAN)
 def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, dome, film, keys,
            triangle_material, repeats, records, level, path_pixel, path_sample,
-           seed, counts):  # fmt: skip
+           numbers, counts):  # fmt: skip
     """Add the light that rays met, and give each lane that goes on the key of its queue, else -1.
 
     repeats : (materials, 2) float32 - ends and picks of a fabric's repeat, 0 where the surface has
@@ -132,12 +132,10 @@ def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, do
             if level == AUTO_LEVEL:
                 width = lanes[LANE_WIDTH, k] + reach * lanes[LANE_SPREAD, k]
                 path = lane_tags[0, k]
-                u, _, _, _ = four_uniform(
-                    path_pixel[path],
-                    path_sample[path],
+                u, _, _, _ = four_numbers(
+                    numbers, path_pixel[path], path_sample[path],
                     np.uint32(2 + NUMBERS_PER_STEP * step + 2),
-                    seed,
-                )
+                )  # fmt: skip
                 inverse = (nx * nx + ny * ny + nz * nz) / max(cosine * cosine, R(1e-30))
                 record = records[triangle]
                 queue = _level_of(record, width, inverse, repeats[material], dx, dy, dz, u)
@@ -186,7 +184,7 @@ def _meet_lights(k, depth, estimator, lights, dome, reach, lanes, lane_tags, fil
 
 @njit(**KERNEL)
 def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, records, lights, dome,
-            epsilon, path_pixel, path_sample, seed, hits, tags):  # fmt: skip
+            epsilon, path_pixel, path_sample, numbers, hits, tags):  # fmt: skip
     """Turn each lane with a key into a hit at the next place of its queue.
 
     offsets : (queues,) int64 - where each queue starts; advanced to where it ends.
@@ -207,7 +205,7 @@ def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, recor
                       block, counters, hits, tags)  # fmt: skip
                 fill += 1
             k += 1
-        _flush(step, estimator, fill, places, block, counters, lights, dome, epsilon, seed, hits)
+        _flush(step, estimator, fill, places, block, counters, lights, dome, epsilon, numbers, hits)
 
 
 @njit(**INLINE)
@@ -237,10 +235,10 @@ def _take(k, h, key, x, rays, lanes, lane_tags, records, path_pixel, path_sample
 
 
 @njit(**INLINE)
-def _flush(step, estimator, fill, places, block, counters, lights, dome, epsilon, seed, hits):
+def _flush(step, estimator, fill, places, block, counters, lights, dome, epsilon, numbers, hits):
     """Bring the block's frames and numbers to their hits, and choose a light for each."""
     make_frames(fill, epsilon, block)
-    make_numbers(fill, np.uint32(2 + NUMBERS_PER_STEP * step), seed, counters, block)
+    make_numbers(numbers, fill, np.uint32(2 + NUMBERS_PER_STEP * step), counters, block)
     for x in range(fill):
         h = places[x]
         for row in range(SIDE + 1):
@@ -248,8 +246,8 @@ def _flush(step, estimator, fill, places, block, counters, lights, dome, epsilon
         for row in range(4):
             hits[CHANCE + row, h] = block[NUMBERS + row * BLOCK + x]
         c0, c1 = block[NUMBERS + 4 * BLOCK + x], block[NUMBERS + 5 * BLOCK + x]
-        c2, c3 = block[NUMBERS + 6 * BLOCK + x], block[NUMBERS + 7 * BLOCK + x]
-        _choose_direction(estimator, lights, dome, c0, c1, c2, c3, hits, h)
+        c2 = block[NUMBERS + 6 * BLOCK + x]
+        _choose_direction(estimator, lights, dome, c0, c1, c2, hits, h)
 
 
 @njit(**LEAN)
@@ -268,7 +266,7 @@ def add_emission(count, surfaces, hits, tags, film):
 
 
 @njit(**INLINE)
-def _choose_direction(estimator, lights, dome, c0, c1, c2, c3, hits, h):
+def _choose_direction(estimator, lights, dome, c0, c1, c2, hits, h):
     """Write the direction to a light, what arrives from there, and its pdf."""
     hits[LIGHT_PDF, h] = R(0)
     hits[DISTANCE, h] = FAR
@@ -284,7 +282,7 @@ def _choose_direction(estimator, lights, dome, c0, c1, c2, c3, hits, h):
         return
     light = lights[choose_light(lights, c0)]
     dx, dy, dz, distance, red, green, blue, pdf = sample_light(
-        light, dome, hits[FRONT, h], hits[FRONT + 1, h], hits[FRONT + 2, h], c1, c2, c3
+        light, dome, hits[FRONT, h], hits[FRONT + 1, h], hits[FRONT + 2, h], c1, c2
     )
     if pdf == R(0):
         return

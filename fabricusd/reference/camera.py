@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.real import INLINE, LEAN, cos, sin
 from fabricusd.errors import FabricError
-from fabricusd.reference.counter import four_uniform
 from fabricusd.reference.embree import DX, DY, DZ, GEOMETRY, MISS, OX, OY, OZ, TFAR, TNEAR
 from fabricusd.reference.scene import Camera, Scene
+from fabricusd.reference.sobol import four_numbers
 
 R = np.float32
 FILTERS = ("box", "tent", "spline")
@@ -97,7 +97,7 @@ def _filter_offset(kind, u, v):
 
 
 @njit(**LEAN)
-def camera_rays(lens, width, pixels, first, samples, seed, rays, cone, path_pixel, path_sample):
+def camera_rays(lens, width, pixels, first, samples, numbers, rays, cone, path_pixel, path_sample):
     """Write the rays of `samples` samples of each of `pixels`, from sample `first` on.
 
     pixels : (n,) int32 - row times `width` plus column; path `k` is sample `k % samples` of pixel
@@ -111,10 +111,10 @@ def camera_rays(lens, width, pixels, first, samples, seed, rays, cone, path_pixe
         pixel = pixels[k // samples]
         sample = np.uint32(first + k % samples)
         path_pixel[k], path_sample[k] = np.uint32(pixel), sample
-        u0, u1, u2, u3 = four_uniform(np.uint32(pixel), sample, np.uint32(0), seed)
+        u0, u1, u2, u3 = four_numbers(numbers, np.uint32(pixel), sample, np.uint32(0))
         v0, v1 = R(0.5), R(0.5)
         if lens.filter == 2:
-            v0, v1, _, _ = four_uniform(np.uint32(pixel), sample, np.uint32(1), seed)
+            v0, v1, _, _ = four_numbers(numbers, np.uint32(pixel), sample, np.uint32(1))
         x = R(pixel % width) + R(0.5) + _filter_offset(lens.filter, u0, v0)
         y = R(pixel // width) + R(0.5) + _filter_offset(lens.filter, u1, v1)
         ax = lens.forward[0] + x * lens.across[0] + y * lens.down[0]

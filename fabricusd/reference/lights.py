@@ -133,7 +133,7 @@ def _add_dome(total, dome):
             longitude = (R(i) + R(0.5)) * (R(2) * _PI / R(w)) - R(0.5) * _PI
             sine = sin(R, theta)
             x, y, z = sine * cos(R, longitude), cos(R, theta), sine * sin(R, longitude)
-            column, row, _ = place_of(dome, x, y, z)
+            column, row = place_of(dome, x, y, z)
             red, green, blue = smooth_radiance(dome, column, row)
             total[j, i, 0] += red
             total[j, i, 1] += green
@@ -192,8 +192,8 @@ def _cone(light, ax, ay, az, one_minus_cos, u0, u1):
 
 
 @njit(**INLINE)
-def sample_light(light, dome, px, py, pz, u0, u1, u2):
-    """Towards one light from p, by three uniform numbers: (dx, dy, dz, distance, r, g, b, pdf).
+def sample_light(light, dome, px, py, pz, u0, u1):
+    """Towards one light from p, by two uniform numbers: (dx, dy, dz, distance, r, g, b, pdf).
 
     pdf is 0 where the light does not shine on p, and *minus* the chance of the choice for a light
     without extent, whose (r, g, b) is an irradiance and which no ray hits.
@@ -202,7 +202,7 @@ def sample_light(light, dome, px, py, pz, u0, u1, u2):
     far = R(1e30)
     red, green, blue = light[RED], light[RED + 1], light[RED + 2]
     if kind == DOME:
-        dx, dy, dz, red, green, blue, pdf = sample_dome(dome, u0, u1, u2)
+        dx, dy, dz, red, green, blue, pdf = sample_dome(dome, u0, u1)
         return dx, dy, dz, far, red, green, blue, pdf * light[CHANCE]
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
     if kind == DISTANT:
@@ -256,12 +256,12 @@ def hit_light(light, dome, to_camera, px, py, pz, dx, dy, dz, reach):
     if kind == DOME:
         if reach < R(1e29):
             return none, none, none, none
-        column, row, sine = place_of(dome, dx, dy, dz)
+        column, row = place_of(dome, dx, dy, dz)
         if to_camera:
             red, green, blue = smooth_radiance(dome, column, row)
             return red, green, blue, R(1)
         cell = dome.cells[cell_at(dome, column, row)]
-        return cell[0], cell[1], cell[2], cell[DENSITY] / sine * light[CHANCE]
+        return cell[0], cell[1], cell[2], cell[DENSITY] * light[CHANCE]
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
     if kind == DISTANT:
         if light[AREA] <= R(0) or reach < R(1e29):

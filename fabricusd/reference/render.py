@@ -184,6 +184,7 @@ def render_scene(
     workers: int | None = None,
     pixel_filter: str = "tent",
     estimator: str = "mis",
+    sampler: str = "sobol",
     progress: Progress | None = None,
 ) -> RenderResult:
     """As `render`, for a `Scene` in memory, without files."""
@@ -193,8 +194,9 @@ def render_scene(
         scene.lights = default_lights(scene)
     camera = scene.camera or default_camera(scene, width, height)
     tracer = Tracer(
-        scene, max_bounces=max_bounces, level=level, shadow=shadow, seed=seed, estimator=estimator
-    )
+        scene, max_bounces=max_bounces, level=level, shadow=shadow, seed=seed,
+        estimator=estimator, sampler=sampler,
+    )  # fmt: skip
     if not len(tracer.tables.triangles):
         scene.note("the scene", "has no triangles to render; only its lights are seen")
     lens = build_lens(camera, width, height, tracer.tables.centre, pixel_filter)
