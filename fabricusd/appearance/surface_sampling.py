@@ -17,7 +17,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.blocks import node_range
@@ -178,28 +178,20 @@ def _in_single_precision(tables: SurfaceTables) -> SurfaceTables:
     )
 
 
-@njit(**KERNEL, parallel=True)
+@njit(**KERNEL)
 def _measure(R, tables, stretches, owner, energy):
     """Energy of every lobe at every view, each by directions drawn from the lobe itself."""
-    for view in prange(ELEVATIONS * AZIMUTHS):
-        _measure_view(R, tables, stretches, owner, view // AZIMUTHS, view % AZIMUTHS, energy)
+    for view in range(ELEVATIONS * AZIMUTHS):
+        e, a = view // AZIMUTHS, view % AZIMUTHS
+        # Short of 90 degrees, where nothing is seen.
+        theta = R(0.5 * math.pi) * min(R(e) / R(ELEVATIONS - 1), R(0.99))
+        phi = R(2 * math.pi / AZIMUTHS) * R(a)
+        ox, oy, oz = sin(R, theta) * cos(R, phi), sin(R, theta) * sin(R, phi), cos(R, theta)
+        for k in range(3 * stretches.shape[0]):
+            energy[e, a, k] = _lobe_energy(R, tables, stretches, owner, k // 3, k % 3, ox, oy, oz)
 
 
 @njit(**LEAN)
-def _measure_view(R, tables, stretches, owner, e, a, energy):
-    # Short of 90 degrees, where nothing is seen.
-    theta = R(0.5 * math.pi) * min(R(e) / R(ELEVATIONS - 1), R(0.99))
-    phi = R(2 * math.pi / AZIMUTHS) * R(a)
-    ox, oy = sin(R, theta) * cos(R, phi), sin(R, theta) * sin(R, phi)
-    oz = cos(R, theta)
-    for y in range(stretches.shape[0]):
-        for lobe in range(3):
-            energy[e, a, 3 * y + lobe] = _lobe_energy(
-                R, tables, stretches, owner, y, lobe, ox, oy, oz
-            )
-
-
-@njit(**INLINE)
 def _lobe_energy(R, tables, stretches, owner, y, lobe, ox, oy, oz):
     """Integral over the hemisphere of one lobe's part of the far value, by its own density."""
     row = stretches[y]

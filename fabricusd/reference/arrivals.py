@@ -34,6 +34,7 @@ from fabricusd.reference.embree import (
 from fabricusd.reference.hit_frames import (
     BLOCK,
     BLOCK_ROWS,
+    CHOSEN,
     MADE,
     NUMBERS,
     RAY,
@@ -41,9 +42,9 @@ from fabricusd.reference.hit_frames import (
     make_frames,
     make_numbers,
 )
-from fabricusd.reference.lights import KIND, VISIBLE, choose_light, hit_light, sample_light
+from fabricusd.reference.light_sampling import no_lights, sample_evenly, sample_lights
+from fabricusd.reference.lights import VISIBLE, hit_light
 from fabricusd.reference.preview_surface import emission_at
-from fabricusd.reference.scene import DOME
 from fabricusd.reference.sobol import four_numbers
 from fabricusd.reference.triangles import RATE, RECORD
 from fabricusd.reference.triangles import T as TANGENTS
@@ -54,29 +55,22 @@ from fabricusd.reference.wave import (
     CORNERS,
     DEPTH,
     DIRECT,
-    DISTANCE,
     FAR_LEVEL,
     FOOTPRINT,
-    FRONT,
     INDIRECT,
     LANE_BETA,
     LANE_PDF,
     LANE_SPREAD,
     LANE_WIDTH,
     LEVEL,
-    LIGHT,
     LIGHT_PDF,
     MATERIAL,
     PATH,
     PLACE,
     SIDE,
     SPREAD,
-    TO_LIGHT,
     WI,
     WIDTH,
-    N,
-    U,
-    V,
 )  # fmt: skip
 from fabricusd.reference.wave import PRIMITIVE as TRIANGLE
 
@@ -192,6 +186,7 @@ def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, recor
     block = np.empty(BLOCK_ROWS * BLOCK, np.float32)
     counters = np.empty(2 * BLOCK, np.uint32)
     places = np.empty(BLOCK, np.int64)
+    choice, where = np.empty(BLOCK, np.int32), np.empty(BLOCK + 1, np.int32)
     k = 0
     while k < count:
         fill = 0
@@ -205,7 +200,15 @@ def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, recor
                       block, counters, hits, tags)  # fmt: skip
                 fill += 1
             k += 1
-        _flush(step, estimator, fill, places, block, counters, lights, dome, epsilon, numbers, hits)
+        make_frames(fill, epsilon, block)
+        make_numbers(numbers, fill, np.uint32(2 + NUMBERS_PER_STEP * step), counters, block)
+        if estimator == UNIFORM:
+            sample_evenly(fill, block)
+        elif estimator == SURFACE_ONLY or lights.shape[0] == 0:
+            no_lights(fill, block)
+        else:
+            sample_lights(lights, dome, fill, choice, where, block)
+        _bring(fill, places, block, hits)
 
 
 @njit(**INLINE)
@@ -235,19 +238,16 @@ def _take(k, h, key, x, rays, lanes, lane_tags, records, path_pixel, path_sample
 
 
 @njit(**INLINE)
-def _flush(step, estimator, fill, places, block, counters, lights, dome, epsilon, numbers, hits):
-    """Bring the block's frames and numbers to their hits, and choose a light for each."""
-    make_frames(fill, epsilon, block)
-    make_numbers(numbers, fill, np.uint32(2 + NUMBERS_PER_STEP * step), counters, block)
+def _bring(fill, places, block, hits):
+    """Bring the block's frames, numbers and lights to their hits."""
     for x in range(fill):
         h = places[x]
         for row in range(SIDE + 1):
             hits[row, h] = block[MADE + row * BLOCK + x]
         for row in range(4):
             hits[CHANCE + row, h] = block[NUMBERS + row * BLOCK + x]
-        c0, c1 = block[NUMBERS + 4 * BLOCK + x], block[NUMBERS + 5 * BLOCK + x]
-        c2 = block[NUMBERS + 6 * BLOCK + x]
-        _choose_direction(estimator, lights, dome, c0, c1, c2, hits, h)
+        for row in range(LIGHT_PDF + 1 - WI):
+            hits[WI + row, h] = block[CHOSEN + row * BLOCK + x]
 
 
 @njit(**LEAN)
@@ -263,35 +263,3 @@ def add_emission(count, surfaces, hits, tags, film):
             film[row, path] += red * hits[BETA, h]
             film[row + 1, path] += green * hits[BETA + 1, h]
             film[row + 2, path] += blue * hits[BETA + 2, h]
-
-
-@njit(**INLINE)
-def _choose_direction(estimator, lights, dome, c0, c1, c2, hits, h):
-    """Write the direction to a light, what arrives from there, and its pdf."""
-    hits[LIGHT_PDF, h] = R(0)
-    hits[DISTANCE, h] = FAR
-    hits[LIGHT, h], hits[LIGHT + 1, h], hits[LIGHT + 2, h] = R(0), R(0), R(0)
-    if estimator == UNIFORM:
-        z = R(1) - R(2) * c1
-        r = math.sqrt(max(R(1) - z * z, R(0)))
-        phi = R(2 * math.pi) * c2
-        hits[WI, h], hits[WI + 1, h], hits[WI + 2, h] = r * math.cos(phi), r * math.sin(phi), z
-        return
-    hits[WI, h], hits[WI + 1, h], hits[WI + 2, h] = R(0), R(0), R(1)
-    if lights.shape[0] == 0 or estimator == SURFACE_ONLY:
-        return
-    light = lights[choose_light(lights, c0)]
-    dx, dy, dz, distance, red, green, blue, pdf = sample_light(
-        light, dome, hits[FRONT, h], hits[FRONT + 1, h], hits[FRONT + 2, h], c1, c2
-    )
-    if pdf == R(0):
-        return
-    inverse = R(1) / abs(pdf)
-    hits[WI, h] = dx * hits[U, h] + dy * hits[U + 1, h] + dz * hits[U + 2, h]
-    hits[WI + 1, h] = dx * hits[V, h] + dy * hits[V + 1, h] + dz * hits[V + 2, h]
-    hits[WI + 2, h] = dx * hits[N, h] + dy * hits[N + 1, h] + dz * hits[N + 2, h]
-    hits[TO_LIGHT, h], hits[TO_LIGHT + 1, h], hits[TO_LIGHT + 2, h] = dx, dy, dz
-    hits[DISTANCE, h] = distance if light[KIND] != R(DOME) else FAR
-    hits[LIGHT, h], hits[LIGHT + 1, h] = red * inverse, green * inverse
-    hits[LIGHT + 2, h] = blue * inverse
-    hits[LIGHT_PDF, h] = pdf

@@ -69,13 +69,13 @@ def shares_and_guides(
     """
     n = weight.shape[1]
     upto = np.cumsum(weight, axis=1)
-    upto = (upto / upto[:, -1:]).astype(np.float32)
+    shares = np.asarray(upto / upto[:, -1:], np.float32)
     # Numbers are below 1, and a search may not run over the end.
     last = n - np.argmax(weight[:, ::-1] > 0, axis=1)
-    upto[np.arange(n) >= last[:, None] - 1] = 2.0
+    shares[np.arange(n) >= last[:, None] - 1] = 2.0
     starts = (np.arange(n) / n).astype(np.float32)
-    guide = np.stack([np.searchsorted(row, starts, side="right") for row in upto])
-    return upto, guide.astype(np.float32)
+    guide = np.stack([np.searchsorted(row, starts, side="right") for row in shares])
+    return shares, guide.astype(np.float32)
 
 
 @njit(**INLINE)
@@ -130,22 +130,29 @@ def _find(table, start, count, upto, guide, u):
 
 
 @njit(**INLINE)
-def sample_dome(dome, u0, u1):
-    """A world direction from two uniform numbers: (x, y, z, r, g, b, pdf [1/sr])."""
+def choose_cell(dome, u0, u1):
+    """A texel by its brightness from two uniform numbers: (row, how far down in it, column, how far
+    along in it)."""
     h, w = dome.size[0], dome.size[1]
+    if h * w == 1:
+        return 0, u0, 0, u1
     j, down = _find(dome.rows, 0, h, 0, 1, u0)
     i, along = _find(dome.cells, j * w, w, UPTO, GUIDE, u1)
-    # Even by solid angle inside a texel, whose radiance is one.
-    top, bottom = cos(R, R(j) * (_PI / R(h))), cos(R, R(j + 1) * (_PI / R(h)))
+    return j, down, i, along
+
+
+@njit(**INLINE)
+def direction_in(dome, row, down, column):
+    """World direction of a place `down` and `column` in texels; even by solid angle down a row."""
+    top = cos(R, row * (_PI / R(dome.size[0])))
+    bottom = cos(R, (row + R(1)) * (_PI / R(dome.size[0])))
     b = top + down * (bottom - top)
     sine = math.sqrt(max((R(1) - b) * (R(1) + b), R(0)))
-    longitude = (R(i) + along) * (R(2) * _PI / R(w)) - R(0.5) * _PI
+    longitude = column * (R(2) * _PI / R(dome.size[1])) - R(0.5) * _PI
     a, c = sine * cos(R, longitude), sine * sin(R, longitude)
     m = dome.rotation
-    cell = dome.cells[j * w + i]
     return (
         m[0, 0] * a + m[1, 0] * b + m[2, 0] * c,
         m[0, 1] * a + m[1, 1] * b + m[2, 1] * c,
         m[0, 2] * a + m[1, 2] * b + m[2, 2] * c,
-        cell[0], cell[1], cell[2], cell[DENSITY],
-    )  # fmt: skip
+    )

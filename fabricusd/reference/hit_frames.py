@@ -32,7 +32,13 @@ MADE = (RECORD + 5) * BLOCK
 NUMBERS = MADE + (SIDE + 1) * BLOCK
 """Where eight rows of random numbers start."""
 
-BLOCK_ROWS = RECORD + 5 + SIDE + 1 + 8
+CHOSEN = NUMBERS + 8 * BLOCK
+"""Where the light starts: the rows of `Wave.hits` from WI to LIGHT_PDF, in their order."""
+
+DRAWN = CHOSEN + 11 * BLOCK
+"""Where what `light_sampling` works with starts."""
+
+BLOCK_ROWS = RECORD + 5 + SIDE + 1 + 8 + 11 + 13
 
 
 @njit(**LEAN)
@@ -136,9 +142,12 @@ def make_frames(count, epsilon, block):
             -(dx * nx + dy * ny + dz * nz),
         )  # fmt: skip
         block[MADE + SIDE * BLOCK + x] = side
-        for axis in range(2):
-            at = TAKEN + axis * BLOCK + x
-            block[MADE + (PLACE + axis) * BLOCK + x] = (
-                block[at + ST * BLOCK] + u * block[at + D1 * BLOCK] + v * block[at + D2 * BLOCK]
-            )
+        at = TAKEN + x
+        block[MADE + PLACE * BLOCK + x] = (
+            block[at + ST * BLOCK] + u * block[at + D1 * BLOCK] + v * block[at + D2 * BLOCK]
+        )
+        at += BLOCK
+        block[MADE + (PLACE + 1) * BLOCK + x] = (
+            block[at + ST * BLOCK] + u * block[at + D1 * BLOCK] + v * block[at + D2 * BLOCK]
+        )
         block[MADE + FOOTPRINT * BLOCK + x] *= block[TAKEN + RATE * BLOCK + x]

@@ -121,8 +121,9 @@ class Tracer:
         aovs = len(wave.film) > BEAUTY_ROWS
         wave.film[:, :count] = 0.0
         camera_rays(
-            lens, width, pixels, first, samples, self.numbers, wave.rays,
-            wave.lanes[LANE_WIDTH : LANE_SPREAD + 1], wave.path_pixel, wave.path_sample,
+            lens, width, pixels, first, samples, self.numbers,
+            wave.rays.reshape(len(wave.rays), -1), wave.lanes[LANE_WIDTH : LANE_SPREAD + 1],
+            wave.path_pixel, wave.path_sample,
         )  # fmt: skip
         wave.lanes[LANE_BETA : LANE_BETA + 3, :count] = 1.0
         wave.lanes[LANE_PDF, :count] = -1.0
