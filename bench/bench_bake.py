@@ -17,14 +17,15 @@ from pathlib import Path
 import numpy as np
 
 from fabricusd.appearance.coverage import WARP
-from fabricusd.bake import blocks as b
 from fabricusd.bake import moments as m
 from fabricusd.bake import planes
 from fabricusd.bake.angle_rows import steepness
 from fabricusd.bake.bake import Settings, bake
 from fabricusd.bake.btf.write import FORMS, write_btf
 from fabricusd.bake.garment import garments
+from fabricusd.bake.recipe import Recipe, recipe
 from fabricusd.bake.reflectance import reflectance_table
+from fabricusd.bake.sheet import sheets_of, texel_step
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.reference.scene import FabricSurface, Mesh, Scene
 from fabricusd.schema import load
@@ -45,7 +46,7 @@ def square(fabric: Fabric, threads: float) -> Scene:
     return Scene(meshes=[mesh], materials=[surface])
 
 
-def plain_planes(made: m.Recipe, fabric: Fabric, step: np.ndarray, size: int) -> np.ndarray:
+def plain_planes(made: Recipe, fabric: Fabric, step: np.ndarray, size: int) -> np.ndarray:
     """The same planes with NumPy's own functions: the weave by masks, tables by fancy indices."""
     cells = fabric.weave.cells
     ends, picks = cells.shape
@@ -119,15 +120,15 @@ def against_numpy() -> None:
     fabric = load("linen_plain")
     size, threads = 256, 448.0
     one = garments(square(fabric, threads))[0]
-    made = m.recipe(fabric)
-    sheet = b.sheet_of(one, (made,), 1001, (0, 0), size, 0)
-    step = np.abs(b.texel_step(sheet, 0))
+    made = recipe(fabric)
+    sheet = sheets_of(one, (made,), {1001: (0, 0)}, size, 0)[0]
+    step = np.abs(texel_step(sheet, 0))
     owner = np.zeros((size, size), np.int32)
     out = np.empty((planes.PLANES, size, size), np.float32)
     sums = np.empty(planes.PLANES, np.float32)
 
     def ours() -> None:
-        m.texels(made, step, np.zeros(2), (0, 0), owner, 0, SIDE, sums, out)
+        m.texels(made, step, step, np.zeros(2), (0, 0), owner, 0, SIDE, sums, out)
 
     ours()
     seconds = [_timed(f) for f in (ours, lambda: plain_planes(made, fabric, step, size))]

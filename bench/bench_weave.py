@@ -1,8 +1,9 @@
-"""The weave under a point, its shadow and its thread's BSDF: `python bench/bench_weave.py`.
+"""The weave under a point, its shadow and level `weave`: `python bench/bench_weave.py`.
 
 Everything runs in one process on the same places and directions, so that the ratios to plain NumPy
 hold on a busy machine. Each figure is the best of several runs. A satin: five picks, a set that is
-seen underneath, a curve of five pieces; weave coordinates reach to 10^4 threads.
+seen underneath, a curve of five pieces; weave coordinates reach to 10^4 threads. NumPy's side does
+less: the thread's BSDF without masking and `Q`.
 """
 
 from __future__ import annotations
@@ -17,30 +18,17 @@ from typing import Any
 import numba
 import numpy as np
 from bench_thread import microcylinder_in_numpy
-from numba import njit, prange
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.coverage import GAP
-from fabricusd.appearance.frame import WARP, to_thread
-from fabricusd.appearance.real import KERNEL, LEAN, cos, sin
-from fabricusd.appearance.shadow import (
-    Shadow,
-    compile_shadow,
-    horizon_block,
-    lit_all,
-    look_up_block,
-)
-from fabricusd.appearance.surface import points_all
+from fabricusd.appearance.frame import WARP
+from fabricusd.appearance.shadow import Shadow, compile_shadow
+from fabricusd.appearance.surface import evaluate, weave_all
 from fabricusd.appearance.surface_tables import surface_tables
-from fabricusd.appearance.thread_table import pack_threads
-from fabricusd.appearance.thread_terms import pair_angles, published_terms
-from fabricusd.appearance.weave import BLOCK, find_all, lookup
+from fabricusd.appearance.weave import find_all, lookup
 from fabricusd.fabric import DEGREE, Fabric, TangentCurve, Thread, ThreadSet, Weave
 
 Array = np.ndarray
-
-COMPONENTS = 8
-"""What is noted of each place: angle, shadow, wi and wo."""
 
 
 def satin() -> Fabric:
@@ -73,76 +61,6 @@ def satin() -> Fabric:
         warp=ThreadSet(sequence=(0,), density=10000.0, coverage=0.9),
         weft=ThreadSet(sequence=(1,), density=4000.0, coverage=0.1),
     )
-
-
-@njit(**LEAN)
-def _bring_together(which, thread, sets, threads, notes, wi, wo, begin, where, found):  # type: ignore[no-untyped-def]
-    """The block's places on one thread, side by side: found (COMPONENTS, b); their number."""
-    count = 0
-    for k in range(sets.size):
-        where[count] = k
-        count += int(sets[k] == which and threads[k] == thread)
-    for k in range(count):
-        at = where[k]
-        found[0, k], found[1, k] = notes[0, at], notes[1, at]
-        for c in range(3):
-            found[2 + c, k], found[5 + c, k] = wi[c, begin + at], wo[c, begin + at]
-    return count
-
-
-@njit(**LEAN)
-def _constants(row):  # type: ignore[no-untyped-def]
-    """A thread's numbers as a tuple: LLVM need not fear that a store to an array changes them."""
-    return (
-        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9],
-        row[10], row[11], row[12], row[13], row[14],
-    )  # fmt: skip
-
-
-@njit(**LEAN)
-def _scatter(R, row, which, a, g, ix, iy, iz, ox, oy, oz, size):  # type: ignore[no-untyped-def]
-    """g f_s of the places noted for one thread, over the directions' own memory."""
-    for k in range(size):
-        c, s = cos(R, a[k]), sin(R, a[k])
-        ti, bi, ni = to_thread(R, which, c, s, ix[k], iy[k], iz[k])
-        to, bo, no = to_thread(R, which, c, s, ox[k], oy[k], oz[k])
-        cos_i, cos_o, half = pair_angles(R, bi, ni, bo, no)
-        surface, volume = published_terms(R, False, row, ti, cos_i, to, cos_o, half)
-        ix[k] = g[k] * (surface + volume * row[0])
-        iy[k] = g[k] * (surface + volume * row[1])
-        iz[k] = g[k] * (surface + volume * row[2])
-
-
-@njit(parallel=True, **KERNEL)
-def lookup_shadow_scatter(R, cloth, shadow, rows, uv, wi, wo, out):  # type: ignore[no-untyped-def]
-    """Lookup, horizon and microcylinder BSDF of (n, 2) places and (3, n) pairs of directions."""
-    n, kinds = uv.shape[0], rows.shape[0]
-    for b in prange((n + BLOCK - 1) // BLOCK):
-        begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
-        ints, reals = np.empty((12, size), np.int32), np.empty((5, size), out.dtype)
-        notes, a = np.empty((2, size), out.dtype), np.empty((COMPONENTS, size), out.dtype)
-        where = np.empty(size + 1, np.int32)
-        cells, threads, tops, sets, free = ints[:6], ints[6], ints[7], ints[8], ints[9]
-        p, q = reals[0], reals[1]
-        look_up_block(R, cloth, shadow, uv, begin, cells, p, q, threads, tops, sets, free, notes[0])
-        horizon_block(
-            R, cloth, shadow, cells, p, q, tops, sets, free, wi, begin, ints[10:], reals[2:],
-            notes[1],
-        )  # fmt: skip
-        for c in range(3):
-            out[c, begin : begin + size] = 0
-        for thread in range(kinds):
-            row = _constants(rows[thread])
-            for which in range(2):
-                if cloth.area[which, thread] == 0:
-                    continue
-                found = _bring_together(
-                    which, thread, sets, threads, notes, wi, wo, begin, where, a
-                )
-                _scatter(R, row, which, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], found)
-                for k in range(found):
-                    for c in range(3):
-                        out[c, begin + where[k]] = a[2 + c, k]
 
 
 def lookup_in_numpy(cloth: CompiledFabric, uv: Array) -> dict[str, Array]:
@@ -259,25 +177,16 @@ def main() -> None:
     uv = generator.uniform(-1e4, 1e4, (n, 2))
     wi, wo = upper(generator, n), upper(generator, n)
     cloth, shadow = compile_fabric(fabric), compile_shadow(fabric)
-    rows = pack_threads(fabric, np.float32)
     law = surface_tables(fabric, precision=np.float32)
     real: Any = np.float32
     places = np.empty(n, np.uint8), np.empty(n, np.int32), *np.empty((4, n), real)
-    out, g = np.empty_like(wi), np.empty(n, real)
+    out = np.empty_like(wi)
 
     def find() -> None:
         find_all(real, cloth, uv, *places)
 
-    def scatter() -> None:
-        lookup_shadow_scatter(real, cloth, shadow, rows, uv, wi, wo, out)
-
     def weave_level() -> None:
-        find()
-        points_all(
-            real, law, False, places[0], places[1], places[4], places[3], wi, wo, out
-        )  # fmt: skip
-        lit_all(real, cloth, shadow, uv, wi, g)
-        np.multiply(out, g, out=out)
+        weave_all(real, cloth, shadow, law, uv, wi, wo, out)
 
     few = max(2, options.repeats // 5)
     m = n // 4
@@ -285,10 +194,10 @@ def main() -> None:
     slow_all = m / best(
         lambda: all_in_numpy(fabric, cloth, shadow, uv[:m], wi[:, :m], wo[:, :m]), few
     )
-    scatter()
-    expected = all_in_numpy(fabric, cloth, shadow, uv[:m], wi[:, :m], wo[:, :m])
+    weave_level()
+    expected = evaluate(fabric, wi[:, :m].T, wo[:, :m].T, uv[:m], "weave", "horizon").T
     gap = np.abs(out[:, :m] - expected) / (np.abs(expected) + 1e-3)
-    print(f"both give the same: 99.9 % within {np.quantile(gap, 0.999):.1e} of one another")
+    print(f"float32 against float64: 99.9 % within {np.quantile(gap, 0.999):.1e}")
     print(f"{n} places, float32, best of {options.repeats}; M places/s, and times plain NumPy")
     print(f"{'NumPy, lookup':52}{slow_find / 1e6:8.1f}{1.0:8.1f}")
     print(f"{'NumPy, lookup + horizon + thread BSDF':52}{slow_all / 1e6:8.1f}{1.0:8.1f}")
@@ -296,8 +205,7 @@ def main() -> None:
         numba.set_num_threads(count)
         for label, function, slow in (
             ("lookup", find, slow_find),
-            ("lookup + horizon + thread BSDF", scatter, slow_all),
-            ("level weave (masked, with Q) x horizon", weave_level, slow_all),
+            ("lookup + horizon + level weave", weave_level, slow_all),
         ):
             rate = n / best(function, options.repeats)
             print(f"{f'{label}, {count} worker(s)':52}{rate / 1e6:8.1f}{rate / slow:8.1f}")

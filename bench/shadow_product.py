@@ -30,7 +30,7 @@ WOVEN = (
     "polyester_satin_charmeuse_back",
     "silk_shot",
 )
-VARIANTS = ("neither", "M", "g", "M g", "g, flat threads", "M g, flat threads")
+VARIANTS = ("neither", "M", "g", "M g", "M g / mean g", "g, flat threads", "M g, flat threads")
 
 Array = np.ndarray
 
@@ -87,10 +87,14 @@ def compare(fabric: Fabric, pairs: int, count: int) -> Array:
         geometry = float((visible * lit * f).sum() / visible.sum())
         q = float(plain.normalization(fabric, wi[None], wo[None])[0])
         base = f * p / q
+        even = lit / max(float(lit[on].mean()), 1e-3)
         rows.append(
             [
                 geometry,
-                *(float((base * x).mean()) for x in (1.0, m, lit, m * lit, flat, m * flat)),
+                *(
+                    float((base * x).mean())
+                    for x in (1.0, m, lit, m * lit, m * even, flat, m * flat)
+                ),
             ]
         )
     return np.array(rows)

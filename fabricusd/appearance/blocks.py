@@ -13,7 +13,7 @@ from fabricusd.appearance.real import INLINE
 from fabricusd.appearance.segment import along_set, seen_along
 from fabricusd.appearance.surface_tables import NODE_COS, NODE_SIN, NODE_WEIGHT
 
-BLOCK = 512
+BLOCK = 256
 """Directions that the vectorised loops carry through the nodes together: their partial sums stay
 in the first-level cache."""
 
@@ -35,13 +35,14 @@ def node_range(tables, thread_set):
 
 
 @njit(**INLINE)
-def prepare(R, thread_set, precision, wi, wo, start, size, block):
-    """What the set's threads share, for a block."""
-    for x in range(size):
-        iz, oz = wi[2, start + x], wo[2, start + x]
+def prepare(R, thread_set, precision, wi, wo, start, size, block, at=0):
+    """What the set's threads share, for a block: its rows lie from `at` on."""
+    for y in range(size):
+        x = at + y
+        iz, oz = wi[2, start + y], wo[2, start + y]
         a_i, b_i, scale_i, a_o, b_o, scale_o, u = along_set(
             R, thread_set, precision,
-            wi[0, start + x], wi[1, start + x], iz, wo[0, start + x], wo[1, start + x], oz,
+            wi[0, start + y], wi[1, start + y], iz, wo[0, start + y], wo[1, start + y], oz,
         )  # fmt: skip
         block[AXIS_I + x], block[ACROSS_I + x] = a_i, b_i
         block[UP_I + x], block[SCALE_I + x] = iz, scale_i
@@ -60,12 +61,12 @@ def masking_at(R, c, s, block, x):
 
 
 @njit(**INLINE)
-def add_masking(R, tables, k, size, block):
-    """Node k's share of `Q`, for a block."""
+def add_masking(R, tables, k, size, block, at=0):
+    """Node k's share of `Q`, for a block whose set's rows lie from `at` on."""
     c, s, weight = (
         tables.nodes[k, NODE_COS],
         tables.nodes[k, NODE_SIN],
         tables.nodes[k, NODE_WEIGHT],
     )
     for x in range(size):
-        block[NORMALIZATION + x] += weight * masking_at(R, c, s, block, x)
+        block[NORMALIZATION + x] += weight * masking_at(R, c, s, block, at + x)

@@ -28,7 +28,6 @@ from fabricusd.appearance.blocks import (
     UP_I,
     UP_O,
     add_masking,
-    node_range,
     prepare,
 )
 from fabricusd.appearance.far import NOTHING, normalization
@@ -40,14 +39,20 @@ from fabricusd.appearance.thread_terms import (
     ALBEDO_G,
     ALBEDO_R,
     CONSERVING,
+    MICROCYLINDER,
     MODEL,
     THESIS,
+    VOLUME_GAUSSIAN,
 )
 
-_ROWS = 26
-_FOUND = 13 * BLOCK
-"""Where the compacted copy of a block's rows starts, and after its nine rows psi0 and w."""
-_ANGLE, _ACROSS = _FOUND + 9 * BLOCK, _FOUND + 10 * BLOCK
+_WARP = 13 * BLOCK
+"""Where the warp's nine rows start; the weft's are the block's own."""
+_IS_WARP, _COS, _SIN, _ACROSS = 22 * BLOCK, 23 * BLOCK, 24 * BLOCK, 25 * BLOCK
+_THREAD = 26 * BLOCK
+"""Where the columns of each point's own thread start: those before TRANSMISSION's."""
+_COLUMNS = VOLUME_GAUSSIAN + 2
+POINT_ROWS = 26 + _COLUMNS
+_NO_MODEL = -1.0
 
 
 @njit(**LEAN)
@@ -106,78 +111,110 @@ def point_values(R, tables, across_too, sets, threads, psi0, w, wi, wo, out, beg
     """`point_value` at the places from `begin` to before `end`.
 
     sets, threads : (n,) ints; psi0, w : (n,) real; wi, wo, out : (3, n) real
-
-    Points of one thread are brought together in each block, so that the thread's numbers are
-    constants of a loop that LLVM vectorises. A set that is neither weft nor warp is a gap.
     """
-    block = np.empty(_ROWS * BLOCK, wi.dtype)
-    where = np.empty(BLOCK, np.int32)
+    block = np.empty(POINT_ROWS * BLOCK, wi.dtype)
     for start in range(begin, end, BLOCK):
-        size = min(BLOCK, end - start)
-        for x in range(size):
-            block[NORMALIZATION + x] = tables.gap * wo[2, start + x]
-            block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
-        for thread_set in (WEFT, WARP):
-            prepare(R, thread_set, tables.overlap_precision, wi, wo, start, size, block)
-            first, last = node_range(tables, thread_set)
-            for k in range(first, last):
-                add_masking(R, tables, k, size, block)
-            for thread in range(tables.threads.shape[0]):
-                model = tables.threads[thread, MODEL]
-                if model == R(CONSERVING):
-                    continue
-                found = _bring_together(
-                    thread_set, thread, sets, threads, psi0, w, start, size, block, where
-                )
-                if model == R(THESIS):
-                    _of_one_thread(R, True, across_too, tables, thread, found, block, where)
-                else:
-                    _of_one_thread(R, False, across_too, tables, thread, found, block, where)
-        for x in range(size):
-            q = block[NORMALIZATION + x]
-            dark = wi[2, start + x] <= R(0) or wo[2, start + x] <= R(0) or q <= R(NOTHING)
-            inverse = R(0) if dark else R(1) / q
-            out[0, start + x] = R(0) if dark else block[RED + x] * inverse
-            out[1, start + x] = R(0) if dark else block[GREEN + x] * inverse
-            out[2, start + x] = R(0) if dark else block[BLUE + x] * inverse
+        point_block(
+            R, tables, across_too, sets, threads, psi0, w, start, wi, wo, out, start,
+            min(BLOCK, end - start), block,
+        )  # fmt: skip
+
+
+@njit(**LEAN)
+def point_block(
+    R, tables, across_too, sets, threads, psi0, w, first, wi, wo, out, start, size, block
+):
+    """`size` of `point_values`: places from `first` on, directions and answers from `start` on.
+
+    block : (POINT_ROWS*BLOCK,) real, written over
+
+    The numbers of each point's thread are copied into rows of the block first, in a loop of their
+    own, so that LLVM vectorises the one that computes. A set that is neither weft nor warp is a
+    gap.
+    """
+    for x in range(size):
+        block[NORMALIZATION + x] = tables.gap * wo[2, start + x]
+        block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
+    prepare(R, WEFT, tables.overlap_precision, wi, wo, start, size, block)
+    prepare(R, WARP, tables.overlap_precision, wi, wo, start, size, block, _WARP)
+    for k in range(tables.warp_start):
+        add_masking(R, tables, k, size, block)
+    for k in range(tables.warp_start, tables.nodes.shape[0]):
+        add_masking(R, tables, k, size, block, _WARP)
+    _copy_threads(R, tables, sets, threads, psi0, w, first, size, block)
+    if _has_model(R, tables, THESIS):
+        _of_model(R, True, across_too, tables.overlap_precision, size, block)
+    if _has_model(R, tables, MICROCYLINDER):
+        _of_model(R, False, across_too, tables.overlap_precision, size, block)
+    for x in range(size):
+        q = block[NORMALIZATION + x]
+        dark = wi[2, start + x] <= R(0) or wo[2, start + x] <= R(0) or q <= R(NOTHING)
+        inverse = R(0) if dark else R(1) / q
+        out[0, start + x] = R(0) if dark else block[RED + x] * inverse
+        out[1, start + x] = R(0) if dark else block[GREEN + x] * inverse
+        out[2, start + x] = R(0) if dark else block[BLUE + x] * inverse
 
 
 @njit(**INLINE)
-def _bring_together(thread_set, thread, sets, threads, psi0, w, start, size, block, where):
-    """Copy the block's points that lie on `thread` side by side; their number and old places."""
-    found = 0
-    for x in range(size):
-        if sets[start + x] == thread_set and threads[start + x] == thread:
-            where[found] = x
-            found += 1
-    for row in range(AXIS_I, NORMALIZATION, BLOCK):
-        for y in range(found):
-            block[_FOUND + row + y] = block[row + where[y]]
-    for y in range(found):
-        block[_ANGLE + y] = psi0[start + where[y]]
-        block[_ACROSS + y] = w[start + where[y]]
+def _has_model(R, tables, model):
+    found = False
+    for thread in range(tables.threads.shape[0]):
+        found |= tables.threads[thread, MODEL] == R(model)
     return found
 
 
 @njit(**INLINE)
-def _of_one_thread(R, thesis, across_too, tables, thread, found, block, where):
-    """The value without `1/Q` of the points brought together, back to their places."""
-    row, precision = tables.threads[thread], tables.overlap_precision
-    for y in range(found):
-        x = _FOUND + y
-        c, s = cos(R, block[_ANGLE + y]), sin(R, block[_ANGLE + y])
-        a_i, b_i, iz = block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x]
-        a_o, b_o, oz = block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x]
-        p = seen_along(
-            R, c, s, a_i, iz, block[SCALE_I + x], a_o, oz, block[SCALE_O + x], block[OVERLAP + x]
-        )
+def _copy_threads(R, tables, sets, threads, psi0, w, first, size, block):
+    """Set, tangent angle, place across and the thread's numbers of a block of points."""
+    for x in range(size):
+        which, thread = sets[first + x], threads[first + x]
+        block[_IS_WARP + x] = R(1) if which == WARP else R(0)
+        block[_ACROSS + x] = w[first + x]
+        for column in range(_COLUMNS):
+            block[_THREAD + column * BLOCK + x] = tables.threads[thread, column]
+        if which != WEFT and which != WARP:
+            block[_THREAD + MODEL * BLOCK + x] = R(_NO_MODEL)
+    for x in range(size):
+        block[_COS + x], block[_SIN + x] = cos(R, psi0[first + x]), sin(R, psi0[first + x])
+
+
+@njit(**INLINE)
+def _row_at(block, x):
+    """The columns of the point's thread, to be read as a row of the table."""
+    x += _THREAD
+    return (
+        block[x], block[x + BLOCK], block[x + 2 * BLOCK], block[x + 3 * BLOCK],
+        block[x + 4 * BLOCK], block[x + 5 * BLOCK], block[x + 6 * BLOCK], block[x + 7 * BLOCK],
+        block[x + 8 * BLOCK], block[x + 9 * BLOCK], block[x + 10 * BLOCK], block[x + 11 * BLOCK],
+        block[x + 12 * BLOCK],
+    )  # fmt: skip
+
+
+@njit(**INLINE)
+def _own(block, x, warp):
+    """The entry at x of the point's own set. Both are loaded: a selection, not a branch."""
+    weft_value, warp_value = block[x], block[x + _WARP]
+    return warp_value if warp else weft_value
+
+
+@njit(**INLINE)
+def _of_model(R, thesis, across_too, precision, size, block):
+    """The value without `1/Q` of the points whose thread has the model, into the sums' rows."""
+    model = R(THESIS) if thesis else R(MICROCYLINDER)
+    for x in range(size):
+        row = _row_at(block, x)
+        c, s, warp = block[_COS + x], block[_SIN + x], block[_IS_WARP + x] > R(0)
+        iz, oz = block[UP_I + x], block[UP_O + x]
+        a_i, b_i = _own(block, AXIS_I + x, warp), _own(block, ACROSS_I + x, warp)
+        a_o, b_o = _own(block, AXIS_O + x, warp), _own(block, ACROSS_O + x, warp)
+        scale_i, scale_o = _own(block, SCALE_I + x, warp), _own(block, SCALE_O + x, warp)
+        u = _own(block, OVERLAP + x, warp)
+        p = seen_along(R, c, s, a_i, iz, scale_i, a_o, oz, scale_o, u)
         surface, volume = _bit_of_thread(
-            R, thesis, across_too, row, precision, c, s, block[_ACROSS + y],
+            R, thesis, across_too, row, precision, c, s, block[_ACROSS + x],
             a_i, b_i, iz, a_o, b_o, oz,
         )  # fmt: skip
-        block[AXIS_I + x], block[ACROSS_I + x] = surface * p, volume * p
-    for y in range(found):
-        surface, volume = block[_FOUND + AXIS_I + y], block[_FOUND + ACROSS_I + y]
-        block[RED + where[y]] = surface + volume * row[ALBEDO_R]
-        block[GREEN + where[y]] = surface + volume * row[ALBEDO_G]
-        block[BLUE + where[y]] = surface + volume * row[ALBEDO_B]
+        share = p if row[MODEL] == model else R(0)
+        block[RED + x] += share * (surface + volume * row[ALBEDO_R])
+        block[GREEN + x] += share * (surface + volume * row[ALBEDO_G])
+        block[BLUE + x] += share * (surface + volume * row[ALBEDO_B])

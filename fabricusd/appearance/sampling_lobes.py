@@ -6,10 +6,14 @@ A lobe stands for a stretch of thread around one tangent angle psi0. In that thr
     phi_m(theta) = acos(clamp(tan theta tan psi0, 0, 1))
 
 which is above the cloth and in front of the thread, where the published law is not 0, and nowhere
-else. `p(theta)` is a normal distribution cut at the inclinations that are above the cloth at all,
-or, for the isotropic term, uniform in sin theta. Every density is per steradian and exact. Source:
-`docs/model.md` section 6; the normal's mean is the mirror inclination moved inside the cut, so that
-its mass there never vanishes.
+else. `p(theta)` is a normal distribution cut at the inclinations that are above the cloth at all;
+its mean is the mirror inclination moved inside the cut, so that its mass there never vanishes. The
+isotropic term has the cosine about the thread's normal instead, cut in the same way: seen along the
+normal that is half a disk and half an ellipse, of semi-axis cos psi0. Every density is per
+steradian and exact.
+
+Source: `docs/model.md` section 6, which has uniform in sin theta for the isotropic term; the cosine
+leaves .14 instead of .19 of the variance over mean^2 on spun polyester at level `weave`.
 """
 
 from __future__ import annotations
@@ -18,7 +22,7 @@ import math
 
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, asin, atan2, cos, erf, erfinv, exp, sin
+from fabricusd.appearance.real import INLINE, atan2, cos, erf, erfinv, exp, sin
 
 STEEPEST = math.radians(89.5)
 """Tangent angles of lobes stop here: beyond, hardly a direction is above the cloth."""
@@ -73,21 +77,34 @@ def lobe_densities(R, psi0, tangent, surface, volume, theta_o, t, b, n):
     around = R(0.5) * n * inverse / sin_m
     on_surface = cut_normal(R, theta, mean, surface, low, high) * inverse * around
     on_volume = cut_normal(R, theta, mean, volume, low, high) * inverse * around
-    return on_surface, on_volume, around / (sin(R, high) - sin(R, low))
+    cosine = R(1) / math.sqrt(R(1) + tangent * tangent)
+    return on_surface, on_volume, R(2 / math.pi) * n / (R(1) + cosine)
 
 
 @njit(**INLINE)
 def sample_lobe(R, lobe, psi0, tangent, deviation, theta_o, u1, u2):
     """(t, b, n) of the thread frame from `lobe`, whose normal has `deviation` [rad]."""
-    low, high = theta_range(R, psi0)
     if lobe == ISOTROPIC:
-        sin_low = sin(R, low)
-        theta = asin(R, sin_low + u1 * (sin(R, high) - sin_low))
-        theta = min(max(theta, low), high)
-    else:
-        mean = min(max(-theta_o, low), high)
-        theta = sample_cut_normal(R, u1, mean, deviation, low, high)
+        return _sample_cosine(R, tangent, u1, u2)
+    low, high = theta_range(R, psi0)
+    mean = min(max(-theta_o, low), high)
+    theta = sample_cut_normal(R, u1, mean, deviation, low, high)
     t, cos_theta = sin(R, theta), max(cos(R, theta), R(0))
     edge = min(max(t * tangent / max(cos_theta, R(1e-6)), R(0)), R(1))
     sin_phi = (R(2) * u2 - R(1)) * math.sqrt((R(1) - edge) * (R(1) + edge))
     return t, cos_theta * sin_phi, cos_theta * math.sqrt((R(1) - sin_phi) * (R(1) + sin_phi))
+
+
+@njit(**INLINE)
+def _sample_cosine(R, tangent, u1, u2):
+    """The isotropic term's direction: a place on the half disk or on the half ellipse."""
+    cosine = R(1) / math.sqrt(R(1) + tangent * tangent)
+    v = u1 * (R(1) + cosine)
+    on_disk = v < R(1)
+    radius = math.sqrt(v if on_disk else min((v - R(1)) / max(cosine, R(1e-6)), R(1)))
+    turn = R(math.pi) * (u2 - R(0.5))
+    t, b = radius * cos(R, turn), radius * sin(R, turn)
+    # The disk's side is the one that the horizon leaves whole.
+    side = R(-1) if tangent >= R(0) else R(1)
+    t *= side if on_disk else -side * cosine
+    return t, b, math.sqrt(max(R(1) - t * t - b * b, R(0)))

@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
+from fabricusd.appearance.blocks import BLOCK
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.coverage import GAP
 from fabricusd.appearance.curve import crest, peak
@@ -27,14 +28,20 @@ from fabricusd.appearance.height import crown_of, highest_point, level_is_round,
 from fabricusd.appearance.horizon import AZIMUTHS, TEXELS, horizon_error, horizon_table
 from fabricusd.appearance.horizon_lookup import (
     above_horizon,
-    choose_texels,
     horizon_at,
-    mix_texels,
     soft_edge,
-    split_table,
+)
+from fabricusd.appearance.place_blocks import (
+    FREE,
+    INT_ROWS,
+    LIT,
+    REAL_ROWS,
+    X,
+    look_up_block,
 )
 from fabricusd.appearance.real import INLINE, KERNEL, LEAN
-from fabricusd.appearance.weave import BLOCK, find, height_on, split_block, thread_at, wrap
+from fabricusd.appearance.texel_blocks import choose_texels, mix_texels
+from fabricusd.appearance.weave import find, height_on, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -231,40 +238,22 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
 
 
 @njit(**LEAN)
-def horizon_block(R, cloth, shadow, cells, p, q, tops, sets, free, wi, begin, base, notes, out):
-    """`lit` by the horizon table at a block of places that `split` and `split_table` have found.
+def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
+    """`lit` by the horizon table at a block of places that `look_up_block` has found, into LIT.
 
-    sets, tops, free : (b,) set of the thread, set on top of the cell, 1 where no light is kept off
-    (gap or pile); wi : (3, n), the block's from `begin` on; base (2, b) int32 and notes (3, b) are
-    written over
+    wi : (3, n), the block's from `begin` on
     """
     table = shadow.table
-    choose_texels(R, cloth, table, cells, p, q, tops, sets, wi, begin, base, notes)
-    mix_texels(R, shadow.texels, table.shape[4], table.shape[5], base, notes, out)
-    for k in range(out.size):
+    choose_texels(R, cloth, table, wi, begin, size, ints, reals)
+    mix_texels(R, shadow.texels, table.shape[4], table.shape[5], size, ints, reals)
+    for k in range(size):
         x, y, z = wi[0, begin + k], wi[1, begin + k], wi[2, begin + k]
         flat = math.sqrt(x * x + y * y)
-        g = soft_edge(R, above_horizon(R, out[k], flat, z), shadow.softness)
-        g = R(1) if free[k] != 0 else g
+        g = soft_edge(R, above_horizon(R, reals[LIT + k], flat, z), shadow.softness)
+        g = R(1) if ints[FREE + k] != 0 else g
         g = g if z > R(0) else R(0)
-        sound = p[k] >= R(0) and flat < R(2) and z < R(2)
-        out[k] = g if sound else R(np.nan)
-
-
-@njit(**LEAN)
-def look_up_block(R, cloth, shadow, uv, begin, cells, p, q, threads, tops, sets, free, angle):
-    """What `horizon_block` asks about as many places from `begin` on as `p` holds, all (b,) but
-    cells (6, b); and with it the thread and its tangent angle there."""
-    split_block(R, cloth, uv, begin, cells, p, q)
-    for k in range(p.size):
-        cells[4, k], cells[5, k] = split_table(shadow.table, uv[begin + k, 0], uv[begin + k, 1])
-    for k in range(p.size):
-        i, j = cells[0, k], cells[1, k]
-        which, thread, _, _, psi0, _ = thread_at(
-            R, cloth, i, j, cells[2, k], cells[3, k], p[k], q[k]
-        )
-        sets[k], threads[k], tops[k], angle[k] = which, thread, cloth.grid[i, j], psi0
-        free[k] = which == GAP or cloth.pile[thread] != 0
+        sound = reals[X + k] >= R(0) and flat < R(2) and z < R(2)
+        reals[LIT + k] = g if sound else R(np.nan)
 
 
 @njit(**LEAN)
@@ -287,17 +276,10 @@ def lit_all(R, cloth, shadow, uv, wi, out):
         if shadow.method != HORIZON:
             _lit_one_by_one(R, cloth, shadow, uv, begin, wi, found)
         else:
-            ints = np.empty((12, size), np.int32)
-            reals = np.empty((5, size), out.dtype)
-            p, q = reals[0], reals[1]
-            threads, tops, sets, free = ints[6], ints[7], ints[8], ints[9]
-            look_up_block(
-                R, cloth, shadow, uv, begin, ints[:6], p, q, threads, tops, sets, free, reals[2]
-            )
-            horizon_block(
-                R, cloth, shadow, ints[:6], p, q, tops, sets, free, wi, begin, ints[10:],
-                reals[2:], found,
-            )  # fmt: skip
+            ints, reals = np.empty(INT_ROWS * BLOCK, np.int32), np.empty(REAL_ROWS * BLOCK, R)
+            look_up_block(R, cloth, shadow.table, uv, begin, size, ints, reals)
+            horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
+            found[:] = reals[LIT : LIT + size]
 
 
 def shadowing(

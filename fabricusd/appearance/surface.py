@@ -37,8 +37,20 @@ from fabricusd.appearance.law import (
     law_direction,
     surface_law,
 )
-from fabricusd.appearance.levels import point_values
+from fabricusd.appearance.levels import POINT_ROWS, point_block, point_values
 from fabricusd.appearance.multiple import conserving_value
+from fabricusd.appearance.place_blocks import (
+    ANGLE,
+    INT_ROWS,
+    LIT,
+    REAL_ROWS,
+    SET,
+    S,
+    look_up_block,
+)
+from fabricusd.appearance.place_blocks import (
+    THREAD as THREAD_ROW,
+)
 from fabricusd.appearance.real import KERNEL
 from fabricusd.appearance.shadow import (
     METHODS,
@@ -46,7 +58,6 @@ from fabricusd.appearance.shadow import (
     compile_shadow,
     horizon_block,
     lit_all,
-    look_up_block,
 )
 from fabricusd.appearance.weave import WeaveHit, lookup
 from fabricusd.errors import FabricError
@@ -56,7 +67,7 @@ Floats = NDArray[np.float64]
 
 LEVELS = ("far", "weave", "thread")
 
-_CHUNK = 16 * BLOCK
+_CHUNK = 32 * BLOCK
 """Directions that one worker takes at a time."""
 
 
@@ -304,27 +315,26 @@ def weave_all(R, cloth, shadow, tables, uv, wi, wo, out):
     cloth, shadow, tables : compiled for precision R, the shadow by "horizon"; wi, wo, out : (3, n)
     """
     n = uv.shape[0]
-    found, psi0 = np.empty((4, n), np.int32), np.empty(n, out.dtype)
-    for b in prange((n + BLOCK - 1) // BLOCK):
-        begin, end = b * BLOCK, min(n, (b + 1) * BLOCK)
-        size = end - begin
-        ints, reals = np.empty((8, size), np.int32), np.empty((6, size), out.dtype)
-        sets, threads, tops, free = (
-            found[0, begin:end], found[1, begin:end], found[2, begin:end], found[3, begin:end],
+    for chunk in prange((n + _CHUNK - 1) // _CHUNK):
+        first, last = chunk * _CHUNK, min(n, (chunk + 1) * _CHUNK)
+        _weave_chunk(R, cloth, shadow, tables, uv, wi, wo, out, first, last)
+
+
+@njit(**KERNEL)
+def _weave_chunk(R, cloth, shadow, tables, uv, wi, wo, out, first, last):
+    ints, reals = np.empty(INT_ROWS * BLOCK, np.int32), np.empty(REAL_ROWS * BLOCK, R)
+    block = np.empty(POINT_ROWS * BLOCK, R)
+    for begin in range(first, last, BLOCK):
+        size = min(BLOCK, last - begin)
+        look_up_block(R, cloth, shadow.table, uv, begin, size, ints, reals)
+        horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
+        point_block(
+            R, tables, False, ints[SET:], ints[THREAD_ROW:], reals[ANGLE:], reals[S:], 0,
+            wi, wo, out, begin, size, block,
         )  # fmt: skip
-        p, q = reals[0], reals[1]
-        look_up_block(
-            R, cloth, shadow, uv, begin, ints[:6], p, q, threads, tops, sets, free,
-            psi0[begin:end],
-        )  # fmt: skip
-        horizon_block(
-            R, cloth, shadow, ints[:6], p, q, tops, sets, free, wi, begin, ints[6:], reals[2:5],
-            reals[5],
-        )  # fmt: skip
-        point_values(R, tables, False, found[0], found[1], psi0, psi0, wi, wo, out, begin, end)
         for c in range(3):
             for k in range(size):
-                out[c, begin + k] *= reals[5, k]
+                out[c, begin + k] *= reals[LIT + k]
 
 
 @njit(**KERNEL, parallel=True)

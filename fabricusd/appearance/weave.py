@@ -148,17 +148,15 @@ def crown_on(R, cloth, thread_set, thread, w):
 
 
 @njit(**INLINE)
-def thread_at(R, cloth, i, j, end, pick, x, y):
-    """The thread at a place that `split` has found; the answer is `find`'s."""
-    none = R(0)
-    if not x >= none:
-        nan = R(np.nan)
-        return WEFT, 0, nan, nan, nan, nan
-    # Selections instead of branches from here: which thread a point meets cannot be predicted.
-    top = int(cloth.grid[i, j])
-    over = x if top == WARP else y
-    along = y if top == WARP else x
-    width = cloth.width[top]
+def place_on(R, cloth, top, width, upper_place, upper_cells, lower_place, lower_cells, x, y):
+    """(set or GAP, s, w, length in cells) of the thread seen at (x, y) in a cell with `top` above.
+
+    width : visible width of the set on top; place and cells of the run above and of that below
+
+    Selections instead of branches: which thread a point meets cannot be predicted.
+    """
+    warp = top == WARP
+    over, along = (x, y) if warp else (y, x)
     offset = over - R(0.5)
     on_top = abs(offset) <= R(0.5) * width and width > R(0)
     beside = cloth.under == 1 - top and abs(along - R(0.5)) <= R(0.5) * cloth.under_width
@@ -167,16 +165,31 @@ def thread_at(R, cloth, i, j, end, pick, x, y):
     share = R(1) if on_top else R(1) - width
     seen = along if on_top else (over if offset < R(0) else over - width) / max(share, cloth.tiny)
     w = R(2) * (offset if on_top else along - R(0.5)) / (width if on_top else cloth.under_width)
-    slot = 0 if on_top else cloth.runs.shape[2] - 1
-    place, cells = R(cloth.runs[i, j, slot, 0]), R(cloth.runs[i, j, slot, 1])
+    place, cells = (upper_place, upper_cells) if on_top else (lower_place, lower_cells)
     s = max(R(0), min((place + seen) / cells, cloth.last))
     # b, and with it w, runs along -U on the warp.
     w = max(R(-1), min(-w if hit == WARP else w, R(1)))
-    thread = int(cloth.sequence[hit, end if hit == WARP else pick])
-    if not (on_top or beside):
+    return hit if on_top or beside else GAP, s, w, cells * share
+
+
+@njit(**INLINE)
+def thread_at(R, cloth, i, j, end, pick, x, y):
+    """The thread at a place that `split` has found; the answer is `find`'s."""
+    none = R(0)
+    if not x >= none:
+        nan = R(np.nan)
+        return WEFT, 0, nan, nan, nan, nan
+    top = int(cloth.grid[i, j])
+    lower = cloth.runs.shape[2] - 1
+    which, s, w, cells = place_on(
+        R, cloth, top, cloth.width[top],
+        R(cloth.runs[i, j, 0, 0]), R(cloth.runs[i, j, 0, 1]),
+        R(cloth.runs[i, j, lower, 0]), R(cloth.runs[i, j, lower, 1]), x, y,
+    )  # fmt: skip
+    if which == GAP:
         return GAP, 0, none, none, none, none
-    length = cells * share * cloth.pitch[1 - hit]
-    return hit, thread, s, w, angle_on(R, cloth, thread, s), length
+    thread = int(cloth.sequence[which, end if which == WARP else pick])
+    return which, thread, s, w, angle_on(R, cloth, thread, s), cells * cloth.pitch[1 - which]
 
 
 @njit(**INLINE)

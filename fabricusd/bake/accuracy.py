@@ -9,6 +9,7 @@ display that shows a perfect white as 1: radiance times pi over the light's cosi
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -17,10 +18,11 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.accuracy import spread_pairs
 from fabricusd.appearance.surface import evaluate
-from fabricusd.bake import blocks as b
+from fabricusd.bake.blocks import bake_block
 from fabricusd.bake.maps import REGISTRY
 from fabricusd.bake.raster import NOBODY, owners
 from fabricusd.bake.relight import NEEDED, relight
+from fabricusd.bake.sheet import Sheet, texel_start, texel_step
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -29,10 +31,10 @@ Floats = NDArray[np.float64]
 PAIRS = 32
 """Pairs of directions that an error is measured under."""
 
-TEXELS = 256
-"""Texels of a swatch that are compared."""
+TEXELS, MEANS = 256, 128
+"""Texels of a swatch that are compared at points, and with their means."""
 
-INSIDE = 8
+INSIDE = 12
 """Samples along a texel's side that its true mean is taken from."""
 
 MARGIN = 1.5
@@ -78,7 +80,7 @@ def delta_e(a: Floats, reference: Floats) -> Floats:
     return np.asarray(colour.difference.delta_E_CIE2000(lab[0], lab[1]), np.float64)
 
 
-def fullest_block(sheet: b.Sheet) -> tuple[int, int, int]:
+def fullest_block(sheet: Sheet) -> tuple[int, int, int]:
     """(bx, by, lay) of the block near the middle that one lay covers most of."""
     middle = sheet.across // 2
     best, found = -1, (middle, middle, 0)
@@ -87,55 +89,119 @@ def fullest_block(sheet: b.Sheet) -> tuple[int, int, int]:
         key=lambda p: abs(p[0] - middle) + abs(p[1] - middle),
     )
     for x, y in order[:64]:
-        size = sheet.block
-        window = (x * size, y * size, (x + 1) * size, (y + 1) * size)
-        owner, _ = owners(sheet.corners, sheet.garment.lay, window, 0, sheet.resolution)
+        owner, _ = owners(sheet.corners, sheet.garment.lay, sheet.window(x, y), 0, sheet.resolution)
         counts = np.bincount(owner[owner != NOBODY], minlength=len(sheet.garment.lays))
         if counts.max() > best:
             best, found = int(counts.max()), (x, y, int(counts.argmax()))
-        if best == size * size:
+        if best == sheet.block**2:
             break
     return found
 
 
-def swatch_error(
-    sheet: b.Sheet, *, level: int = 0, pairs: tuple[Floats, Floats] | None = None, seed: int = 0
-) -> SwatchError:
-    """Error of a sheet's fullest block at mip `level`, computed as it would be written."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Swatch:
+    """The fullest block of a sheet at one mip level, and texels of it that are its lay's.
+
+    block : (bx, by)
+    maps : names to (h, w, channels)
+    """
+
+    sheet: Sheet
+    block: tuple[int, int]
+    lay: int
+    level: int
+    maps: dict[str, NDArray[Any]]
+
+    @property
+    def mine(self) -> NDArray[np.bool_]:
+        """(h, w) where the texels are the lay's."""
+        return np.asarray(self.maps["lay"][..., 0] == self.lay)
+
+    def texels(self, rng: np.random.Generator) -> NDArray[np.int64]:
+        """(TEXELS, 2) rows and columns."""
+        mine = np.argwhere(self.mine)
+        if not len(mine):
+            raise FabricError(
+                self.sheet.garment.name, "covers no texel; bake it at a higher resolution"
+            )
+        return mine[rng.integers(0, len(mine), TEXELS)]
+
+
+def swatch_of(sheet: Sheet, names: Collection[str], level: int = 0) -> Swatch:
+    """A sheet's swatch with the maps `names`, computed as they would be written."""
     bx, by, lay = fullest_block(sheet)
-    maps = [REGISTRY[name] for name in (*NEEDED, "lay")]
-    found, _, _ = b.bake_block(sheet, maps, bx, by)
-    at_level = {t.name: found[k][level] for k, t in enumerate(maps)}
-    mine = np.argwhere(at_level["lay"][..., 0] == lay)
-    if not len(mine):
-        raise FabricError(sheet.garment.name, "covers no texel; bake it at a higher resolution")
-    rng = np.random.default_rng(seed)
-    chosen = mine[rng.integers(0, len(mine), TEXELS)]
-    texels = {n: a[chosen[:, 0], chosen[:, 1]] for n, a in at_level.items()}
-    step = b.texel_step(sheet, lay, 1 << level)
-    start = b.texel_start(sheet, lay, bx * sheet.block, by * sheet.block)
-    fabric = sheet.garment.lays[lay].fabric
-    inside = (np.arange(INSIDE) + rng.random((TEXELS, 2, INSIDE))) / INSIDE
-    x = chosen[:, 1, None, None] + inside[:, 0, :, None]
-    y = chosen[:, 0, None, None] + inside[:, 1, None, :]
-    x, y = np.broadcast_arrays(x, y)
-    weave = start + np.stack((x, y), axis=-1) @ step.T
-    return compare(texels, fabric, weave.reshape(TEXELS, -1, 2), pairs or pairs_between(PAIRS))
+    maps = [REGISTRY[name] for name in {*names, "lay"}]
+    found, _, _ = bake_block(sheet, maps, bx, by)
+    return Swatch(
+        sheet=sheet,
+        block=(bx, by),
+        lay=lay,
+        level=level,
+        maps={t.name: found[k][level] for k, t in enumerate(maps)},
+    )
 
 
-def compare(
-    texels: dict[str, NDArray[Any]], fabric: Fabric, weave: Floats, pairs: tuple[Floats, Floats]
+def swatch_error(
+    sheet: Sheet, *, level: int = 0, pairs: tuple[Floats, Floats] | None = None, seed: int = 0
 ) -> SwatchError:
-    """Error of texels (n, ...) that span weave coordinates (n, samples, 2)."""
-    points, means = [], []
+    """Error of a sheet at mip `level` with the maps that lose least."""
+    return swatch_errors(sheet, (NEEDED,), level=level, pairs=pairs, seed=seed)[0]
+
+
+def swatch_errors(
+    sheet: Sheet,
+    choices: Sequence[Sequence[str]],
+    *,
+    level: int = 0,
+    pairs: tuple[Floats, Floats] | None = None,
+    seed: int = 0,
+    means: bool = True,
+) -> list[SwatchError]:
+    """Error of a sheet at mip `level` with each of several choices of maps, see `relight.RELIT`.
+
+    means : False measures at points alone, which is quick, and leaves the rest 0
+    """
+    swatch = swatch_of(sheet, {name for names in choices for name in names}, level)
+    rng = np.random.default_rng(seed)
+    chosen = swatch.texels(rng)
+    step = texel_step(sheet, swatch.lay, 1 << level)
+    start = texel_start(sheet, swatch.lay, *(k * sheet.block for k in swatch.block))
+    corner = chosen[:, None, ::-1]
+    points = start + (corner + rng.random((TEXELS, 1, 2))) @ step.T
+    strata = np.stack(np.meshgrid(np.arange(INSIDE), np.arange(INSIDE)), axis=-1).reshape(-1, 2)
+    inside = (strata + rng.random((MEANS, INSIDE**2, 2))) / INSIDE
+    areas = start + (corner[:MEANS] + inside) @ step.T
+    texels = [{n: swatch.maps[n][chosen[:, 0], chosen[:, 1]] for n in names} for names in choices]
+    fabric = sheet.garment.lays[swatch.lay].fabric
+    lit = pairs or pairs_between(PAIRS)
+    at_points = compared(texels, fabric, points, lit)
+    of_texels = compared(texels, fabric, areas, lit) if means else np.zeros_like(at_points)
+    return [
+        SwatchError(
+            point=float(point.mean()),
+            texel=float(texel.mean()),
+            worst_pair=float(texel.max()),
+            bound=MARGIN * float(texel.max()),
+        )
+        for point, texel in zip(at_points, of_texels, strict=True)
+    ]
+
+
+def compared(
+    choices: Sequence[dict[str, NDArray[Any]]],
+    fabric: Fabric,
+    weave: Floats,
+    pairs: tuple[Floats, Floats],
+) -> Floats:
+    """(choices, pairs) mean delta E of maps (n, ...) against places (m, samples, 2), m <= n."""
+    errors = np.zeros((len(choices), len(pairs[0])))
     n, samples = weave.shape[:2]
-    for wi, wo in zip(*pairs, strict=True):
-        got = display(relight(texels, fabric, wi, wo), wi)
+    for k, (wi, wo) in enumerate(zip(*pairs, strict=True)):
         true = evaluate(
             fabric, np.repeat(wi[None], n * samples, axis=0), wo, weave.reshape(-1, 2), "weave"
         ).reshape(n, samples, 3)
-        means.append(float(delta_e(got, display(true.mean(axis=1), wi)).mean()))
-        points.append(float(delta_e(got, display(true[:, samples // 2], wi)).mean()))
-    texel, point = float(np.mean(means)), float(np.mean(points))
-    worst = float(np.max(means))
-    return SwatchError(point=point, texel=texel, worst_pair=worst, bound=MARGIN * worst)
+        mean = display(true.mean(axis=1), wi)
+        for choice, texels in enumerate(choices):
+            got = relight({name: a[:n] for name, a in texels.items()}, fabric, wi, wo)
+            errors[choice, k] = delta_e(display(got, wi), mean).mean()
+    return errors

@@ -2,76 +2,87 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fabricusd import __version__
-from fabricusd.bake import blocks as b
+from fabricusd.bake.blocks import Layers, composed
+from fabricusd.bake.encoding import FORMATS, encoding_of
+from fabricusd.bake.kept import Kept, block_is_sound, kept, read_top
+from fabricusd.bake.layers import ComputedLayer, Place
 from fabricusd.bake.maps import TextureMap
-from fabricusd.bake.scratch import Scratch, bands, upper_levels
-from fabricusd.reference.images import write_mip_exr
+from fabricusd.bake.planes import PLANES
+from fabricusd.bake.scratch import Scratch
+from fabricusd.bake.sheet import Sheet
+from fabricusd.reference.images import write_16_bit, write_mip_exr
 from fabricusd.reference.workers import Batches
 
 Progress = Callable[[str, int, int], Any]
 """Told what is counted, how many there are, and how many are done."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Files:
+    """Where textures go and what they are called."""
+
+    folder: Path
+    udim: bool
+    file_format: str
+
+    def path(self, sheet: Sheet, one: TextureMap) -> Path:
+        """A texture: garment, map, and the tile's number where there are tiles."""
+        number = f".{sheet.number}" if self.udim else ""
+        name = f"{sheet.garment.name}.{one.name}{number}{FORMATS[self.file_format]}"
+        return self.folder / name
+
+
 def compute(
     scratch: Scratch,
-    sheets: Sequence[b.Sheet],
+    sheets: Sequence[Sheet],
     maps: Sequence[TextureMap],
-    folder: Path,
-    udim: bool,
+    files: Files,
     workers: int,
     progress: Progress | None,
 ) -> bool:
     """Every block that is not there yet; False where interrupted."""
     jobs = []
     for sheet in sheets:
-        if all(scratch.is_done(folder / file_name(sheet, one, udim)) for one in maps):
+        if all(scratch.is_done(files.path(sheet, one)) for one in maps):
             continue
         jobs += [(sheet, x, y) for y in range(sheet.across) for x in range(sheet.across)]
+    ways = {id(sheet): kept(sheet, maps) for sheet in sheets}
 
     def one_block(_: int, k: int) -> None:
         sheet, x, y = jobs[k]
         path = scratch.block(sheet, x, y)
-        if not b.block_is_sound(path):
-            b.write_block(path, *b.bake_block(sheet, maps, x, y))
+        if not block_is_sound(path):
+            ways[id(sheet)].write(path, x, y)
 
     report = partial(progress, "blocks", len(jobs)) if progress else None
     return Batches(workers, one_block).run(len(jobs), report)
 
 
-def file_name(sheet: b.Sheet, one: TextureMap, udim: bool) -> Path:
-    """A texture's name: garment, map, and the tile's number where there are tiles."""
-    number = f".{sheet.number}" if udim else ""
-    return Path(f"{sheet.garment.name}.{one.name}{number}.exr")
-
-
 def assemble(
     scratch: Scratch,
-    sheets: Sequence[b.Sheet],
+    sheets: Sequence[Sheet],
     maps: Sequence[TextureMap],
-    folder: Path,
-    udim: bool,
+    files: Files,
     workers: int,
     progress: Progress | None,
 ) -> bool:
     """Every texture that is not there yet; False where interrupted."""
     for sheet in sheets:
-        todo = [
-            k
-            for k, one in enumerate(maps)
-            if not scratch.is_done(folder / file_name(sheet, one, udim))
-        ]
+        todo = [k for k, one in enumerate(maps) if not scratch.is_done(files.path(sheet, one))]
         if not todo:
             continue
-        task = partial(_write_texture, scratch, sheet, maps, folder, udim, todo)
-        task = partial(task, upper_levels(scratch, sheet, maps))
+        task = partial(_write_texture, scratch, sheet, maps, files, todo, uppermost(scratch, sheet))
         report = partial(progress, "textures", len(todo)) if progress else None
         if not Batches(workers, task).run(len(todo), report):
             return False
@@ -81,32 +92,80 @@ def assemble(
 
 def _write_texture(
     scratch: Scratch,
-    sheet: b.Sheet,
+    sheet: Sheet,
     maps: Sequence[TextureMap],
-    folder: Path,
-    udim: bool,
+    files: Files,
     todo: Sequence[int],
-    upper: list[list[Any]],
+    upper: Layers,
     _worker: int,
     job: int,
 ) -> None:
     """One texture, from the blocks and the levels above them."""
     k = todo[job]
-    one, places = maps[k], b.sizes(sheet, maps)[k]
+    one, way = maps[k], kept(sheet, maps)
+    path, note = files.path(sheet, one), ""
     levels: list[Any] = [
-        partial(bands, scratch, sheet, one, level, places) for level in range(sheet.levels)
+        partial(bands, scratch, sheet, way, k, level) for level in range(sheet.levels)
     ]
-    levels += [partial(_whole, level) for level in upper[k]]
     metadata = {
         "fabricusd:map": one.name,
         "fabricusd:meaning": one.meaning,
-        "oiio:ColorSpace": "lin_rec709" if one.color else "Raw",
         "Software": f"fabricusd {__version__}",
     }
-    path = folder / file_name(sheet, one, udim)
-    write_mip_exr(path, levels, sheet.resolution, one.channels, one.kind, metadata)
-    scratch.mark_done(path)
+    if files.file_format == "exr":
+        metadata["oiio:ColorSpace"] = "lin_rec709" if one.color else "Raw"
+        levels += [partial(_whole, level) for level in upper_levels(one, upper, sheet.across)]
+        write_mip_exr(path, levels, sheet.resolution, one.channels, one.kind, metadata)
+    else:
+        encoding = encoding_of(one, levels[0]())
+        note = json.dumps(encoding.as_dict())
+        metadata["oiio:ColorSpace"] = "sRGB" if one.color else "Raw"
+        metadata["fabricusd:encoding"] = note
+        rows = (encoding.encoded(band) for band in levels[0]())
+        write_16_bit(path, rows, sheet.resolution, len(one.channels), metadata)
+    scratch.mark_done(path, note)
 
 
 def _whole(level: np.ndarray[Any, Any]) -> Any:
     return iter((level,))
+
+
+def bands(scratch: Scratch, sheet: Sheet, way: Kept, k: int, level: int) -> Iterator[NDArray[Any]]:
+    """Rows of a map's level that lies inside the blocks, from the top, in heights for tiles."""
+    waiting: list[NDArray[Any]] = []
+    for by in range(sheet.across):
+        row = [
+            way.values(scratch.block(sheet, x, by), x, by, k, level) for x in range(sheet.across)
+        ]
+        waiting.append(np.concatenate(row, axis=1))
+        if len(waiting) * (sheet.block >> level) >= 64 or by == sheet.across - 1:
+            yield np.ascontiguousarray(np.concatenate(waiting))
+            waiting = []
+
+
+def uppermost(scratch: Scratch, sheet: Sheet) -> Layers:
+    """Layers of the level at which each block is one texel."""
+    lays, n = len(sheet.garment.lays), sheet.across
+    planes, owned = np.empty((lays, PLANES, n, n), np.float32), np.empty((lays, n, n), np.float32)
+    for by in range(n):
+        for bx in range(n):
+            found = read_top(scratch.block(sheet, bx, by), sheet)
+            planes[:, :, by, bx], owned[:, by, bx] = found
+    window = (0, 0, sheet.resolution, sheet.resolution)
+    return {
+        k: ComputedLayer(
+            Place(sheet=sheet, lay=k, window=window, level=sheet.levels - 1), planes[k], owned[k]
+        )
+        for k in range(lays)
+        if owned[k].any()
+    }
+
+
+def upper_levels(one: TextureMap, layers: Layers, size: int) -> list[NDArray[Any]]:
+    """The levels of a map above the blocks' own, whole; layers : as `uppermost` gives them"""
+    found = []
+    while size > 1:
+        layers = {k: layer.halved() for k, layer in layers.items()}
+        size //= 2
+        found.append(composed(one, layers, size))
+    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shutil
 import time
@@ -13,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from fabricusd import __version__
-from fabricusd.bake import blocks as b
-from fabricusd.bake import moments as m
-from fabricusd.bake.accuracy import SwatchError, swatch_error
-from fabricusd.bake.assemble import Progress, assemble, compute, file_name
+from fabricusd.bake.accuracy import SwatchError, swatch_errors
+from fabricusd.bake.assemble import Files, Progress, assemble, compute
 from fabricusd.bake.btf.write import MAX_ERROR, write_btf
+from fabricusd.bake.choose import Tried, cheapest, maps_with
+from fabricusd.bake.encoding import FORMATS, Encoding, stored_by
 from fabricusd.bake.garment import (
     Garment,
     fitted,
@@ -26,18 +27,24 @@ from fabricusd.bake.garment import (
     threads_per_uv,
     tiles_of,
 )
-from fabricusd.bake.layer import write_mesh_layer
+from fabricusd.bake.kept import kept
 from fabricusd.bake.manifest import manifest_of, write_json
+from fabricusd.bake.map_error import MapError, map_errors
 from fabricusd.bake.maps import TextureMap, chosen_maps
+from fabricusd.bake.mesh_layer import write_mesh_layer
 from fabricusd.bake.overlaps import refuse_overlaps
+from fabricusd.bake.recipe import Recipe, recipe
+from fabricusd.bake.relight import best_choice
 from fabricusd.bake.report import write_report
-from fabricusd.bake.scratch import Scratch, bytes_needed
+from fabricusd.bake.scratch import Scratch
+from fabricusd.bake.sheet import Sheet, sheets_of
 from fabricusd.bake.unwrap import unwrapped
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.reference.read import as_binding, read_scene
 from fabricusd.reference.scene import Scene
 from fabricusd.reference.workers import worker_count
+from fabricusd.schema import save_all
 
 MARGIN = 16
 """Texels that a shell is continued beyond its border: enough for four mip levels without a seam."""
@@ -62,6 +69,7 @@ class Settings:
     unwrap : "x", "y" or "z": new UVs by xatlas, with the warp along that axis of the world
     max_error : mean delta E 2000 of re-lit texels against level `weave` to reach; 0 to ask nothing
     btf : forms of the BTF to write, see `btf.write.FORMS`
+    file_format : "exr", or "png" or "tiff" for 16-bit integers and the finest level alone
     """
 
     resolution: int = 1024
@@ -75,6 +83,7 @@ class Settings:
     unwrap: str = ""
     max_error: float = 0.0
     btf: tuple[str, ...] = ()
+    file_format: str = "exr"
     margin: int = MARGIN
 
 
@@ -83,7 +92,10 @@ class Baked:
     """What a bake has made.
 
     files : names of the textures, by garment, map and UDIM number
-    errors : of each garment, measured as `accuracy.swatch_error` does
+    encodings : of each file whose numbers are not the values themselves
+    errors : of each garment, measured as `accuracy.swatch_error` does with the maps that were made
+    map_errors : of each garment and map
+    tried : where a bound was asked for, what was tried to meet it
     btf : records of the BTFs that were written, by fabric
     notes : what had to be assumed or left out
     """
@@ -94,7 +106,10 @@ class Baked:
     maps: list[TextureMap]
     files: dict[str, dict[str, dict[int, str]]]
     notes: list[str] = field(default_factory=list)
+    encodings: dict[str, Encoding] = field(default_factory=dict)
     errors: dict[str, SwatchError] = field(default_factory=dict)
+    map_errors: dict[str, dict[str, MapError]] = field(default_factory=dict)
+    tried: list[Tried] = field(default_factory=list)
     btf: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     seconds: float = 0.0
     finished: bool = True
@@ -132,59 +147,82 @@ def bake(
     read = read_scene(scene, fabric=fabric)
     found = _garments(read, settings, mesh, fabric)
     maps = chosen_maps(settings.maps, light=settings.light is not None)
+    if settings.file_format not in FORMATS:
+        raise FabricError(
+            "--format", f"is '{settings.file_format}'; it must be one of {', '.join(FORMATS)}"
+        )
     resolution = _resolution(settings, found)
     tiles = [tiles_of(one, settings.udim) for one in found]
     folder = _folder(out)
     for one, places in zip(found, tiles, strict=True):
         refuse_overlaps(one, places, min(resolution, 2048), folder)
     recipes = _recipes(found, settings)
+    tried: list[Tried] = []
     if settings.max_error:
-        resolution = resolution_within(settings.max_error, found, tiles, recipes, resolution)
-    sheets = [
-        b.sheet_of(
-            one, tuple(recipes[lay.fabric] for lay in one.lays), number, place, resolution,
-            settings.margin,
+        best, tried = cheapest(
+            settings.max_error,
+            lambda n: [
+                _sheets(one, recipes, places, n, MARGIN)[0]
+                for one, places in zip(found, tiles, strict=True)
+            ],
+            resolution,
+            sum(map(len, tiles)),
         )
+        resolution = best.resolution
+        if settings.maps is None:
+            maps = maps_with(best.maps, light=settings.light is not None)
+    sheets = [
+        sheet
         for one, places in zip(found, tiles, strict=True)
-        for number, place in places.items()
-    ]  # fmt: skip
+        for sheet in _sheets(one, recipes, places, resolution, settings.margin)
+    ]
     result = Baked(
         folder=folder,
         resolution=resolution,
         garments=found,
         maps=maps,
         files={},
+        tried=tried,
         notes=[*read.notes, *(n for g in found for n in g.notes), *_coarse(found, resolution)],
     )
     scratch = Scratch(folder, _key(found, settings, resolution, maps), resume=resume)
-    _check_space(folder, bytes_needed(sheets, maps))
+    _check_space(folder, sum(kept(sheet, maps).bytes_needed for sheet in sheets))
     count = worker_count(workers)
+    files = Files(folder=folder, udim=settings.udim, file_format=settings.file_format)
     result.finished = all(
-        step(scratch, sheets, maps, folder, settings.udim, count, progress)
-        for step in (compute, assemble)
+        step(scratch, sheets, maps, files, count, progress) for step in (compute, assemble)
     )
     if not result.finished:
         return result
     for sheet in sheets:
         per_map = result.files.setdefault(sheet.garment.name, {})
         for texture in maps:
-            name = file_name(sheet, texture, settings.udim).name
-            per_map.setdefault(texture.name, {})[sheet.number] = name
+            path = files.path(sheet, texture)
+            per_map.setdefault(texture.name, {})[sheet.number] = path.name
+            note = scratch.note(path)
+            if note:
+                result.encodings[path.name] = Encoding(**json.loads(note))
     for one in found:
         write_mesh_layer(folder / f"{one.name}.usdc", one, read.up_axis)
     _measure(result, sheets, settings)
     result.seconds = time.perf_counter() - began
+    save_all([lay.fabric for one in found for lay in one.lays], folder / "fabrics.usda")
     write_json(folder / "manifest.json", manifest_of(result, settings, Path(scene)))
     write_report(result, settings)
     scratch.close()
     return result
 
 
-def _measure(result: Baked, sheets: Sequence[b.Sheet], settings: Settings) -> None:
+def _measure(result: Baked, sheets: Sequence[Sheet], settings: Settings) -> None:
     """The error of each garment's first sheet, and the BTFs of its fabrics."""
     for sheet in sheets:
-        if sheet.garment.name not in result.errors:
-            result.errors[sheet.garment.name] = swatch_error(sheet)
+        name = sheet.garment.name
+        if name not in result.errors:
+            names = best_choice([one.name for one in result.maps])
+            result.errors[name] = swatch_errors(sheet, (names,))[0]
+            result.map_errors[name] = map_errors(
+                sheet, result.maps, stored_by(settings.file_format)
+            )
         for lay in sheet.garment.lays:
             if settings.btf and lay.fabric.name not in result.btf:
                 result.btf[lay.fabric.name] = write_btf(
@@ -193,32 +231,16 @@ def _measure(result: Baked, sheets: Sequence[b.Sheet], settings: Settings) -> No
                 )  # fmt: skip
 
 
-def resolution_within(
-    max_error: float,
-    found: Sequence[Garment],
-    tiles: Sequence[dict[int, tuple[int, int]]],
-    recipes: dict[Fabric, m.Recipe],
-    largest: int,
-) -> int:
-    """The least power of two up to `largest` at which every garment meets `max_error`.
-
-    `largest` itself where none does: the report then says what was reached.
-    """
-    resolution = 64
-    while resolution < largest:
-        if all(
-            swatch_error(
-                b.sheet_of(
-                    one, tuple(recipes[lay.fabric] for lay in one.lays),
-                    *next(iter(places.items())), resolution, MARGIN,
-                )
-            ).point
-            <= max_error
-            for one, places in zip(found, tiles, strict=True)
-        ):  # fmt: skip
-            return resolution
-        resolution *= 2
-    return largest
+def _sheets(
+    one: Garment,
+    recipes: dict[Fabric, Recipe],
+    places: dict[int, tuple[int, int]],
+    resolution: int,
+    margin: int,
+) -> list[Sheet]:
+    return sheets_of(
+        one, tuple(recipes[lay.fabric] for lay in one.lays), places, resolution, margin
+    )
 
 
 def plan(
@@ -292,12 +314,12 @@ def _coarse(found: Sequence[Garment], resolution: int) -> list[str]:
     return notes
 
 
-def _recipes(found: Sequence[Garment], settings: Settings) -> dict[Fabric, m.Recipe]:
-    made: dict[Fabric, m.Recipe] = {}
+def _recipes(found: Sequence[Garment], settings: Settings) -> dict[Fabric, Recipe]:
+    made: dict[Fabric, Recipe] = {}
     for one in found:
         for lay in one.lays:
             if lay.fabric not in made:
-                made[lay.fabric] = m.recipe(
+                made[lay.fabric] = recipe(
                     lay.fabric, level=settings.level, light=settings.light, method=settings.shadow
                 )
     return made

@@ -13,6 +13,7 @@ import numpy as np
 import OpenImageIO
 
 from fabricusd import __version__
+from fabricusd.bake.maps import TextureMap
 from fabricusd.bake.scratch import sha256
 from fabricusd.files import whole_file
 
@@ -45,8 +46,9 @@ def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any
             one.name: {
                 "meaning": one.meaning,
                 "channels": list(one.channels),
-                "color_space": "lin_rec709" if one.color else "raw",
-                "type": "float" if one.exact else "half",
+                "color_space": _color_space(one, settings.file_format),
+                "type": _number_type(one, settings.file_format),
+                "unit": one.unit,
             }
             for one in result.maps
         },
@@ -59,6 +61,9 @@ def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any
                 "triangles": len(one.triangles),
                 "mirrored_triangles": int(one.mirrored.sum()),
                 "error": result.errors[one.name].as_dict(),
+                "map_error": {
+                    name: error.as_dict() for name, error in result.map_errors[one.name].items()
+                },
                 "lays": [
                     {
                         "fabric": lay.fabric.name,
@@ -68,10 +73,7 @@ def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any
                     for lay in one.lays
                 ],
                 "files": {
-                    name: {
-                        str(number): {"file": file, "sha256": sha256(result.folder / file)}
-                        for number, file in files.items()
-                    }
+                    name: {str(number): _file(result, file) for number, file in files.items()}
                     for name, files in result.files[one.name].items()
                 },
             }
@@ -80,3 +82,23 @@ def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any
         "btf": result.btf,
         "notes": result.notes,
     }
+
+
+def _file(result: Baked, file: str) -> dict[str, Any]:
+    """A texture's entry; with its `encoding.Encoding` where its numbers are not the values."""
+    said: dict[str, Any] = {"file": file, "sha256": sha256(result.folder / file)}
+    if file in result.encodings:
+        said["encoding"] = result.encodings[file].as_dict()
+    return said
+
+
+def _color_space(one: TextureMap, file_format: str) -> str:
+    if not one.color:
+        return "raw"
+    return "lin_rec709" if file_format == "exr" else "srgb_texture"
+
+
+def _number_type(one: TextureMap, file_format: str) -> str:
+    if file_format != "exr":
+        return "uint16"
+    return "float" if one.exact else "half"

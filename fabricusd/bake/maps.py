@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.coverage import GAP, WARP, WEFT
 from fabricusd.bake import planes as m
+from fabricusd.bake.garment import Lay
+from fabricusd.bake.recipe import Recipe
 from fabricusd.errors import FabricError
 
 Planes = NDArray[np.float32]
@@ -47,6 +49,20 @@ class Texels:
     types: int
     lay: int
 
+    @classmethod
+    def of_planes(cls, planes: Planes, recipe: Recipe, lay: Lay) -> Texels:
+        """Texels without a place: for maps that depend on the planes alone."""
+        nothing: NDArray[Any] = np.empty(0, np.int32)
+        return cls(
+            planes=planes,
+            usual=recipe.mean,
+            along=lay.along,
+            weave=np.empty((0, 2)),
+            hit=(nothing, nothing),
+            types=len(lay.fabric.threads),
+            lay=-1,
+        )
+
     def mean(self, plane: int, count: int = 1) -> Planes:
         """(n, count) planes of what the threads show, gaps left out."""
         chosen = slice(plane, plane + count)
@@ -68,6 +84,13 @@ class TextureMap:
     color : whether it is a colour (linear Rec. 709) rather than data
     exact : float32 instead of half, and each level taken at its texels' centres
     needs_light : made only when a light is named
+    spare : made only when it is asked for
+    kind_of : what the numbers are, which says how they are compared and how they fit 16 bits:
+        "share" from 0 to 1, "direction", "axis" (a direction whose sign means nothing), "angle" in
+        [-pi/2, pi/2], "id", "place" in the repeat, or any "number"
+    unit : of the numbers, "" where they have none
+    weight : how much a texel's value counts, (n,) or (n, channels); by how much threads cover where
+        it is None
     """
 
     name: str
@@ -78,6 +101,15 @@ class TextureMap:
     color: bool = False
     exact: bool = False
     needs_light: bool = False
+    spare: bool = False
+    kind_of: str = "share"
+    unit: str = ""
+    weight: Function | None = None
+
+    @property
+    def bytes_per_texel(self) -> int:
+        """Before compression, at the finest level."""
+        return len(self.channels) * np.dtype(self.kind).itemsize
 
     @property
     def kind(self) -> type[Any]:
@@ -89,7 +121,7 @@ REGISTRY: dict[str, TextureMap] = {}
 
 
 def texture_map(
-    name: str, channels: str, empty: Sequence[float] = (0.0,), **flags: bool
+    name: str, channels: str, empty: Sequence[float] = (0.0,), **options: Any
 ) -> Callable[[Function], Function]:
     """Register a function (n texels) -> (n, channels); its docstring is the meaning."""
     names = tuple(channels.split())
@@ -101,7 +133,7 @@ def texture_map(
             channels=names,
             empty=tuple(empty) if len(empty) == len(names) else tuple(empty) * len(names),
             meaning=" ".join((function.__doc__ or "").split()),
-            **flags,
+            **options,
         )
         return function
 
@@ -111,7 +143,7 @@ def texture_map(
 def chosen_maps(names: Sequence[str] | None, *, light: bool) -> list[TextureMap]:
     """The maps called for, in the registry's order; all that can be made where `names` is None."""
     if names is None:
-        return [t for t in REGISTRY.values() if light or not t.needs_light]
+        return [t for t in REGISTRY.values() if (light or not t.needs_light) and not t.spare]
     unknown = [n for n in names if n not in REGISTRY]
     if unknown:
         raise FabricError(
@@ -123,7 +155,12 @@ def chosen_maps(names: Sequence[str] | None, *, light: bool) -> list[TextureMap]
     return [t for t in REGISTRY.values() if t.name in names]
 
 
-@texture_map("thread_id", "Y", (GAP_ID,), exact=True)
+def _whole(t: Texels) -> NDArray[Any]:
+    """Weight of maps whose value means something in gaps as well."""
+    return np.ones(t.planes.shape[1])
+
+
+@texture_map("thread_id", "Y", (GAP_ID,), exact=True, kind_of="id", weight=_whole)
 def thread_id(t: Texels) -> NDArray[Any]:
     """Thread type at the texel's centre: its index for weft, index + types for warp, 255 for gap"""
     which, thread = t.hit
@@ -131,13 +168,13 @@ def thread_id(t: Texels) -> NDArray[Any]:
     return np.where(which == GAP, GAP_ID, number)[:, None]
 
 
-@texture_map("lay", "Y", (NO_LAY,), exact=True)
+@texture_map("lay", "Y", (NO_LAY,), exact=True, kind_of="id", weight=_whole)
 def lay(t: Texels) -> NDArray[Any]:
     """Which of the manifest's lays, a fabric and how it lies, a texel belongs to; 255 for none"""
     return np.full((len(t.weave), 1), t.lay)
 
 
-@texture_map("weave_coordinate", "R G", exact=True)
+@texture_map("weave_coordinate", "R G", exact=True, kind_of="place", unit="threads", weight=_whole)
 def weave_coordinate(t: Texels) -> NDArray[Any]:
     """Place of the texel's centre in the repeat, in threads: ends along U, picks along V"""
     return t.weave
@@ -149,7 +186,7 @@ def base_color(t: Texels) -> NDArray[Any]:
     return t.mean(m.VOLUME, 3)
 
 
-@texture_map("albedo", "R G B", (0.5,), color=True)
+@texture_map("albedo", "R G B", (0.5,), color=True, weight=_whole)
 def albedo(t: Texels) -> NDArray[Any]:
     """Reflectance of the cloth seen from above, surface and volume, gaps black"""
     return np.asarray((t.planes[m.VOLUME : m.VOLUME + 3] + t.planes[m.SURFACE]).T)
@@ -207,7 +244,7 @@ def anisotropy(t: Texels) -> NDArray[Any]:
     return (1.0 - _alpha(narrow) / _alpha(wide))[:, None]
 
 
-@texture_map("tangent", "R G B", (1.0, 0.0, 0.0))
+@texture_map("tangent", "R G B", (1.0, 0.0, 0.0), kind_of="axis", unit="degrees", weight=anisotropy)
 def tangent(t: Texels) -> NDArray[Any]:
     """Direction along the smoother axis in UV axes, a unit vector whose sign means nothing"""
     angle = _principal(t)[2]
@@ -218,7 +255,7 @@ def tangent(t: Texels) -> NDArray[Any]:
     return np.stack((flat[0], flat[1], np.zeros_like(flat[0])), axis=1)
 
 
-@texture_map("normal", "R G B", (0.0, 0.0, 1.0))
+@texture_map("normal", "R G B", (0.0, 0.0, 1.0), kind_of="direction", unit="degrees")
 def normal(t: Texels) -> NDArray[Any]:
     """Unit normal of the mean slope, in UV axes"""
     mean = _slope_widths(t)[0]
@@ -227,7 +264,7 @@ def normal(t: Texels) -> NDArray[Any]:
     return np.asarray((full / np.linalg.norm(full, axis=0)).T)
 
 
-@texture_map("slope_variance", "R G B")
+@texture_map("slope_variance", "R G B", kind_of="number")
 def slope_variance(t: Texels) -> NDArray[Any]:
     """Variance of the slopes inside the texel along u, along v, and their covariance"""
     _, uu, vv, uv = _slope_widths(t)
@@ -238,13 +275,13 @@ def slope_variance(t: Texels) -> NDArray[Any]:
     return np.asarray(np.clip(found, -limit, limit))
 
 
-@texture_map("height", "Y")
+@texture_map("height", "Y", kind_of="number", unit="mm")
 def height(t: Texels) -> NDArray[Any]:
     """Mean height of the threads above their ends [mm], gaps left out"""
     return np.asarray(t.mean(m.HEIGHT) * np.float32(1e3))
 
 
-@texture_map("opacity", "Y")
+@texture_map("opacity", "Y", weight=_whole)
 def opacity(t: Texels) -> NDArray[Any]:
     """Share of the texel that threads cover; the rest is gap"""
     return np.asarray(t.planes[m.COVER][:, None])
@@ -288,7 +325,7 @@ def fuzz(t: Texels) -> NDArray[Any]:
     return t.mean(m.FUZZ)
 
 
-@texture_map("shadow", "Y", (1.0,), needs_light=True)
+@texture_map("shadow", "Y", (1.0,), needs_light=True, weight=_whole)
 def shadow(t: Texels) -> NDArray[Any]:
     """Share of the named light that arrives, gaps lit"""
     return np.asarray(t.planes[m.LIT][:, None])
@@ -318,13 +355,26 @@ def _of_set(which: int, noun: str) -> None:
         mean, square = parts(t, m.ANGLE) / weight, parts(t, m.ANGLE_2) / weight
         return np.sqrt(np.maximum(square - mean * mean, 0.0)).T
 
+    def lean(t: Texels) -> NDArray[Any]:
+        weight = np.maximum(share(t).sum(axis=1), least)
+        mean, square = (parts(t, p).sum(axis=0) / weight for p in (m.ANGLE, m.ANGLE_2))
+        return np.stack((mean, np.sqrt(np.maximum(square - mean * mean, 0.0))), axis=1)
+
+    def covered(t: Texels) -> NDArray[Any]:
+        return share(t).sum(axis=1)
+
     by_part = "where it falls gently, falls steeply, rises gently, rises steeply along its axis"
     thread.__doc__ = f"`A` of the {noun} in the texel, and in alpha the share that it covers"
     share.__doc__ = f"Share of the texel that the {noun} covers {by_part}"
     angle.__doc__ = f"Mean tangent angle [rad] of the {noun} {by_part}"
     spread.__doc__ = f"Standard deviation of the {noun}'s tangent angle [rad] {by_part}"
-    for function in (thread, share, angle, spread):
-        texture_map(f"{noun}_{function.__name__}", "R G B A")(function)
+    lean.__doc__ = f"Mean and standard deviation of the {noun}'s tangent angle [rad], no parts kept"
+    by_angle: dict[str, Any] = {"kind_of": "angle", "unit": "rad"}
+    texture_map(f"{noun}_thread", "R G B A", kind_of="number", weight=covered)(thread)
+    texture_map(f"{noun}_share", "R G B A", weight=_whole)(share)
+    texture_map(f"{noun}_angle", "R G B A", weight=share, **by_angle)(angle)
+    texture_map(f"{noun}_spread", "R G B A", weight=share, **by_angle)(spread)
+    texture_map(f"{noun}_lean", "R G", spare=True, weight=covered, **by_angle)(lean)
 
 
 for _which, _noun in ((WEFT, "weft"), (WARP, "warp")):

@@ -10,20 +10,17 @@ of a cosine-weighted sky that they hide.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.compiled import CompiledFabric, compile_fabric, true_repeat
 from fabricusd.appearance.coverage import GAP, WARP
 from fabricusd.appearance.real import INLINE, LEAN
-from fabricusd.appearance.shadow import Shadow, compile_shadow, lit
+from fabricusd.appearance.shadow import lit
 from fabricusd.appearance.weave import crown_on, find, wrap
-from fabricusd.bake.angle_rows import HEIGHTS, STEPS, angle_rows, height_rows
+from fabricusd.bake.angle_rows import HEIGHTS, STEPS
 from fabricusd.bake.planes import AZIMUTHS, HEIGHT, HORIZON, LIT, PLANES, SLOPE, SLOPE_2
-from fabricusd.fabric import Fabric
 
 ROUNDEST = 0.95
 """Place across a thread beyond which its round gets no steeper: at its edge the slope is infinite,
@@ -37,89 +34,30 @@ MOST_SAMPLES = 8
 """Along each side of a texel."""
 
 
-class Recipe(NamedTuple):
-    """What a fabric's texels are computed from.
-
-    cloth, shadow : compiled for float32; `shadow` answers for the chosen light, by `light`
-    table : horizon table of `compile_shadow(..., "horizon")`
-    rows, heights : see `angle_rows`
-    rounded : int - 1 where threads are round across their width
-    light : (3,) float32 - unit vector to the light in the weave's frame; zero for none
-    mean : (PLANES,) float32 - of the whole repeat
-    """
-
-    cloth: CompiledFabric
-    shadow: Shadow
-    table: NDArray[np.uint8]
-    rows: NDArray[np.float32]
-    heights: NDArray[np.float32]
-    rounded: int
-    light: NDArray[np.float32]
-    mean: NDArray[np.float32]
-
-
-def recipe(
-    fabric: Fabric,
-    *,
-    level: str = "weave",
-    light: tuple[float, float, float] | None = None,
-    method: str = "peak",
-) -> Recipe:
-    """Tables of `fabric` for the kernels.
-
-    level : "weave" or "thread", whether threads are flat or round across their width
-    light : direction to the light in the surface frame, for the shadow mask by `method`
-    """
-    cloth = compile_fabric(fabric, precision=np.float32)
-    horizon = compile_shadow(fabric, "horizon", level=level)
-    shadow = compile_shadow(fabric, method, level=level) if light is not None else horizon
-    towards = np.zeros(3) if light is None else np.asarray(light, np.float64)
-    towards = towards / max(float(np.linalg.norm(towards)), 1e-30)
-    made = Recipe(
-        cloth=cloth,
-        shadow=shadow,
-        table=horizon.table,
-        rows=angle_rows(fabric),
-        heights=height_rows(fabric),
-        rounded=int(level == "thread"),
-        light=towards.astype(np.float32),
-        mean=np.zeros(PLANES, np.float32),
-    )
-    return made._replace(mean=repeat_mean(fabric, made))
-
-
-def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:
-    """(PLANES,) over one repeat, from about 16 samples a thread each way."""
-    repeat = true_repeat(fabric)
-    count = [min(max(16 * n, 256), 2048) for n in repeat]
-    planes = np.empty((PLANES, count[1], 1), np.float32)
-    sums = np.empty(PLANES, np.float32)
-    nobody = np.zeros((count[1], 1), np.int32)
-    total = np.zeros(PLANES)
-    across = np.array([[repeat[0] / count[0], 0.0], [0.0, repeat[1] / count[1]]])
-    for column in range(count[0]):
-        start = np.array([across[0, 0] * column, 0.0])
-        texels(made, across, start, (column, 0), nobody, 0, 1, sums, planes)
-        total += planes[:, :, 0].mean(axis=1, dtype=np.float64)
-    return (total / count[0]).astype(np.float32)
-
-
-def samples_for(made: Recipe, step: NDArray[np.float64], repeat: tuple[int, int]) -> int:
+def samples_for(step: NDArray[np.float64], repeat: tuple[int, int]) -> int:
     """Samples along each side of a texel that spans `step` (2, 2) threads; 0 to take the mean.
 
     Three to a thread, from four to MOST_SAMPLES.
     """
-    span = np.abs(step).sum(axis=1)
-    if (span >= WHOLE * np.array(repeat)).all():
+    if spans_repeats(step, repeat):
         return 0
-    return int(min(max(math.ceil(3.0 * float(span.max())), 4), MOST_SAMPLES))
+    span = float(np.abs(step).sum(axis=1).max())
+    return int(min(max(math.ceil(3.0 * span), 4), MOST_SAMPLES))
+
+
+def spans_repeats(step: NDArray[np.float64], repeat: tuple[int, int]) -> bool:
+    """Whether a texel that spans `step` (2, 2) threads takes the repeat's mean."""
+    return bool((np.abs(step).sum(axis=1) >= WHOLE * np.array(repeat)).all())
 
 
 @njit(**LEAN)
-def texels(made, step, start, corner, owner, mine, side, sums, out):  # type: ignore[no-untyped-def]
+def texels(  # type: ignore[no-untyped-def]
+    made, apart, step, start, corner, owner, mine, side, sums, out
+):
     """Planes of the texels that are owned by `mine`, into out (PLANES, h, w); others stay.
 
-    step : (2, 2) float64 - threads per texel: columns for one texel right and one texel down
+    apart : (2, 2) float64 - threads from a texel to the next: columns for right and for down
+    step : (2, 2) float64 - threads that a texel spans; as `apart`, but where texels overlap
     start : (2,) float64 - weave coordinates of the first texel's outer corner
     corner : (x, y) of the first texel on its sheet
     side : samples along each side of a texel, 0 to take the repeat's mean
@@ -141,13 +79,15 @@ def texels(made, step, start, corner, owner, mine, side, sums, out):  # type: ig
             for p in range(PLANES):
                 sums[p] = R(0)
             seed = _mixed(np.uint64(corner[0] + i) << np.uint64(32) | np.uint64(corner[1] + j))
+            left = start[0] + apart[0, 0] * i + apart[0, 1] * j
+            top = start[1] + apart[1, 0] * i + apart[1, 1] * j
             for b in range(side):
                 for a in range(side):
                     seed = _mixed(seed + np.uint64(0x9E3779B97F4A7C15))
-                    x = i + (a + (seed >> np.uint64(32)) * 2.0**-32) / side
-                    y = j + (b + (seed & np.uint64(0xFFFFFFFF)) * 2.0**-32) / side
-                    u = start[0] + step[0, 0] * x + step[0, 1] * y
-                    v = start[1] + step[1, 0] * x + step[1, 1] * y
+                    x = (a + (seed >> np.uint64(32)) * 2.0**-32) / side
+                    y = (b + (seed & np.uint64(0xFFFFFFFF)) * 2.0**-32) / side
+                    u = left + step[0, 0] * x + step[0, 1] * y
+                    v = top + step[1, 0] * x + step[1, 1] * y
                     _add(made, u, v, sums)
             share = R(1.0 / (side * side))
             for p in range(PLANES):
@@ -253,12 +193,30 @@ def halve(
     planes : (p, h, w), owned : (h, w) share of each texel that belongs to the layout
     """
     p, h, w = planes.shape
-    weight = owned.reshape(h // 2, 2, w // 2, 2)
-    total = weight.sum(axis=(1, 3))
-    if bool((owned == 1.0).all()):
-        return planes.reshape(p, h // 2, 2, w // 2, 2).mean(axis=(2, 4), dtype=np.float32), (
-            total * np.float32(0.25)
-        )
-    summed = np.einsum("phiwj,hiwj->phw", planes.reshape(p, h // 2, 2, w // 2, 2), weight)
-    means = summed / np.maximum(total, np.float32(1e-20))
-    return means.astype(np.float32), (total * np.float32(0.25)).astype(np.float32)
+    half = np.empty((p, h // 2, w // 2), np.float32)
+    share = np.empty((h // 2, w // 2), np.float32)
+    _halve(planes, owned, half, share)
+    return half, share
+
+
+@njit(**LEAN)
+def _halve(planes, owned, half, share):  # type: ignore[no-untyped-def]
+    R = np.float32
+    height, width = share.shape
+    for j in range(height):
+        for i in range(width):
+            share[j, i] = R(0.25) * (
+                (owned[2 * j, 2 * i] + owned[2 * j, 2 * i + 1])
+                + (owned[2 * j + 1, 2 * i] + owned[2 * j + 1, 2 * i + 1])
+            )
+    for p in range(planes.shape[0]):
+        for j in range(height):
+            for i in range(width):
+                total = (
+                    planes[p, 2 * j, 2 * i] * owned[2 * j, 2 * i]
+                    + planes[p, 2 * j, 2 * i + 1] * owned[2 * j, 2 * i + 1]
+                ) + (
+                    planes[p, 2 * j + 1, 2 * i] * owned[2 * j + 1, 2 * i]
+                    + planes[p, 2 * j + 1, 2 * i + 1] * owned[2 * j + 1, 2 * i + 1]
+                )
+                half[p, j, i] = R(0.25) * total / max(share[j, i], R(1e-20))

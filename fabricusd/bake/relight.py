@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from fabricusd.appearance.real import KERNEL
 from fabricusd.appearance.segment import along_set, seen_along, segment
 from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.thread_terms import GAMMA_SURFACE, MODEL, THESIS
+from fabricusd.bake.encoding import Encoding
 from fabricusd.bake.maps import GAP_ID
 from fabricusd.bake.planes import PARTS
 from fabricusd.errors import FabricError
@@ -33,13 +34,18 @@ from fabricusd.reference.images import read_mip_level
 
 Floats = NDArray[np.float64]
 
-PER_SET = ("thread", "share", "angle", "spread")
+PER_SET = (("thread", "lean"), ("thread", "share", "angle"), ("thread", "share", "angle", "spread"))
+"""Maps of each thread set that suffice to re-light, cheapest first. Without shares of parts a set
+has one mean angle and one spread; without spreads a part has one angle."""
 
-NEEDED = (
-    "thread_id",
-    *(f"{noun}_{what}" for noun in ("weft", "warp") for what in PER_SET),
+RELIT = tuple(
+    ("thread_id", *(f"{noun}_{what}" for noun in ("weft", "warp") for what in per_set))
+    for per_set in PER_SET
 )
-"""Maps that are re-lit."""
+"""Maps that are re-lit, cheapest choice first."""
+
+NEEDED = RELIT[-1]
+"""Those that lose least."""
 
 MOST_NODES = 64
 """Tangent angles that a texel's spread is cut into at most."""
@@ -70,7 +76,10 @@ class BakedSet:
                 f"holds no map '{name}' of '{garment}' in tile {tile}; it must be one of "
                 f"{', '.join(files) or 'none'}",
             )
-        return read_mip_level(self.folder / files[name][str(tile)]["file"], level)
+        said = files[name][str(tile)]
+        stored = read_mip_level(self.folder / said["file"], level)
+        stored = stored[..., : len(self.manifest["maps"][name]["channels"])]
+        return Encoding(**said["encoding"]).decoded(stored) if "encoding" in said else stored
 
     def relight(
         self,
@@ -87,7 +96,10 @@ class BakedSet:
         fabrics : of each lay, as the manifest counts them
         wi, wo : (3,) unit vectors in UV axes: x along u, y along v, z out of the cloth
         """
-        maps = {name: self.read(garment, name, level, tile) for name in NEEDED}
+        maps = {
+            name: self.read(garment, name, level, tile)
+            for name in best_choice(self.manifest["garments"][garment]["files"])
+        }
         lay = self.read(garment, "lay", level, tile)[..., 0]
         out = np.zeros((*lay.shape, 3))
         for k, (fabric, said) in enumerate(
@@ -107,7 +119,7 @@ class BakedSet:
 def relight(
     maps: Mapping[str, NDArray[Any]], fabric: Fabric, wi: ArrayLike, wo: ArrayLike
 ) -> Floats:
-    """(n, 3) radiance per unit `L_i dwi` of texels whose maps NEEDED are (n, channels).
+    """(n, 3) radiance per unit `L_i dwi` of texels whose maps, one of RELIT, are (n, channels).
 
     wi, wo : (3,) unit vectors in the weave's frame, x along U, y along V
     """
@@ -115,20 +127,33 @@ def relight(
     area = coverage(fabric).type_area
     share = area / np.maximum(area.sum(axis=1, keepdims=True), 1e-30)
     ids = np.asarray(maps["thread_id"][:, 0])
-    sets = np.stack(
-        [
-            np.concatenate(
-                [maps[f"{noun}_{what}"][:, :PARTS] for what in PER_SET], axis=1, dtype=np.float64
-            )
-            for noun in ("weft", "warp")
-        ],
-        axis=1,
-    )
+    sets = np.stack([_set_of(maps, noun) for noun in ("weft", "warp")], axis=1)
     kinds = np.where(ids == GAP_ID, -1, ids).astype(np.int64)
     out = np.zeros((len(ids), 3))
     i, o = (np.asarray(w, np.float64) for w in (wi, wo))
     _relight(surface_tables(fabric), share, types, sets, kinds, i, o, out)
     return out
+
+
+def best_choice(names: Collection[str]) -> tuple[str, ...]:
+    """The one of RELIT that loses least among maps of these names, NEEDED where there is none."""
+    return next((c for c in reversed(RELIT) if set(c) <= set(names)), NEEDED)
+
+
+def _set_of(maps: Mapping[str, NDArray[Any]], noun: str) -> Floats:
+    """(n, 16): `A` and share; shares, mean angles and deviations of the parts of a thread set."""
+    thread = maps[f"{noun}_thread"]
+    found = np.zeros((len(thread), 4 + 3 * PARTS))
+    found[:, :4] = thread
+    if f"{noun}_share" not in maps:
+        # One part is the whole set.
+        found[:, 4] = thread[:, 3]
+        found[:, 4 + PARTS], found[:, 4 + 2 * PARTS] = maps[f"{noun}_lean"].T
+        return found
+    for k, what in enumerate(("share", "angle", "spread")):
+        if f"{noun}_{what}" in maps:
+            found[:, 4 + k * PARTS : 4 + (k + 1) * PARTS] = maps[f"{noun}_{what}"]
+    return found
 
 
 @njit(parallel=True, **KERNEL)

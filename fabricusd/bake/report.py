@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fabricusd.bake.manifest import write_json
 from fabricusd.files import whole_file
-from fabricusd.reference.images import read_mip_level, write_png
+from fabricusd.reference.images import read_middle, write_png
 
 if TYPE_CHECKING:
     from fabricusd.bake.bake import Baked, Settings
@@ -41,6 +41,11 @@ def report_of(result: Baked, settings: Settings) -> dict[str, Any]:
             "bytes": sum(sizes.values()),
             "bytes_per_map": sizes,
         },
+        "tried": [one.as_dict() for one in result.tried],
+        "map_error": {
+            garment: {name: error.as_dict() for name, error in maps.items()}
+            for garment, maps in result.map_errors.items()
+        },
         "btf": result.btf,
         "notes": result.notes,
     }
@@ -57,7 +62,7 @@ def write_report(result: Baked, settings: Settings) -> None:
         for name, files in maps.items():
             file = next(iter(files.values()))
             picture = pictures / f"{garment}.{name}.png"
-            write_png(picture, as_picture(read_mip_level(result.folder / file), name))
+            write_png(picture, as_picture(read_middle(result.folder / file, PICTURE), name))
             figures.append(
                 f'<figure><img src="report/{escape(picture.name)}" alt="{escape(name)}">'
                 f"<figcaption>{escape(name)}</figcaption></figure>"
@@ -81,6 +86,17 @@ def _page(said: dict[str, Any], figures: list[str]) -> str:
     )
     notes = "".join(f"<li>{escape(n)}</li>" for n in said["notes"])
     cost = said["cost"]
+    tried = "".join(
+        f"<tr><td>{t['resolution']}<td>{len(t['maps'])}<td>{t['megabytes']:.2f}"
+        f"<td>{t['point']:.2f}</tr>"
+        for t in said["tried"]
+    )
+    errors = "".join(
+        f"<tr><td>{escape(garment)}<td>{escape(name)}<td>{escape(e['unit'])}<td>{e['rounding']:.2g}"
+        f"<td>{e['texel']:.2g}<td>{e['point']:.2g}<td>{e['spread']:.2g}</tr>"
+        for garment, maps in said["map_error"].items()
+        for name, e in maps.items()
+    )
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Bake</title>'
         f"<style>{_STYLE}</style><h1>Bake</h1>"
@@ -95,17 +111,24 @@ def _page(said: dict[str, Any], figures: list[str]) -> str:
             if forms
             else ""
         )
+        + (
+            "<h2>Tried</h2><table><tr><th>texels a side<th>maps to re-light<th>MB<th>delta E 2000"
+            f" at points</tr>{tried}</table>"
+            if tried
+            else ""
+        )
         + (f"<h2>Notes</h2><ul>{notes}</ul>" if notes else "")
+        + "<h2>Error of each map</h2><p>Root mean squares against level weave.</p>"
+        + "<table><tr><th>garment<th>map<th>unit<th>number type<th>of texels<th>at points"
+        + f"<th>the map's own spread</tr>{errors}</table>"
         + f"<h2>Maps</h2>{''.join(figures)}</html>\n"
     )
 
 
 def as_picture(pixels: NDArray[Any], name: str) -> NDArray[np.uint8]:
-    """(h, w, 3) uint8 of a map's middle: directions as colours, the rest from its least value to
-    its greatest."""
-    h, w = pixels.shape[:2]
-    y, x = max(0, (h - PICTURE) // 2), max(0, (w - PICTURE) // 2)
-    part = np.asarray(pixels[y : y + PICTURE, x : x + PICTURE, :3], np.float64)
+    """(h, w, 3) uint8 of a map: directions as colours, the rest from its least value to its
+    greatest."""
+    part = np.asarray(pixels[..., :3], np.float64)
     if name in ("normal", "tangent"):
         part = 0.5 * part + 0.5
     else:

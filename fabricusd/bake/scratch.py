@@ -8,17 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from fabricusd.bake import blocks as b
-from fabricusd.bake import moments as m
-from fabricusd.bake.maps import TextureMap
-from fabricusd.bake.planes import PLANES
+from fabricusd.bake.sheet import Sheet
 from fabricusd.errors import FabricError
 from fabricusd.files import remove_partial_files, whole_file
 
@@ -51,25 +43,34 @@ class Scratch:
             with whole_file(held) as temporary:
                 temporary.write_text(key)
 
-    def block(self, sheet: b.Sheet, bx: int, by: int) -> Path:
+    def block(self, sheet: Sheet, bx: int, by: int) -> Path:
         """Where a block is kept."""
         folder = self.folder / f"{sheet.garment.name}.{sheet.number}"
         folder.mkdir(exist_ok=True)
         return folder / f"{bx}_{by}.block"
 
-    def drop(self, sheet: b.Sheet) -> None:
+    def drop(self, sheet: Sheet) -> None:
         """Forget the blocks of a sheet whose textures are all done."""
         shutil.rmtree(self.folder / f"{sheet.garment.name}.{sheet.number}", ignore_errors=True)
 
     def is_done(self, file: Path) -> bool:
         """Whether a texture is there, as it was when it was marked."""
-        mark = self.folder / f"{file.name}.done"
-        return mark.is_file() and file.is_file() and mark.read_text() == sha256(file)
+        mark = self._mark(file)
+        if not mark.is_file() or not file.is_file():
+            return False
+        return mark.read_text().partition("\n")[0] == sha256(file)
 
-    def mark_done(self, file: Path) -> None:
-        """Remember that a texture is finished."""
-        with whole_file(self.folder / f"{file.name}.done") as temporary:
-            temporary.write_text(sha256(file))
+    def mark_done(self, file: Path, note: str = "") -> None:
+        """Remember that a texture is finished, and a note about it."""
+        with whole_file(self._mark(file)) as temporary:
+            temporary.write_text(f"{sha256(file)}\n{note}")
+
+    def note(self, file: Path) -> str:
+        """What was noted about a finished texture."""
+        return self._mark(file).read_text().partition("\n")[2]
+
+    def _mark(self, file: Path) -> Path:
+        return self.folder / f"{file.name}.done"
 
     def close(self) -> None:
         """Remove the folder: the job is done."""
@@ -80,71 +81,3 @@ def sha256(path: Path) -> str:
     """Checksum of a file."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def bytes_needed(sheets: Sequence[b.Sheet], maps: Sequence[TextureMap]) -> int:
-    """What the blocks of all sheets take."""
-    total = 0
-    for sheet in sheets:
-        one = sum(count for row in b.sizes(sheet, maps) for _, count in row)
-        total += one * sheet.across**2
-    return total
-
-
-def read_tops(
-    scratch: Scratch, sheet: b.Sheet, maps: Sequence[TextureMap]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """(lays, PLANES, n, n) planes of the texel that each block shrinks to, (lays, n, n) owned."""
-    lays, n = len(sheet.garment.lays), sheet.across
-    planes, owned = np.empty((lays, PLANES, n, n), np.float32), np.empty((lays, n, n), np.float32)
-    last = b.sizes(sheet, maps)[-1][-1] if maps else (0, 0)
-    count = lays * PLANES
-    for by in range(n):
-        for bx in range(n):
-            with scratch.block(sheet, bx, by).open("rb") as stream:
-                stream.seek(sum(last))
-                values = np.frombuffer(stream.read(4 * (count + lays)), np.float32)
-            planes[:, :, by, bx] = values[:count].reshape(lays, PLANES)
-            owned[:, by, bx] = values[count:]
-    return planes, owned
-
-
-def bands(
-    scratch: Scratch, sheet: b.Sheet, one: TextureMap, level: int, places: list[tuple[int, int]]
-) -> Iterator[NDArray[Any]]:
-    """Rows of a level that lies inside the blocks, from the top, in heights that tiles like."""
-    side = sheet.block >> level
-    shape = (side, side, len(one.channels))
-    offset, count = places[level]
-    waiting: list[NDArray[Any]] = []
-    for by in range(sheet.across):
-        row = np.empty((side, side * sheet.across, shape[2]), one.kind)
-        for bx in range(sheet.across):
-            with scratch.block(sheet, bx, by).open("rb") as stream:
-                stream.seek(offset)
-                values = np.frombuffer(stream.read(count), one.kind)
-            row[:, bx * side : (bx + 1) * side] = values.reshape(shape)
-        waiting.append(row)
-        if len(waiting) * side >= 64 or by == sheet.across - 1:
-            yield np.ascontiguousarray(np.concatenate(waiting))
-            waiting = []
-
-
-def upper_levels(
-    scratch: Scratch, sheet: b.Sheet, maps: Sequence[TextureMap]
-) -> list[list[NDArray[Any]]]:
-    """[map][level] the levels above the blocks' own, whole."""
-    planes, owned = read_tops(scratch, sheet, maps)
-    stacks = {k: (planes[k], owned[k]) for k in range(len(planes)) if owned[k].any()}
-    found: list[list[NDArray[Any]]] = [[] for _ in maps]
-    size, level = sheet.across, sheet.levels - 1
-    while size > 1:
-        stacks = {k: m.halve(*stack) for k, stack in stacks.items()}
-        size, level = size // 2, level + 1
-        layers = {
-            k: (*stack, *b.centres(sheet, k, (0, 0, sheet.resolution, sheet.resolution), level))
-            for k, stack in stacks.items()
-        }
-        for k, one in enumerate(maps):
-            found[k].append(b.compose(sheet, one, layers, size))
-    return found

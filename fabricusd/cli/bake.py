@@ -50,6 +50,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FORM",
         help="also the fabrics' BTF: ubo, ubo-joint, factored, atlas",
     )
+    parser.add_argument(
+        "--format",
+        default="exr",
+        choices=("exr", "png", "tiff"),
+        help="EXR with half floats and mip levels; PNG and TIFF hold 16-bit integers",
+    )
     parser.add_argument("--resume", action="store_true", help="go on with a bake that was stopped")
     parser.add_argument("--workers", type=int, metavar="N", help="default: all processors")
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
@@ -85,6 +91,7 @@ def run(options: argparse.Namespace) -> int:
         unwrap=options.unwrap or "",
         max_error=_positive(options.max_error),
         btf=tuple(options.btf or ()),
+        file_format=options.format,
     )
     if options.dry_run:
         for line in plan(options.scene, settings, fabric=options.fabric, mesh=options.mesh):

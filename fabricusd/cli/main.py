@@ -22,6 +22,7 @@ COMMANDS = {
     "cat": "say what a fabric is, in a weaver's words, and draw its draft",
     "check": "find faults in fabrics, threads and bindings",
     "bake": "make textures of a fabric on a garment",
+    "material": "write the materials of a bake for USD and MaterialX",
     "render": "path-trace a scene for look-dev review",
     "compare": "measure how far one picture is from another",
     "plugin-path": "print the folder that PXR_PLUGINPATH_NAME needs",

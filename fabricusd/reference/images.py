@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,10 +40,16 @@ def write_exr(
     _write(path, spec, data)
 
 
-def write_png(path: str | os.PathLike[str], pixels: NDArray[np.uint8]) -> None:
-    """(h, w, 3) uint8 sRGB code values to a PNG, whole or not at all."""
-    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], oiio.UINT8)
-    spec.attribute("oiio:ColorSpace", "sRGB")
+def write_png(
+    path: str | os.PathLike[str],
+    pixels: NDArray[np.uint8] | NDArray[np.uint16],
+    *,
+    color_space: str = "sRGB",
+) -> None:
+    """(h, w, c) uint8 or uint16 code values to a PNG, whole or not at all; "raw" for data."""
+    kind = oiio.UINT16 if pixels.dtype == np.uint16 else oiio.UINT8
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind)
+    spec.attribute("oiio:ColorSpace", color_space)
     _write(path, spec, np.ascontiguousarray(pixels))
 
 
@@ -148,9 +154,74 @@ def write_mip_exr(
             raise FabricError(str(path), f"cannot be written: {' '.join(str(reason).split())}")
 
 
+def write_16_bit(
+    path: str | os.PathLike[str],
+    bands: Iterable[NDArray[np.uint16]],
+    size: int,
+    channels: int,
+    metadata: Mapping[str, Any],
+) -> None:
+    """A square PNG or TIFF of 16-bit numbers, by the path's suffix, written band by band.
+
+    bands : rows from the top, (rows, size, channels); a third channel of 0 is added to two, which
+        both formats would take for a grey and its opacity
+
+    Written whole or not at all; `FabricError` where it cannot.
+    """
+    kept = 3 if channels == 2 else channels
+    with whole_file(path) as temporary:
+        output: Any = oiio.ImageOutput.create(str(temporary))
+        spec = oiio.ImageSpec(size, size, kept, oiio.UINT16)
+        spec.channelnames = ("Y",) if kept == 1 else ("R", "G", "B", "A")[:kept]
+        # The fourth channel is data: nothing is to be divided by it.
+        spec.attribute("oiio:UnassociatedAlpha", 1)
+        spec.attribute("compression", "zip")
+        spec.attribute("DateTime", "1970:01:01 00:00:00")
+        for key, value in metadata.items():
+            spec.attribute(key, value)
+        good = output is not None and output.open(str(temporary), spec)
+        row = 0
+        for band in bands if good else ():
+            pixels = np.zeros((*band.shape[:2], kept), np.uint16)
+            pixels[..., :channels] = band
+            good = good and output.write_scanlines(row, row + len(band), 0, pixels)
+            row += len(band)
+        good = good and output.close()
+        reason = output.geterror() if output is not None else "no writer"
+        del output
+        if not good:
+            raise FabricError(str(path), f"cannot be written: {' '.join(str(reason).split())}")
+
+
 def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.float32]:
     """(h, w, c) float32 pixels of one mip level, values as they are in the file."""
-    buffer = oiio.ImageBuf(str(readable_file(path)), 0, level)
+    plain = oiio.ImageSpec()
+    # A fourth channel is data: nothing is to be multiplied by it.
+    plain.attribute("oiio:UnassociatedAlpha", 1)
+    buffer = oiio.ImageBuf(str(readable_file(path)), 0, level, plain)
     if buffer.has_error or level >= max(buffer.nmiplevels, 1):
         raise FabricError(str(path), f"has no level {level}: {buffer.geterror()}")
     return np.asarray(buffer.get_pixels(oiio.FLOAT), np.float32)
+
+
+def read_middle(path: str | os.PathLike[str], most: int) -> NDArray[np.float32]:
+    """(h, w, c) float32 middle of a square texture, at most `most` a side.
+
+    most : a multiple of 64; no other tile is read where there are tiles
+    """
+    source: Any = oiio.ImageInput.open(str(readable_file(path)))
+    if source is None:
+        raise FabricError(str(path), f"cannot be read: {oiio.geterror()}")
+    side = source.spec().width
+    size = min(side, most)
+    begin = (side - size) // 2 // 64 * 64
+    end = begin + size
+    channels = source.spec().nchannels
+    if source.spec().tile_width:
+        pixels = source.read_tiles(begin, end, begin, end, 0, 1, 0, channels, oiio.FLOAT)
+    else:
+        pixels = source.read_scanlines(begin, end, 0, 0, channels, oiio.FLOAT)
+        pixels = pixels if pixels is None else pixels[:, begin:end]
+    if pixels is None:
+        raise FabricError(str(path), f"cannot be read: {source.geterror()}")
+    return np.asarray(pixels, np.float32).reshape(size, size, -1)

@@ -13,7 +13,7 @@ register()
 from fabricusd.schema.check import Finding, check  # noqa: E402
 from fabricusd.schema.read import load, read_binding, read_fabric  # noqa: E402
 from fabricusd.schema.source import find_fabric, open_stage, preset_names  # noqa: E402
-from fabricusd.schema.write import save, write_binding, write_fabric  # noqa: E402
+from fabricusd.schema.write import save, save_all, write_binding, write_fabric  # noqa: E402
 
 __all__ = [
     "PLUGIN_PATH",
@@ -26,6 +26,7 @@ __all__ = [
     "read_binding",
     "read_fabric",
     "save",
+    "save_all",
     "write_binding",
     "write_fabric",
 ]

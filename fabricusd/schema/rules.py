@@ -386,7 +386,10 @@ def threads_per_unit_both(prim: Usd.Prim) -> Iterator[Fault]:
 @rule(severity="warning")
 def binding_api_applied(prim: Usd.Prim) -> Iterator[Fault]:
     """A prim with a fabric:binding relationship has FabricBindingAPI applied."""
-    if prim.HasRelationship("fabric:binding") and not prim.HasAPI("FabricBindingAPI"):
+    relationship = prim.GetRelationship("fabric:binding")
+    # A stronger layer unbinds a fabric by leaving no target.
+    bound = relationship and (relationship.GetTargets() or not relationship.HasAuthoredTargets())
+    if bound and not prim.HasAPI("FabricBindingAPI"):
         yield "fabric:binding", "is authored, but FabricBindingAPI is not in the prim's apiSchemas"
 
 

@@ -19,10 +19,20 @@ EXTENSIONS = (".usda", ".usdc", ".usd")
 
 def save(fabric: Fabric, path: str | os.PathLike[str], *, clobber: bool = True) -> None:
     """Write a fabric as the default prim of a new layer, whole or not at all."""
+    save_all([fabric], path, clobber=clobber)
+
+
+def save_all(
+    fabrics: Sequence[Fabric], path: str | os.PathLike[str], *, clobber: bool = True
+) -> None:
+    """Write fabrics as root prims of a new layer, the first as its default prim.
+
+    Of several with one name the first is written.
+    """
     target = os.fspath(path)
     if not target.endswith(EXTENSIONS):
         raise FabricError(target, f"has another suffix than {', '.join(EXTENSIONS)}")
-    layer = _layer(fabric)
+    layer = _layer(fabrics)
     with whole_file(target, clobber=clobber) as temporary:
         try:
             layer.Export(str(temporary))
@@ -32,14 +42,18 @@ def save(fabric: Fabric, path: str | os.PathLike[str], *, clobber: bool = True) 
 
 def usd_text(fabric: Fabric) -> str:
     """What `save` writes into a .usda file."""
-    return str(_layer(fabric).ExportToString())
+    return str(_layer([fabric]).ExportToString())
 
 
-def _layer(fabric: Fabric) -> Sdf.Layer:
+def _layer(fabrics: Sequence[Fabric]) -> Sdf.Layer:
     layer = Sdf.Layer.CreateAnonymous(".usda")
     stage = Usd.Stage.Open(layer)
-    path = Sdf.Path.absoluteRootPath.AppendChild(prim_name(fabric.name))
-    stage.SetDefaultPrim(write_fabric(stage, path, fabric))
+    for fabric in fabrics:
+        path = Sdf.Path.absoluteRootPath.AppendChild(prim_name(fabric.name))
+        if not stage.GetPrimAtPath(path):
+            prim = write_fabric(stage, path, fabric)
+            if not stage.HasDefaultPrim():
+                stage.SetDefaultPrim(prim)
     # No geometry here, but USD's own validators ask every layer for both.
     stage.SetMetadata("upAxis", "Y")
     stage.SetMetadata("metersPerUnit", 0.01)

@@ -158,7 +158,9 @@ def test_drawing_by_the_lobes_leaves_less_variance_than_uniform_directions(name,
     fabric = with_model(PRESETS[name], model)
     views = [*VIEWS.values(), direction(75, 0), direction(25, 300)]
     places = PLACES[:1] if level == "far" else PLACES[:3]
-    found = [relative_variance(fabric, level, wo, uv) for wo in views for uv in places]
+    # At `thread` a view's variance may lie in a few directions out of ten thousand.
+    count = 30_000 if level == "thread" else 3_000
+    found = [relative_variance(fabric, level, wo, uv, count) for wo in views for uv in places]
     even, drawn = np.mean(found, axis=0)
     assert drawn <= largest_variance(name, model, level) * even
 

@@ -10,15 +10,16 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from bake.meshes import write_quad
 
-from fabricusd.bake import assemble
+from fabricusd.bake import assemble, cell_table, kept
 from fabricusd.bake import bake as module
 from fabricusd.bake.bake import Settings, bake, plan
-from fabricusd.bake.relight import BakedSet
+from fabricusd.bake.relight import RELIT, BakedSet, best_choice
 from fabricusd.bake.scratch import Scratch
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
@@ -96,7 +97,7 @@ def test_a_set_is_relit_from_its_folder(square, linen, tmp_path):
 
 def test_a_stopped_bake_goes_on_and_ends_bit_identical(whole, square, linen, tmp_path, monkeypatch):
     written = []
-    original = module.b.write_block
+    original = kept.write_block
 
     def failing(path, *rest):
         if len(written) == 2:
@@ -104,13 +105,13 @@ def test_a_stopped_bake_goes_on_and_ends_bit_identical(whole, square, linen, tmp
         written.append(path)
         original(path, *rest)
 
-    monkeypatch.setattr(module.b, "write_block", failing)
+    monkeypatch.setattr(kept, "write_block", failing)
     with pytest.raises(FabricError, match="No space left"):
         bake(square, tmp_path, SMALL, fabric=linen, workers=1)
     assert not list(tmp_path.glob("*.exr"))
     again = []
     monkeypatch.setattr(
-        module.b, "write_block", lambda path, *rest: (again.append(path), original(path, *rest))
+        kept, "write_block", lambda path, *rest: (again.append(path), original(path, *rest))
     )
     bake(square, tmp_path, SMALL, fabric=linen, resume=True)
     assert len(again) == 2
@@ -129,6 +130,20 @@ def test_a_block_that_was_damaged_is_made_again(whole, square, linen, tmp_path, 
     block.write_bytes(block.read_bytes()[:-1000])
     bake(square, tmp_path, SMALL, fabric=linen, resume=True)
     assert sums(tmp_path) == sums(whole.folder)
+
+
+def test_maps_of_sheets_without_tables_are_kept_in_blocks(square, linen, tmp_path, monkeypatch):
+    """The way of cloths whose repeat is too large for a table; it ends in the same layout."""
+    monkeypatch.setattr(cell_table, "MOST_PHASES", 0)
+    result = bake(square, tmp_path / "a", SMALL, fabric=linen)
+    again = bake(square, tmp_path / "b", SMALL, fabric=linen, workers=1)
+    assert sums(again.folder) == sums(result.folder)
+    name = result.files[result.garments[0].name]
+    monkeypatch.undo()
+    looked_up = bake(square, tmp_path / "c", SMALL, fabric=linen)
+    for texture in MAPS:
+        a, c = (read_mip_level(r.folder / name[texture][1001], 2) for r in (result, looked_up))
+        assert np.abs(a - c).mean() < 0.02
 
 
 def test_another_job_does_not_resume(square, linen, tmp_path):
@@ -218,7 +233,7 @@ def test_a_folder_that_is_a_file_or_not_ours_is_refused(square, linen, tmp_path)
 
 
 def test_a_disk_that_is_too_small_is_refused_before_the_work(square, linen, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "bytes_needed", lambda *_: 10**18)
+    monkeypatch.setattr(module.shutil, "disk_usage", lambda _: SimpleNamespace(free=1000))
     with pytest.raises(FabricError, match="GB left; the bake needs"):
         bake(square, tmp_path, SMALL, fabric=linen)
 
@@ -243,11 +258,65 @@ def test_few_texels_per_thread_are_said_and_prefiltered(square, tmp_path):
     assert np.ptp(read_mip_level(result.folder / name)) == 0.0
 
 
-def test_an_error_asked_for_chooses_the_resolution(square, linen, tmp_path):
-    settings = Settings(resolution=1024, maps=("opacity",), max_error=6.0)
-    result = bake(square, tmp_path, settings, fabric=linen)
-    assert 64 <= result.resolution <= 1024
-    assert result.reached(6.0)
+def test_an_error_asked_for_chooses_the_resolution_and_the_maps(square, linen, tmp_path):
+    """Texels, and maps to re-light, are the fewest that are within it: all cheaper ones are not."""
+    result = bake(square, tmp_path, Settings(resolution=512, max_error=11.0), fabric=linen)
+    assert result.reached(11.0)
+    names = tuple(one.name for one in result.maps)
+    chosen = best_choice(names)
+    assert chosen in RELIT[:-1]
+    assert "weft_spread" not in names
+    assert "base_color" in names
+    best = next(t for t in result.tried if (t.resolution, t.maps) == (result.resolution, chosen))
+    cheaper = [t for t in result.tried if t.megabytes < best.megabytes]
+    assert len(cheaper) >= 6
+    assert all(t.point > 11.0 >= best.point for t in cheaper)
+    picture = BakedSet.load(tmp_path).relight("square_obj", [linen.fabric], (0, 0, 1), (0, 0, 1))
+    assert picture.mean() > 0.01
+
+
+@pytest.mark.parametrize("file_format", ["png", "tiff"])
+def test_16_bit_files_hold_the_values_of_the_exr(square, linen, tmp_path, file_format):
+    """To half a step of 16 bits, ids exactly, four channels as they are."""
+    maps = (
+        "thread_id", "weave_coordinate", "albedo", "normal", "height", "opacity", "weft_share",
+        "weft_angle",
+    )  # fmt: skip
+    of = {
+        f: bake(
+            square, tmp_path / f, Settings(resolution=64, maps=maps, file_format=f), fabric=linen
+        )
+        for f in ("exr", file_format)
+    }
+    exr, other = (BakedSet.load(tmp_path / f) for f in of)
+    for name in maps:
+        a, c = exr.read("square_obj", name), other.read("square_obj", name)
+        said = other.manifest["garments"]["square_obj"]["files"][name]["1001"]["encoding"]
+        steepest = 2.3 if said["transfer"] == "srgb" else 1.0
+        limit = 0.0 if name == "thread_id" else 0.5001 * steepest * said["scale"] / 65535 + 1e-7
+        assert np.abs(a - c).max() <= limit, name
+    assert other.manifest["maps"]["albedo"]["color_space"] == "srgb_texture"
+    with pytest.raises(FabricError, match="no level 1"):
+        other.read("square_obj", "normal", 1)
+    with pytest.raises(FabricError, match="must be one of exr"):
+        bake(square, tmp_path / "jpg", Settings(file_format="jpg"), fabric=linen)
+
+
+def test_the_error_of_each_map_is_stated(square, linen, tmp_path):
+    """Half floats lose hardly anything, a texel's size a lot, and more texels less."""
+    errors = {}
+    for resolution in (128, 512):
+        folder = tmp_path / str(resolution)
+        bake(square, folder, Settings(resolution=resolution), fabric=linen)
+        said = json.loads((folder / "manifest.json").read_text())["garments"]["square_obj"]
+        errors[resolution] = said["map_error"]
+    for name in ("albedo", "normal", "height", "opacity", "horizon_00", "weft_angle"):
+        coarse, fine = errors[128][name], errors[512][name]
+        assert coarse["rounding"] < 0.02 * coarse["spread"]
+        assert fine["texel"] < 0.15 * fine["spread"]
+        assert fine["point"] < 0.8 * coarse["point"]
+    assert errors[512]["thread_id"]["texel"] == 0.0
+    assert errors[512]["normal"]["unit"] == "degrees"
 
 
 def test_the_command_says_when_a_bound_is_not_reached(square, tmp_path, capsys):

@@ -11,7 +11,7 @@ from pxr import Usd, UsdGeom
 
 from fabricusd.bake.bake import Settings, bake
 from fabricusd.bake.garment import garments, tiles_of
-from fabricusd.bake.layer import write_mesh_layer
+from fabricusd.bake.mesh_layer import write_mesh_layer
 from fabricusd.bake.overlaps import refuse_overlaps
 from fabricusd.bake.tangents import corner_tangents
 from fabricusd.bake.unwrap import unwrapped

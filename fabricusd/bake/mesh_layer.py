@@ -40,6 +40,11 @@ def write_mesh_layer(path: str | os.PathLike[str], garment: Garment, up_axis: st
         _primvar(primvars, "normals", types.Normal3fArray, Vt.Vec3fArray, garment.normals)
         tangents = corner_tangents(garment)
         _primvar(primvars, "tangents", types.Float4Array, Vt.Vec4fArray, tangents)
+        for k, lay in enumerate(garment.lays if len(garment.lays) > 1 else ()):
+            faces = Vt.IntArray.FromNumpy(np.flatnonzero(garment.lay == k).astype(np.int32))
+            UsdGeom.Subset.CreateGeomSubset(
+                mesh, f"lay_{k}", UsdGeom.Tokens.face, faces, "materialBind", "partition"
+            ).GetPrim().SetDocumentation(lay.fabric.name)
         layer.Export(str(temporary))
 
 

@@ -1,0 +1,52 @@
+"""`fabricusd material`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+EPILOG = """example:
+  fabricusd material baked
+  fabricusd material baked --scene coat.usda -o coat_look.usda --surface openpbr gltf_pbr
+  fabricusd material baked --usdz coat.usdz --u3m coat.u3m"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which bake, over what, as which surfaces."""
+    parser.add_argument("bake", metavar="DIR", help="folder that 'fabricusd bake' made")
+    parser.add_argument(
+        "--scene", metavar="SCENE", help="put the look over this USD scene, which was baked"
+    )
+    parser.add_argument("-o", "--output", metavar="LOOK", help="layer (default: DIR/look.usda)")
+    parser.add_argument(
+        "--surface",
+        nargs="+",
+        default=["openpbr"],
+        metavar="NAME",
+        help="openpbr, standard_surface, gltf_pbr; USD takes the first",
+    )
+    parser.add_argument("--no-fit", action="store_true", help="leave the textures as they are")
+    parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
+    parser.add_argument("--no-clobber", action="store_true", help="never overwrite a look")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the look; print the names of the files."""
+    from fabricusd.preview.materials import write_materials
+    from fabricusd.preview.recipes import Settings
+
+    def say(line: str) -> None:
+        print(f"fabricusd: {line}", file=sys.stderr)
+
+    made = write_materials(
+        options.bake, options.output,
+        Settings(surfaces=tuple(options.surface), fitted=not options.no_fit),
+        scene=options.scene, clobber=not options.no_clobber, dry_run=options.dry_run,
+        progress=say if options.verbose else None,
+    )  # fmt: skip
+    for path in made.files:
+        print(path)
+    if not options.quiet:
+        for note in made.notes:
+            say(note)
+    return 1 if made.notes else 0

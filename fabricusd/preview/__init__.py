@@ -1,0 +1,1 @@
+"""Baked fabrics for other tools: USD looks, MaterialX documents, U3M, OSL, Blender."""

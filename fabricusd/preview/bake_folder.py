@@ -1,0 +1,159 @@
+"""A bake folder as its manifest describes it: which textures, of which garment, in which place."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+from fabricusd.files import readable_file
+
+FABRICS = "fabrics.usda"
+"""Layer in the folder that holds the fabrics that were baked, one prim each."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BakedLay:
+    """A fabric on a garment: threads = matrix @ uv + offset.
+
+    fabric : the fabric, None where the folder does not hold it and no preset has its name
+    """
+
+    name: str
+    fabric: Fabric | None
+    matrix: NDArray[np.float64]
+    offset: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MapSet:
+    """The textures of one garment.
+
+    textures : map -> UDIM number -> file; only those that exist
+    missing : files that the manifest names and the folder lacks
+    prims : paths in the scene that was baked
+    own_uv : False where the textures are not in the scene's own UVs
+    udim : whether the textures are UDIM tiles
+    """
+
+    folder: Path
+    name: str
+    textures: dict[str, dict[int, Path]]
+    missing: tuple[str, ...]
+    mesh: Path
+    prims: tuple[str, ...]
+    lays: tuple[BakedLay, ...]
+    own_uv: bool
+    udim: bool
+    error: dict[str, float]
+    fingerprint: str
+
+    def pattern(self, texture: str) -> Path | None:
+        """The file of a map, `<UDIM>` standing for the tile; None where it is not there."""
+        files = self.textures.get(texture)
+        if not files:
+            return None
+        number, path = next(iter(files.items()))
+        if not self.udim:
+            return path
+        return path.with_name(path.name.replace(f".{number}.", ".<UDIM>."))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BakeFolder:
+    """All garments of a bake, and the settings it was made with."""
+
+    path: Path
+    garments: tuple[MapSet, ...]
+    scene: str
+    settings: dict[str, Any]
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of all files that the manifest names and the folder lacks."""
+        return tuple(name for one in self.garments for name in one.missing)
+
+
+def read_bake_folder(path: str | os.PathLike[str]) -> BakeFolder:
+    """The bake in a folder, wherever the folder is now. `FabricError` where there is none."""
+    folder = Path(path)
+    if folder.name == "manifest.json":
+        folder = folder.parent
+    if not folder.is_dir():
+        raise FabricError(str(folder), "is no folder; it must be one that 'fabricusd bake' made")
+    source = folder / "manifest.json"
+    if not source.exists():
+        raise FabricError(str(folder), "has no manifest.json; 'fabricusd bake' must finish first")
+    try:
+        said = json.loads(readable_file(source).read_text("utf-8"))
+        return _read(folder, said)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        if isinstance(error, FabricError):
+            raise
+        raise FabricError(
+            str(source), f"is no manifest of a bake ({type(error).__name__}: {error}); bake again"
+        ) from error
+
+
+def _read(folder: Path, said: dict[str, Any]) -> BakeFolder:
+    udim = bool(said["settings"]["udim"])
+    known: dict[str, Fabric | None] = {}
+    garments = tuple(
+        _garment(folder, name, one, udim, known) for name, one in said["garments"].items()
+    )
+    if not garments:
+        raise FabricError(str(folder / "manifest.json"), "names no garment; bake again")
+    return BakeFolder(
+        path=folder, garments=garments, scene=said["scene"]["file"], settings=said["settings"]
+    )
+
+
+def _garment(
+    folder: Path, name: str, said: dict[str, Any], udim: bool, known: dict[str, Fabric | None]
+) -> MapSet:
+    textures: dict[str, dict[int, Path]] = {}
+    missing = []
+    for texture, tiles in said["files"].items():
+        for number, record in tiles.items():
+            path = folder / record["file"]
+            if path.is_file():
+                textures.setdefault(texture, {})[int(number)] = path
+            else:
+                missing.append(record["file"])
+    if not (folder / said["mesh"]).is_file():
+        missing.append(said["mesh"])
+    lays = []
+    for lay in said["lays"]:
+        if lay["fabric"] not in known:
+            known[lay["fabric"]] = _fabric(folder, lay["fabric"])
+        lays.append(
+            BakedLay(
+                name=lay["fabric"],
+                fabric=known[lay["fabric"]],
+                matrix=np.array(lay["threads_per_uv"], np.float64),
+                offset=np.array(lay["offset"], np.float64),
+            )
+        )
+    return MapSet(
+        folder=folder, name=name, textures=textures, missing=tuple(missing),
+        mesh=folder / said["mesh"], prims=tuple(said["prims"]), lays=tuple(lays),
+        own_uv=bool(said["uv_of_the_scene"]), udim=udim, error=said["error"],
+        fingerprint=said["fingerprint"],
+    )  # fmt: skip
+
+
+def _fabric(folder: Path, name: str) -> Fabric | None:
+    """The fabric of that name as it was baked, or else the preset; None where there is neither."""
+    from fabricusd.schema import load, preset_names
+
+    source = folder / FABRICS
+    if source.is_file():
+        return load(f"{source}:/{name}")
+    return load(name) if name in preset_names() else None

@@ -1,0 +1,33 @@
+"""What a material adds to its textures: the factors and constants that a fit finds."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """Parameters of one surface model over one set of textures.
+
+    base_color_scale : (3,) factor on map `base_color`
+    specular_ior : of the reflecting layer; a fit, not the thread's: threads reflect more than a
+        smooth dielectric
+    specular_tint : (3,) factor on the reflection
+    smooth_scale, rough_scale : factors on maps `roughness_along` and `roughness_across`, whose
+        squares are microfacet alphas
+    fuzz_weight, fuzz_roughness, fuzz_color (3,) : the layer on top
+    """
+
+    base_color_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    specular_ior: float = 1.5
+    specular_tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    smooth_scale: float = 1.0
+    rough_scale: float = 1.0
+    fuzz_weight: float = 0.0
+    fuzz_color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    fuzz_roughness: float = 0.5
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)

@@ -1,0 +1,113 @@
+"""From a bake folder to the materials that other tools read."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from pxr import Sdf, Tf, Usd, UsdGeom
+
+from fabricusd import __version__
+from fabricusd.bake.manifest import write_json
+from fabricusd.errors import FabricError
+from fabricusd.preview.bake_folder import BakeFolder, read_bake_folder
+from fabricusd.preview.layer import write_baked_look, write_scene_look
+from fabricusd.preview.mtlx import write_mtlx
+from fabricusd.preview.paths import asset_path
+from fabricusd.preview.recipes import Progress, Settings, Written, recipes
+from fabricusd.preview.surfaces import GRAPHS
+from fabricusd.preview.wearers import find_wearers
+
+
+def write_materials(
+    bake: str | os.PathLike[str],
+    out: str | os.PathLike[str] | None = None,
+    settings: Settings | None = None,
+    *,
+    scene: str | os.PathLike[str] | None = None,
+    clobber: bool = True,
+    dry_run: bool = False,
+    progress: Progress | None = None,
+) -> Written:
+    """Write a look for a bake: a USD layer, the MaterialX document beside it, and a report.
+
+    bake : the folder that `fabricusd bake` made; it is only read
+    out : the layer, by default `look.usda` in that folder
+    scene : USD scene that was baked, to write the look over its prims; without it the look goes
+        over the baked meshes
+
+    Raises FabricError for a folder without a bake, a layer that fabricusd did not write and would
+    overwrite, a scene that was not baked.
+    """
+    settings = settings or Settings()
+    unknown = [s for s in settings.surfaces if s not in GRAPHS]
+    if unknown:
+        raise FabricError(
+            f"surface '{unknown[0]}'", f"is unknown; it must be of {', '.join(GRAPHS)}"
+        )
+    folder = read_bake_folder(bake)
+    path = Path(out) if out is not None else folder.path / "look.usda"
+    _check_target(path, clobber)
+    made = Written()
+    for name in folder.missing:
+        made.notes.append(f"{folder.path / name} is missing; a constant stands in for it")
+    dressed = find_wearers(Path(scene), folder.garments) if scene is not None else None
+    made.notes += dressed.notes if dressed else ()
+    if dry_run:
+        made.files = [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
+        return made
+    made_of, documents = recipes(folder, path, settings, made, progress)
+    custom = {
+        "version": __version__,
+        "bake": asset_path(folder.path / "manifest.json", path.parent),
+    }
+    if dressed is not None:
+        assert scene is not None
+        write_scene_look(path, Path(scene), dressed, made_of, custom)
+        if dressed.uv:
+            made.files.append(path.with_suffix(".uv.usdc"))
+    else:
+        write_baked_look(path, folder.garments, made_of, custom, _up_axis(folder))
+    write_mtlx(path.with_suffix(".mtlx"), documents)
+    write_json(path.with_suffix(".json"), _report(made))
+    made.files += [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
+    return made
+
+
+def _check_target(path: Path, clobber: bool) -> None:
+    """Refuse to overwrite what fabricusd did not write."""
+    if path.suffix not in (".usda", ".usd", ".usdc"):
+        raise FabricError(str(path), "is no USD layer's name; it must end in .usda, .usdc or .usd")
+    if not path.parent.is_dir():
+        raise FabricError(str(path), f"is in '{path.parent}', which is no directory; make it first")
+    if not path.exists():
+        return
+    if not clobber:
+        raise FabricError(str(path), "exists; it must be a new name with --no-clobber")
+    try:
+        layer = Sdf.Layer.FindOrOpen(str(path))
+    except Tf.ErrorException:
+        layer = None
+    if layer is None or "fabricusd" not in (layer.customLayerData or {}):
+        raise FabricError(
+            str(path), "is a file that fabricusd did not write; it must be another name"
+        )
+
+
+def _up_axis(folder: BakeFolder) -> str:
+    for one in folder.garments:
+        if one.mesh.is_file():
+            return str(UsdGeom.GetStageUpAxis(Usd.Stage.Open(str(one.mesh))))
+    raise FabricError(str(folder.path), "has none of its meshes; name the scene with --scene")
+
+
+def _report(made: Written) -> dict[str, Any]:
+    return {
+        "fabricusd": __version__,
+        "fits": {
+            where: {kind: one.as_dict() for kind, one in fits.items()}
+            for where, fits in made.fits.items()
+        },
+        "notes": made.notes,
+    }

@@ -1,0 +1,188 @@
+"""NumPy evaluation of the standard surfaces that fabrics are fitted with.
+
+Written from the public definitions in MaterialX 1.39 ([MaterialX2024]: `bxdf/*.mtlx` and
+`pbrlib/genglsl`), which is what renderers generate their shaders from: GGX with the smooth-surface
+Fresnel of a dielectric or Schlick's form, height-correlated masking at the mean alpha, Turquin's
+energy compensation, albedo-scaled layering, sheen by [Zeltner2022] or Conty and Kulla.
+
+All directions are in the texel's frame: x along the rougher axis, z the shading normal. Values are
+radiance per unit `L dwi`, cosine included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+SMALLEST = 1e-6
+"""Floor of cosines and alphas, MaterialX's M_FLOAT_EPS."""
+
+KINDS = ("openpbr", "standard_surface", "gltf_pbr", "preview")
+"""Surfaces that can be evaluated; `preview` is UsdPreviewSurface, metallic workflow, metallic 0."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surface:
+    """Parameters, each broadcast against the directions' leading shape.
+
+    base : (..., 3); ior : (...); alpha_rough, alpha_smooth : (...) - GGX widths along x and y
+    tint : (..., 3) factor on the specular reflection; fuzz_weight, fuzz_roughness : (...);
+    fuzz_color : (..., 3)
+    """
+
+    base: Floats
+    ior: Floats
+    alpha_rough: Floats
+    alpha_smooth: Floats
+    tint: Floats
+    fuzz_weight: Floats
+    fuzz_color: Floats
+    fuzz_roughness: Floats
+
+
+def evaluate(kind: str, s: Surface, wi: Floats, wo: Floats) -> Floats:
+    """(..., 3) for unit wi, wo (..., 3); 0 where either is below the shading normal."""
+    above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
+    cos_i = np.clip(wi[..., 2], SMALLEST, 1.0)
+    cos_o = np.clip(wo[..., 2], SMALLEST, 1.0)
+    diffuse = s.base * (cos_i / np.pi)[..., None]
+    spec, under_spec = specular(kind, s, wi, wo, cos_i, cos_o)
+    if kind == "preview":
+        out = spec + under_spec[..., None] * diffuse
+    elif kind == "standard_surface":
+        fuzz, under_fuzz = conty_kulla(s, s.fuzz_roughness, wi, wo, cos_i, cos_o)
+        out = spec + under_spec[..., None] * (fuzz + under_fuzz[..., None] * diffuse)
+    else:
+        if kind == "openpbr":
+            fuzz, under_fuzz = zeltner(s, wi, wo, cos_o)
+        else:
+            fuzz, under_fuzz = conty_kulla(s, s.fuzz_roughness**2, wi, wo, cos_i, cos_o)
+        out = fuzz + under_fuzz[..., None] * (spec + under_spec[..., None] * diffuse)
+    return np.where(above[..., None], out, 0.0)
+
+
+def specular(
+    kind: str, s: Surface, wi: Floats, wo: Floats, cos_i: Floats, cos_o: Floats
+) -> tuple[Floats, Floats]:
+    """(..., 3) GGX reflection, and the share (...) that it leaves to the layer below."""
+    h = wi + wo
+    h = h / np.maximum(np.linalg.norm(h, axis=-1, keepdims=True), SMALLEST)
+    ax = np.clip(s.alpha_rough, SMALLEST, 1.0)
+    ay = np.clip(s.alpha_smooth, SMALLEST, 1.0)
+    mean = np.sqrt(ax * ay)
+    d = 1.0 / (
+        np.pi * ax * ay * ((h[..., 0] / ax) ** 2 + (h[..., 1] / ay) ** 2 + h[..., 2] ** 2) ** 2
+    )
+    a2 = mean * mean
+    lambda_i = np.sqrt(a2 + (1.0 - a2) * cos_i**2)
+    lambda_o = np.sqrt(a2 + (1.0 - a2) * cos_o**2)
+    g = 2.0 * cos_i * cos_o / (lambda_i * cos_o + lambda_o * cos_i)
+    cos_h = np.clip(np.sum(wo * h, axis=-1), SMALLEST, 1.0)
+    f0 = ((s.ior - 1.0) / (s.ior + 1.0)) ** 2
+    if kind in ("openpbr", "standard_surface"):
+        fresnel = dielectric_fresnel(cos_h, s.ior)
+    else:
+        fresnel = f0 + (1.0 - f0) * (1.0 - cos_h) ** 5
+    whole = ggx_albedo(cos_o, mean, 1.0, 1.0)
+    gain = 1.0 + fresnel * (1.0 - whole) / whole
+    albedo = ggx_albedo(cos_o, mean, f0, 1.0) * gain
+    value = d * fresnel * g * gain / (4.0 * cos_o)
+    return value[..., None] * s.tint, 1.0 - albedo
+
+
+def dielectric_fresnel(c: Floats, ior: Floats) -> Floats:
+    """Unpolarised reflectance at cosine c."""
+    g = np.sqrt(np.maximum(ior * ior + c * c - 1.0, 0.0))
+    return np.asarray(
+        0.5 * ((g - c) / (g + c)) ** 2 * (1.0 + (((g + c) * c - 1.0) / ((g - c) * c + 1.0)) ** 2)
+    )
+
+
+_ALBEDO = np.array(
+    [
+        [0.1003, 0.9345, 1.0, 1.0],
+        [-0.6303, -2.323, -1.765, 0.2281],
+        [9.748, 2.229, 8.263, 15.94],
+        [-2.038, -3.748, 11.53, -55.83],
+        [29.34, 1.424, 28.96, 13.08],
+        [-8.245, -0.7684, -7.507, 41.26],
+        [-26.44, 1.436, -36.11, 54.9],
+        [19.99, 0.2913, 15.86, 300.2],
+        [-5.448, 0.6286, 33.37, -285.1],
+    ]
+)
+"""Rational fit of GGX's directional albedo, `mx_ggx_dir_albedo_analytic`."""
+
+
+def ggx_albedo(x: Any, y: Any, f0: Any, f90: Any) -> Floats:
+    """Directional albedo at cosine x and alpha y between the reflectances f0 and f90."""
+    x, y = np.broadcast_arrays(x, y)
+    terms = (np.ones_like(x), x, y, x * y, x * x, y * y, x * x * y, x * y * y, x * x * y * y)
+    r = sum(t[..., None] * row for t, row in zip(terms, _ALBEDO, strict=True))
+    a = np.clip(r[..., 0] / r[..., 2], 0.0, 1.0)
+    b = np.clip(r[..., 1] / r[..., 3], 0.0, 1.0)
+    return np.asarray(f0 * a + f90 * b)
+
+
+def zeltner(s: Surface, wi: Floats, wo: Floats, cos_o: Floats) -> tuple[Floats, Floats]:
+    """Sheen of [Zeltner2022] (..., 3), and the share left below."""
+    x, y = cos_o, np.clip(s.fuzz_roughness, 0.01, 1.0)
+    sigma = y * (0.0206607 + 1.58491 * y) / (0.0379424 + y * (1.32227 + y))
+    m = y * (-0.193854 + y * (-1.14885 + y * (1.7932 - 0.95943 * y * y))) / (0.046391 + y)
+    o = y * (0.000654023 + (-0.0207818 + 0.119681 * y) * y) / (1.26264 + y * (-1.92021 + y))
+    albedo = np.exp(-0.5 * ((x - m) / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi)) + o
+    a = (2.58126 * x + 0.813703 * y) * y / (1.0 + 0.310327 * x * x + 2.60994 * x * y)
+    b = (
+        np.sqrt(1.0 - x)
+        * (y - 1.0)
+        * y**3
+        / (0.0000254053 + 1.71228 * x - 1.71506 * x * y + 1.34174 * y * y)
+    )
+    flat = wo[..., :2]
+    length = np.linalg.norm(flat, axis=-1)
+    unit = np.where(
+        length[..., None] > 1e-9, flat / np.maximum(length, 1e-9)[..., None], [1.0, 0.0]
+    )
+    along = np.sum(wi[..., :2] * unit, axis=-1)
+    across = wi[..., 1] * unit[..., 0] - wi[..., 0] * unit[..., 1]
+    z = wi[..., 2]
+    square = (a * along + b * z) ** 2 + (a * across) ** 2 + z * z
+    value = np.maximum(z, 0.0) / np.pi * (a / square) ** 2
+    share = s.fuzz_weight * albedo
+    return (share * value)[..., None] * s.fuzz_color, 1.0 - share
+
+
+def conty_kulla(
+    s: Surface, roughness: Floats, wi: Floats, wo: Floats, cos_i: Floats, cos_o: Floats
+) -> tuple[Floats, Floats]:
+    """Imageworks' sheen [Conty2017] (..., 3), and the share left below."""
+    h = wi + wo
+    h = h / np.maximum(np.linalg.norm(h, axis=-1, keepdims=True), SMALLEST)
+    inverse = 1.0 / np.maximum(roughness, 0.005)
+    sin2 = np.maximum(1.0 - h[..., 2] ** 2, 0.0)
+    d = (2.0 + inverse) * sin2 ** (0.5 * inverse) / (2.0 * np.pi)
+    value = d / (4.0 * (cos_i + cos_o - cos_i * cos_o)) * cos_i
+    x, y = cos_o, roughness
+    top = (
+        13.673
+        - 68.78018 * x
+        + 799.08825 * y
+        - 905.00061 * x * y
+        + 60.28956 * x * x
+        + 1086.96473 * y * y
+    )
+    low = (
+        1.0
+        + 61.57746 * x
+        + 442.78211 * y
+        + 2597.49308 * x * y
+        + 121.81241 * x * x
+        + 3045.55075 * y * y
+    )
+    albedo = np.clip(top / low, 0.0, 1.0)
+    return (s.fuzz_weight * value)[..., None] * s.fuzz_color, 1.0 - s.fuzz_weight * albedo

@@ -1,0 +1,160 @@
+"""What a bake's materials are made of: textures or constants, networks, fitted parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fabricusd.errors import FabricError
+from fabricusd.preview.bake_folder import BakeFolder, MapSet
+from fabricusd.preview.fit import Fitted, fit
+from fabricusd.preview.graph import Texture, Value
+from fabricusd.preview.layer import MaterialRecipe, Recipes
+from fabricusd.preview.look import Look
+from fabricusd.preview.surfaces import GRAPHS, MAPS, Inputs, parameter_values, preview
+from fabricusd.preview.texels import draw_texels, mean_texel
+from fabricusd.reference.images import read_mip_level, write_png
+from fabricusd.schema.write import prim_name
+
+Progress = Callable[[str], None]
+
+OPAQUE = 0.9995
+"""Mean cover from which a material has no opacity: blending costs renderers dear."""
+
+NEUTRAL = {
+    "base_color": Value("color3", (0.5, 0.5, 0.5)),
+    "roughness_along": Value("float", 0.5),
+    "roughness_across": Value("float", 0.5),
+    "opacity": Value("float", 1.0),
+    "normal": Value("vector3", (0.5, 0.5, 1.0)),
+    "tangent": Value("vector3", (1.0, 0.0, 0.0)),
+}
+"""What stands in for a map that is not there."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What is written.
+
+    surfaces : MaterialX surfaces, names of `surfaces.GRAPHS`; USD takes the first, the document all
+    fitted : whether the parameters are sought; otherwise the textures stand as they are
+    """
+
+    surfaces: tuple[str, ...] = ("openpbr",)
+    fitted: bool = True
+
+
+@dataclass(kw_only=True)
+class Written:
+    """The files that were made, what had to be left out, and the fits."""
+
+    files: list[Path] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    fits: dict[str, dict[str, Fitted]] = field(default_factory=dict)
+
+
+def recipes(
+    folder: BakeFolder, path: Path, settings: Settings, made: Written,
+    progress: Progress | None,
+) -> tuple[Recipes, list[Any]]:  # fmt: skip
+    """The materials of every garment and fabric, and those of the document."""
+    found: dict[tuple[str, int, str], MaterialRecipe] = {}
+    documents = []
+    for maps in folder.garments:
+        textures = texture_inputs(maps, path, made)
+        for number in range(len(maps.lays)):
+            name = prim_name(maps.name if len(maps.lays) == 1 else f"{maps.name}_{number}")
+            looks = _looks(maps, number, settings, made, progress)
+            means = mean_inputs(maps, number)
+            cover = means["opacity"].value
+            assert isinstance(cover, float)
+            opaque = cover > OPAQUE
+            for variant, inputs in (("baked", textures), ("procedural", means)):
+                title = name if variant == "baked" else f"{name}_plain"
+                graphs = {s: GRAPHS[s](inputs, opaque) for s in settings.surfaces}
+                first = settings.surfaces[0]
+                found[maps.name, number, variant] = MaterialRecipe(
+                    name=title,
+                    graphs=(
+                        ("", preview(inputs, looks["preview"], opaque)),
+                        ("", graphs[first]),
+                    ),
+                    parameters=parameter_values(looks[first]),
+                )
+                for surface, graph in graphs.items():
+                    tail = "" if len(graphs) == 1 else f"_{surface}"
+                    documents.append((title + tail, graph, parameter_values(looks[surface])))
+    return found, documents
+
+
+def texture_inputs(maps: MapSet, path: Path, made: Written) -> Inputs:
+    """The textures of a garment, and constants for those that are missing."""
+    found: dict[str, Texture | Value] = {}
+    for name, kind in MAPS.items():
+        pattern = maps.pattern(name)
+        if pattern is not None and name == "normal":
+            pattern = _coded_normals(maps, path, made)
+        found[name] = NEUTRAL[name] if pattern is None else Texture(pattern, kind == "color3")
+    return found
+
+
+def _coded_normals(maps: MapSet, path: Path, made: Written) -> Path:
+    """Normals as 16-bit PNG files beside the layer: readers of normal maps ask for codes."""
+    folder = path.with_name(f"{path.stem}_maps")
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise FabricError(str(folder), f"cannot be made: {error.strerror}; use -o") from error
+    for number, source in maps.textures["normal"].items():
+        target = folder / f"{maps.name}.normal.{number}.png"
+        codes = np.clip(0.5 * read_mip_level(source) + 0.5, 0.0, 1.0)
+        # Texels outside the layout hold no direction; they point straight up.
+        codes[np.all(codes == 0.5, axis=-1)] = (0.5, 0.5, 1.0)
+        write_png(target, np.rint(codes * 65535).astype(np.uint16), color_space="raw")
+        made.files.append(target)
+    return folder / f"{maps.name}.normal.{'<UDIM>' if maps.udim else number}.png"
+
+
+def mean_inputs(maps: MapSet, number: int) -> dict[str, Value]:
+    """One constant for each map: the mean texel of a lay."""
+    texel = mean_texel(maps, number)
+    if "normal" in texel:
+        texel["normal"] = tuple(0.5 * x + 0.5 for x in texel["normal"])
+    return {
+        name: Value(kind, texel[name] if kind != "float" else texel[name][0])
+        if name in texel
+        else NEUTRAL[name]
+        for name, kind in MAPS.items()
+    }
+
+
+def _looks(
+    maps: MapSet, number: int, settings: Settings, made: Written,
+    progress: Progress | None,
+) -> dict[str, Look]:  # fmt: skip
+    """The look for each surface that is written; lays of one fabric and scale share a fit."""
+    lay = maps.lays[number]
+    kinds = ("preview", *settings.surfaces)
+    plain = dict.fromkeys(kinds, Look())
+    if not settings.fitted:
+        return plain
+    if lay.fabric is None:
+        made.notes.append(
+            f"fabric '{lay.name}' is not in the folder; its parameters are not fitted"
+        )
+        return plain
+    texels = draw_texels(maps, number, lay)
+    if texels is None:
+        made.notes.append(f"{maps.name} lacks maps that a fit needs; its parameters are not fitted")
+        return plain
+    found = {}
+    for kind in kinds:
+        if progress:
+            progress(f"fitting {kind} to {lay.name} on {maps.name}")
+        found[kind] = fit(kind, texels, lay.fabric)
+    made.fits[f"{maps.name} {lay.name}"] = found
+    return {kind: one.look for kind, one in found.items()}

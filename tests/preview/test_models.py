@@ -1,0 +1,98 @@
+"""The standard surfaces in NumPy, and the fit to a fabric."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fabricusd.preview.fit import (
+    TexelSample,
+    direction_pairs,
+    fit,
+    forward,
+    hemisphere,
+)
+from fabricusd.preview.look import Look
+from fabricusd.preview.models import KINDS, Surface, evaluate
+from fabricusd.schema import load
+
+
+def white(alpha=(0.3, 0.6), ior=1.5, fuzz=0.0):
+    one = np.ones(1)
+    return Surface(
+        base=np.ones((1, 3)), ior=ior * one, alpha_smooth=alpha[0] * one,
+        alpha_rough=alpha[1] * one, tint=np.ones((1, 3)), fuzz_weight=fuzz * one,
+        fuzz_color=np.ones((1, 3)), fuzz_roughness=0.5 * one,
+    )  # fmt: skip
+
+
+def albedo(kind, surface, view):
+    wi = hemisphere(20000)
+    values = evaluate(kind, surface, wi, np.broadcast_to(view, wi.shape))
+    return values.mean(axis=0) * 2 * np.pi
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("degrees", [0.0, 40.0, 70.0])
+def test_a_white_surface_reflects_nearly_all_light(kind, degrees):
+    angle = np.radians(degrees)
+    view = np.array([np.sin(angle), 0.0, np.cos(angle)])
+    for fuzz in (0.0, 0.7):
+        # The layers' albedos are MaterialX's own rational fits, good to a few per cent.
+        got = albedo(kind, white(fuzz=fuzz, alpha=(0.4, 0.4)), view)
+        assert got == pytest.approx(np.ones(3), abs=0.06)
+
+
+def test_below_the_surface_there_is_nothing():
+    down, up = np.array([[0.0, 0.6, -0.8]]), np.array([[0.0, 0.6, 0.8]])
+    for kind in KINDS:
+        assert not evaluate(kind, white(), down, up).any()
+        assert not evaluate(kind, white(), up, down).any()
+
+
+def test_the_highlight_is_longer_along_the_rougher_axis():
+    view = np.array([[0.0, 0.0, 1.0]])
+    s = np.sin(np.radians(50.0))
+    glossy = replace(white(), base=np.zeros((1, 3)))
+    along = evaluate("openpbr", glossy, np.array([[s, 0, np.sqrt(1 - s * s)]]), view)
+    across = evaluate("openpbr", glossy, np.array([[0, s, np.sqrt(1 - s * s)]]), view)
+    assert (along > across * 1.5).all()
+
+
+def texels(**changes):
+    made = TexelSample(
+        base=np.full((1, 3), 0.4), smooth=np.full(1, 0.6), rough=np.full(1, 0.8),
+        opacity=np.ones(1), normal=np.array([[0.0, 0, 1]]), tangent=np.array([[1.0, 0, 0]]),
+        weight=np.ones(1),
+    )  # fmt: skip
+    return replace(made, **changes)
+
+
+@pytest.mark.parametrize("kind", ["openpbr", "preview"])
+def test_a_fit_returns_the_surface_that_made_the_data(kind, monkeypatch):
+    truth = Look(
+        base_color_scale=(0.5, 0.8, 1.2), specular_ior=2.0, smooth_scale=0.8, rough_scale=1.0
+    )
+    wi, wo = direction_pairs()
+    made = forward(kind, truth, texels(), wi[None], wo[None])
+    monkeypatch.setattr("fabricusd.preview.fit.surface.evaluate", lambda *_, **__: made)
+    found = fit(kind, texels(), load("linen_plain"))
+    assert found.delta_e < 0.3
+    assert found.albedo < 0.01
+    assert found.look.specular_ior == pytest.approx(2.0, abs=0.1)
+    assert found.look.smooth_scale == pytest.approx(0.8, abs=0.05)
+
+
+def test_a_fit_to_cloth_is_nearer_than_the_textures_alone():
+    found = fit("openpbr", texels(base=np.array([[0.05, 0.2, 0.25]])), load("linen_plain"))
+    assert found.delta_e < 0.8 * found.start_delta_e
+    assert found.albedo < 0.2
+
+
+def test_half_the_cover_is_half_the_light():
+    wi, wo = (w[None] for w in direction_pairs())
+    whole = forward("openpbr", Look(), texels(), wi, wo)
+    half = forward("openpbr", Look(), texels(opacity=np.full(1, 0.5)), wi, wo)
+    assert np.allclose(half, 0.5 * whole)
