@@ -27,10 +27,7 @@ KERNEL: dict[str, Any] = {
 # For kernels that allocate no array: numba then does not count references. In a function that hands
 # a compiled fabric on to another, counting its arrays cost five times the work itself.
 LEAN: dict[str, Any] = {**KERNEL, "_nrt": False}
-# Only kernels call these; without wrappers for Python an eighth of the compilation is saved.
-INLINE: dict[str, Any] = {
-    **LEAN, "forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True,
-}  # fmt: skip
+INLINE: dict[str, Any] = {**LEAN, "forceinline": True}
 # Only fused multiply-add here: reordering would undo the two-part reductions below.
 _EXACT: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "forceinline": True}
 _inner = register_jitable(**_EXACT)
