@@ -47,6 +47,8 @@ bench: $(STAMP)  ## Run the benchmarks; figures go to stdout.
 
 docs: $(STAMP)  ## Remake every figure and table in docs/.
 	for script in docs/make_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+	$(BIN)/fabricusd chart -o docs/images/charts --page docs/charts.md
+	$(BIN)/fabricusd chart -o docs/images/charts --stability docs/stability.md
 
 # Blender brings its own numpy and needs one version of Python: see `pip index versions bpy`.
 BLENDER_PYTHON ?= python3.11

@@ -16,6 +16,7 @@ from typing import Any
 
 from fabricusd.errors import FabricError
 from fabricusd.files import readable_file, whole_file
+from fabricusd.reference.scene import FabricSurface, Scene
 
 TABLE = Path(__file__).with_name("choice.json")
 
@@ -83,6 +84,15 @@ def choose_shadow(names: Sequence[str], max_error: float, path: Path = TABLE) ->
     table = read_table(path)
     choices = [cheapest(front_of(name, table), max_error) for name in names or ("",)]
     return max(choices, key=lambda c: c.cost)
+
+
+def presets_in(scene: Scene) -> tuple[str, ...]:
+    """A name for each fabric in a scene: its own where it is that preset unchanged, else ""."""
+    from fabricusd.schema import load, preset_names
+
+    presets = preset_names()
+    fabrics = [m.binding.fabric for m in scene.materials if isinstance(m, FabricSurface)]
+    return tuple(f.name if f.name in presets and f == load(f.name) else "" for f in fabrics)
 
 
 def write_table(path: Path, quick: bool = True) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import fabricusd
+from fabricusd.chart.choice import cheapest, read_table
 from fabricusd.chart.panel import Panel, Row, relative_costs
 from fabricusd.files import whole_file
 
@@ -68,6 +69,7 @@ def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: st
             f"![{panel.title}]({images}{name}.png)\n",
             *_tables(rows),
         ]
+    parts += ["## What --max-error takes\n", *_choices()]
     if sheets:
         parts.append("## The thesis's pictures\n")
     for name, about in sheets.items():
@@ -98,6 +100,31 @@ def _tables(rows: Sequence[Row]) -> list[str]:
         lines += [f"- {group}: {'; '.join(methods)}" for group, methods in beaten.items()]
         lines.append("\n</details>\n")
     return lines
+
+
+BOUNDS = (1.0, 0.5, 0.3, 0.1, 0.05, 0.01)
+
+
+def _choices() -> list[str]:
+    """The shadowing that each preset gets at some bounds, from the table that is in use."""
+    table = read_table()
+    lines = [
+        "The shadowing that `fabricusd render --max-error` chooses: the cheapest whose error is "
+        "within the bound, else the nearest (*). In brackets cost over the cheapest method's, and "
+        "error. `fabricusd chart --choice fabricusd/chart/choice.json` remakes the table; "
+        "`render -n` says what would be chosen, and why.\n",
+        "| preset | " + " | ".join(f"{b:g}" for b in BOUNDS) + " |",
+        "|---|" + "---|" * len(BOUNDS),
+    ]
+    for name, front in table.items():
+        least = min(cost for cost, _ in front.values())
+        cells = []
+        for bound in BOUNDS:
+            c = cheapest(front, bound)
+            star = "*" if c.error > bound else ""
+            cells.append(f"{c.method}{star} ({number(c.cost / least)}×, {number(c.error)})")
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    return [*lines, ""]
 
 
 def number(x: float) -> str:

@@ -6,8 +6,12 @@ import argparse
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fabricusd.errors import FabricError
+
+if TYPE_CHECKING:
+    from fabricusd.fabric import Fabric
 
 EPILOG = """SCENE is .usd, .usda, .usdc or .usdz, or with --fabric an .obj, .glb or .ply
 
@@ -36,7 +40,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-bounces", type=int, default=4, metavar="N")
     parser.add_argument("--level", choices=("auto", "far", "weave", "thread"), default="auto")
     parser.add_argument(
-        "--shadow", choices=("none", "peak", "horizon", "traced"), default="horizon"
+        "--shadow", choices=("none", "peak", "horizon", "traced"), help="default: horizon"
+    )
+    parser.add_argument(
+        "--max-error", type=float, metavar="E", help="choose --shadow, and --noise, by this bound"
     )
     parser.add_argument("--aov", action="append", default=[], metavar="LAYER", help="or 'all'")
     parser.add_argument("--frames", metavar="A-B", help="time codes: 7, 1-10, 1-10x2, or a list")
@@ -62,6 +69,7 @@ def run(options: argparse.Namespace) -> int:
         from fabricusd.schema.anysource import load_any
 
         fabric, _ = load_any(options.fabric)
+    _choose(options, fabric)
     if options.dry_run:
         scene = read_scene(options.scene, fabric=fabric, camera=options.camera)
         _tell(scene.notes, options)
@@ -93,6 +101,24 @@ def run(options: argparse.Namespace) -> int:
         print("fabricusd: interrupted; what was done is kept", file=sys.stderr)
         return 130
     return 1 if options.noise and result.noise > options.noise else 0
+
+
+def _choose(options: argparse.Namespace, fabric: Fabric | None) -> None:
+    """Fill in what --max-error leaves open, and say why."""
+    if options.max_error is None:
+        options.shadow = options.shadow or "horizon"
+        return
+    from fabricusd.chart.choice import choose_shadow, presets_in
+    from fabricusd.reference import read_scene
+
+    scene = read_scene(options.scene, fabric=fabric, camera=options.camera)
+    if options.shadow is None:
+        choice = choose_shadow(presets_in(scene), options.max_error)
+        options.shadow = choice.method
+        _tell([f"shadow {choice.method}: {choice.why}"], options)
+    if options.noise is None and options.spp is None:
+        options.noise = options.max_error
+        _tell([f"noise {options.noise:g}: that of the bound"], options)
 
 
 def _tell(notes: object, options: argparse.Namespace) -> None:
