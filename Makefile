@@ -7,7 +7,7 @@ BIN := $(VENV)/Scripts
 endif
 STAMP := $(VENV)/.installed
 
-.PHONY: help demo test quick lint schema bench docs clean
+.PHONY: help demo test quick lint schema bench docs blender clean
 
 help:  ## Say what each target does.
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
@@ -47,6 +47,16 @@ bench: $(STAMP)  ## Run the benchmarks; figures go to stdout.
 
 docs: $(STAMP)  ## Remake every figure and table in docs/.
 	for script in docs/make_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+# Blender brings its own numpy and needs one version of Python: see `pip index versions bpy`.
+BLENDER_PYTHON ?= python3.11
+build/bpy/.installed:
+	$(BLENDER_PYTHON) -m venv build/bpy
+	build/bpy/bin/python -m pip install --quiet bpy==5.0.1 usd-core
+	@touch $@
+
+blender: $(STAMP) build/bpy/.installed  ## Compare Cycles with the reference, into build/blender.
+	$(BIN)/python bench/blender_compare.py --blender build/bpy/bin/python
 
 clean:  ## Remove the environment and everything made.
 	rm -rf $(VENV) demo build dist *.egg-info

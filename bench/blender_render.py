@@ -20,6 +20,7 @@ SOCKETS = (
     ("NodeSocketVector", "Tangent"),
     ("NodeSocketVector", "TowardsLight"),
     ("NodeSocketColor", "Irradiance"),
+    ("NodeSocketInt", "Shadows"),
 )
 TO_Z_UP = Matrix.Rotation(math.pi / 2, 4, "X")
 
@@ -67,6 +68,7 @@ def shade_by_osl(job):
     towards = TO_Z_UP.to_3x3() @ Vector(job["towards_light"])
     script.inputs["TowardsLight"].default_value = towards
     script.inputs["Irradiance"].default_value = (*(3 * [job["irradiance"]]), 1.0)
+    script.inputs["Shadows"].default_value = 1
     tangent = tree.nodes.new("ShaderNodeTangent")
     tangent.direction_type, tangent.uv_map = "UV_MAP", "st"
     tree.links.new(tangent.outputs[0], script.inputs["Tangent"])
@@ -96,12 +98,6 @@ def add_light(job):
     towards = TO_Z_UP.to_3x3() @ Vector(job["towards_light"])
     one.rotation_euler = towards.to_track_quat("Z", "Y").to_euler()
     bpy.context.scene.collection.objects.link(one)
-    world = bpy.data.worlds.new("World")
-    bpy.context.scene.world = world
-    world.use_nodes = True
-    background = world.node_tree.nodes["Background"]
-    background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    background.inputs["Strength"].default_value = job["dome"]
 
 
 def add_camera(job):
@@ -123,7 +119,7 @@ def settings(job):
     scene.cycles.samples = job["spp"]
     scene.cycles.use_adaptive_sampling = False
     scene.cycles.use_denoising = False
-    scene.cycles.max_bounces = job["bounces"]
+    scene.cycles.max_bounces = 0
     scene.cycles.sample_clamp_indirect = 0.0
     scene.cycles.pixel_filter_type = "BOX"
     scene.render.film_transparent = True

@@ -9,7 +9,6 @@ Every number is over places spread evenly on the threads of one repeat, and 16 a
 from __future__ import annotations
 
 import argparse
-import math
 import time
 from pathlib import Path
 
@@ -19,62 +18,32 @@ import numpy as np
 from fabricusd.appearance.compiled import compile_fabric
 from fabricusd.appearance.shadow import METHODS, compile_shadow, shadowing
 from fabricusd.appearance.weave import lookup
+from fabricusd.chart.shadows import (
+    AZIMUTHS,
+    ELEVATIONS,
+    TABLES,
+    WOVEN,
+    light,
+    places_on_threads,
+    rms,
+    shares,
+)
 from fabricusd.fabric import Fabric
 from fabricusd.schema import load
-
-WOVEN = (
-    "linen_plain",
-    "silk_crepe_de_chine",
-    "polyester_satin_charmeuse",
-    "polyester_satin_charmeuse_back",
-    "silk_shot",
-)
-ELEVATIONS = (5, 10, 20, 30, 45, 60)
-AZIMUTHS = 16
-TABLES = ((16, (4, 2)), (16, (8, 4)), (32, (8, 4)), (16, (16, 8)), (64, (32, 16)))
 
 Array = np.ndarray
 
 
-def places(fabric: Fabric, count: int) -> Array:
-    """(n, 2) weave coordinates on the threads, from a low-discrepancy sequence."""
-    k = np.arange(count)[:, None]
-    # Roberts' sequence: powers of the plastic number's inverse.
-    uv = (k * np.array([0.7548776662466927, 0.5698402909980532])) % 1.0 * fabric.weave.cells.shape
-    return uv[~lookup(fabric, uv).gap]
-
-
-def light(elevation: float, azimuth: float) -> Array:
-    """(3,) unit direction, angles in degrees, azimuth from U to V."""
-    e, a = math.radians(elevation), math.radians(azimuth)
-    return np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
-
-
-def shares(fabric: Fabric, level: str, uv: Array) -> dict[str, Array]:
+def all_shares(fabric: Fabric, level: str, uv: Array) -> dict[str, Array]:
     """Method -> (elevations, azimuths, places) `g`."""
     cloth = compile_fabric(fabric, precision=np.float64)
-    found = {}
-    for method in METHODS:
-        shadow = compile_shadow(fabric, method, level=level, precision=np.float64)
-        found[method] = np.array(
-            [
-                [
-                    shadowing(
-                        fabric,
-                        np.tile(light(e, 360 * (a + 0.25) / AZIMUTHS), (len(uv), 1)),
-                        uv,
-                        compiled=(cloth, shadow),
-                    )
-                    for a in range(AZIMUTHS)
-                ]
-                for e in ELEVATIONS
-            ]
+    return {
+        method: shares(
+            fabric, uv, cloth,
+            compile_shadow(fabric, method, level=level, precision=np.float64),
         )
-    return found
-
-
-def rms(x: Array) -> float:
-    return math.sqrt(float((x * x).mean()))
+        for method in METHODS
+    }  # fmt: skip
 
 
 def by_elevation(name: str, level: str, uv: Array, found: dict[str, Array]) -> None:
@@ -124,7 +93,7 @@ def by_table(level: str, count: int) -> None:
         row = []
         for name in WOVEN:
             fabric = load(name)
-            uv = places(fabric, count)
+            uv = places_on_threads(fabric, count)
             e, a = rng.uniform(2, 70, len(uv)), rng.uniform(0, 360, len(uv))
             wi = np.array([light(*pair) for pair in zip(e, a, strict=True)])
             cloth = compile_fabric(fabric, precision=np.float64)
@@ -145,7 +114,7 @@ def speed(count: int) -> None:
     print("|---|---|---|---|---|---|")
     for name in WOVEN:
         fabric = load(name)
-        uv = places(fabric, count)
+        uv = places_on_threads(fabric, count)
         wi = np.tile(light(20, 30), (len(uv), 1)).astype(np.float32)
         cloth, row = compile_fabric(fabric), []
         for method in METHODS:
@@ -203,8 +172,8 @@ def main() -> None:
     for level in ("weave", "thread"):
         for name in WOVEN:
             fabric = load(name)
-            uv = places(fabric, options.places)
-            found = shares(fabric, level, uv)
+            uv = places_on_threads(fabric, options.places)
+            found = all_shares(fabric, level, uv)
             by_elevation(name, level, uv, found)
             if level == "weave":
                 by_azimuth(fabric, uv, found)

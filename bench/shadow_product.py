@@ -6,7 +6,8 @@ The geometry is the height field with round threads, light passing once. From th
 place on a thread counts by the area that it shows, `max(n.wo, 0)/n.N` times whether the march finds
 it visible; it sends `f_s cos theta_i` where the march finds it lit (a thread's own dark side is in
 `f_s`). The model sends `f_s P cos theta_i / Q` times M, times g, or times both, at the same places;
-g is marched over round threads (level `thread`) or flat ones (level `weave`).
+g is marched over round threads (level `thread`) or flat ones (level `weave`). `<g>` is its mean
+over the threads, each place counted by the light that its slope would catch.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ WOVEN = (
     "polyester_satin_charmeuse_back",
     "silk_shot",
 )
-VARIANTS = ("neither", "M", "g", "M g", "M g / mean g", "g, flat threads", "M g, flat threads")
+VARIANTS = ("neither", "M", "g", "M g", "M g / <g>", "g, flat threads", "M g, flat threads")
 
 Array = np.ndarray
 
@@ -63,7 +64,7 @@ def compare(fabric: Fabric, pairs: int, count: int) -> Array:
             for w in (wi, wo)
         )
         flat = shadowing(fabric, np.tile(wi, (count, 1)), uv, compiled=(cloth, ribbons))
-        f, m, p, shown = (np.zeros(count) for _ in range(4))
+        f, m, p, shown, caught = (np.zeros(count) for _ in range(5))
         for share in plain.shares(fabric):
             kind = [t is share.thread for t in fabric.thread_list].index(True)
             here = on & (hit.set == int(share.is_warp)) & (hit.thread == kind)
@@ -78,6 +79,7 @@ def compare(fabric: Fabric, pairs: int, count: int) -> Array:
             f[here] = value * np.cos(a.theta)
             m[here] = plain.masked(a.phi, b.phi, fabric.masking_width)
             p[here] = plain.masked(a.psi, b.psi, fabric.masking_width)
+            caught[here] = np.maximum(i[:, 2], 0)
             # The tube's normal, sqrt(1 - w^2) n_t + w b, against the viewer and against N.
             w = np.clip(hit.across[here], -0.999, 0.999)
             up = np.sqrt(1 - w * w) * np.cos(hit.angle[here])
@@ -87,7 +89,7 @@ def compare(fabric: Fabric, pairs: int, count: int) -> Array:
         geometry = float((visible * lit * f).sum() / visible.sum())
         q = float(plain.normalization(fabric, wi[None], wo[None])[0])
         base = f * p / q
-        even = lit / max(float(lit[on].mean()), 1e-3)
+        even = lit * caught.sum() / max(float((lit * caught).sum()), 1e-3)
         rows.append(
             [
                 geometry,

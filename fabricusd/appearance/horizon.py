@@ -32,6 +32,15 @@ TEXELS = (8, 4)
 MOST_BYTES = 2**25
 """Largest horizon table, 256 x 256 cells at the usual size: half a minute's work to fill."""
 
+ELEVATIONS = 16
+"""Rows of the table of the mean of `g`."""
+
+MOST_CELLS = 256
+"""Cells that the mean of `g` is taken over."""
+
+LEAST_LIGHT = 1.0 / 32.0
+"""Least mean of `g`: at the horizon it falls to 0, and `g` over its mean would have no bound."""
+
 LOWEST = math.tan(math.radians(0.25))
 """Slope below which a horizon counts as level: half the sun's disc."""
 
@@ -61,7 +70,9 @@ def horizon_table(
         return None
     table = np.zeros((*repeat, slots, *texels, azimuths), np.uint8)
     if highest > 0:
-        _fill(cloth, rounded, highest, _diamond_directions(azimuths), table)
+        cells = np.argwhere(np.ones(repeat, bool))
+        entries = table.reshape(-1, *table.shape[2:])
+        _fill(cloth, rounded, highest, _diamond_directions(azimuths), cells, entries)
     return table
 
 
@@ -95,11 +106,11 @@ def _diamond_directions(azimuths: int) -> NDArray[np.float64]:
 
 
 @njit(parallel=True, **KERNEL)
-def _fill(cloth, rounded, highest, directions, table):
-    """The horizon at the centre of every texel, in every direction."""
-    ends, picks, slots, rows, columns, azimuths = table.shape
-    for cell in prange(ends * picks):
-        i, j = cell // picks, cell % picks
+def _fill(cloth, rounded, highest, directions, cells, entries):
+    """The horizon at the centre of every texel of each of cells (n, 2), in every direction."""
+    count, slots, rows, columns, azimuths = entries.shape
+    for cell in prange(count):
+        i, j = cells[cell, 0], cells[cell, 1]
         for slot in range(slots):
             for row in range(rows):
                 for column in range(columns):
@@ -119,7 +130,89 @@ def _fill(cloth, rounded, highest, directions, table):
                             directions[a, 0], directions[a, 1], LOWEST, False,
                         )  # fmt: skip
                         sine = k / math.sqrt(1.0 + k * k) if k > LOWEST else 0.0
-                        table[i, j, slot, row, column, a] = np.uint8(255.0 * sine + 0.5)
+                        entries[cell, slot, row, column, a] = np.uint8(255.0 * sine + 0.5)
+
+
+def mean_light(
+    fabric: Fabric,
+    cloth: CompiledFabric,
+    rounded: int,
+    highest: float,
+    softness: float,
+    table: NDArray[np.uint8] | None,
+) -> NDArray[np.float64]:
+    """(ELEVATIONS, azimuths + 1) share of the light on the threads that `g` lets arrive.
+
+    Each place counts by the light that its slope would catch, max(n_t.wi, 0). Rows are even in the
+    square root of the sine of the light's elevation, columns in the diamond angle, the last being
+    the first again. Read off the horizon table, or off cells of it that are filled for this where
+    `table` is None; at most MOST_CELLS of them. Not below LEAST_LIGHT.
+    """
+    repeat = shape_repeat(fabric)
+    cells = np.argwhere(np.ones(repeat, bool))
+    if len(cells) > MOST_CELLS:
+        cells = cells[np.random.default_rng(0).choice(len(cells), MOST_CELLS, replace=False)]
+    if table is None:
+        slots = 1 if cloth.under == GAP else 2
+        entries = np.zeros((len(cells), slots, *TEXELS, AZIMUTHS), np.uint8)
+        if highest > 0:
+            _fill(cloth, rounded, highest, _diamond_directions(AZIMUTHS), cells, entries)
+    else:
+        entries = np.ascontiguousarray(table[cells[:, 0], cells[:, 1]])
+    azimuths = entries.shape[-1]
+    normal, area = _texel_normals(cloth, cells, entries.shape[1:4])
+    sine = entries.reshape(-1, azimuths) / 255.0
+    # Not quite level: flat threads catch nothing of that.
+    z = np.maximum(np.linspace(0.0, 1.0, ELEVATIONS) ** 2, 1e-3)
+    found = np.empty((ELEVATIONS, azimuths + 1))
+    for a, direction in enumerate(_diamond_directions(azimuths)):
+        for row, up in enumerate(z):
+            flat = math.sqrt(1.0 - up * up)
+            caught = area * np.maximum(normal @ (*(flat * direction), up), 0.0)
+            above = up * np.sqrt(1.0 - sine[:, a] ** 2) - flat * sine[:, a]
+            t = np.clip(above / softness + 0.5, 0.0, 1.0)
+            total = caught.sum()
+            lit = float((caught * t * t * (3.0 - 2.0 * t)).sum())
+            found[row, a] = lit / total if total > 0 else 1.0
+    # Straight down nothing is in the way, whatever the edge's width makes of a steep place.
+    found[-1] = 1.0
+    found[:, azimuths] = found[:, 0]
+    return np.maximum(found, LEAST_LIGHT)
+
+
+def _texel_normals(
+    cloth: CompiledFabric, cells: NDArray[np.int64], shape: tuple[int, ...]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(texels, 3) normals n_t of the threads at the table's texels, (texels,) their areas."""
+    texels = len(cells) * math.prod(shape)
+    psi0, sets, area = np.zeros(texels), np.zeros(texels, np.int64), np.zeros(texels)
+    _describe_texels(cloth, cells, shape, psi0, sets, area)
+    along, up = np.sin(psi0), np.cos(psi0)
+    warp = sets == WARP
+    normal = np.stack((np.where(warp, 0.0, along), np.where(warp, along, 0.0), up), axis=1)
+    return normal, area
+
+
+@njit(**KERNEL)
+def _describe_texels(cloth, cells, shape, psi0, sets, area):
+    """Tangent angle [rad], set and area in cells of each texel; area 0 where none is seen."""
+    slots, rows, columns = shape
+    k = 0
+    for cell in range(cells.shape[0]):
+        i, j = cells[cell, 0], cells[cell, 1]
+        top = int(cloth.grid[i % cloth.grid.shape[0], j % cloth.grid.shape[1]])
+        width = float(cloth.width[top])
+        for slot in range(slots):
+            whole = width if slot == 0 else (1.0 - width) * float(cloth.under_width)
+            for row in range(rows):
+                for column in range(columns):
+                    u, v, seen = _texel_centre(
+                        cloth, i, j, slot, (row + 0.5) / rows, (column + 0.5) / columns
+                    )
+                    which, _, _, _, angle, _ = find(np.float64, cloth, u, v)
+                    if seen and which != GAP:
+                        psi0[k], sets[k], area[k] = angle, which, whole / (rows * columns)
+                    k += 1
 
 
 @njit(**LEAN)

@@ -8,6 +8,10 @@ peak    : the nearest of the highest points is the horizon in every direction, [
 horizon : a table of the horizon by place on the thread and azimuth, [Max1988]; marched instead
           where the repeat is too large for a table
 traced  : the height field is marched along the ray, the answer that the others are measured by
+
+What a cloth sends back is multiplied by `shade`. By `peak` that is `g`, as the thesis has it. By
+`horizon` and `traced` it is `g` over its mean over the cloth: the masking term already holds the
+mean of this shade, and `g` says where it falls. See docs/decisions/004.
 """
 
 from __future__ import annotations
@@ -25,9 +29,17 @@ from fabricusd.appearance.coverage import GAP
 from fabricusd.appearance.curve import crest, peak
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.height import crown_of, highest_point, level_is_round, steepest
-from fabricusd.appearance.horizon import AZIMUTHS, TEXELS, horizon_error, horizon_table
+from fabricusd.appearance.horizon import (
+    AZIMUTHS,
+    ELEVATIONS,
+    TEXELS,
+    horizon_error,
+    horizon_table,
+    mean_light,
+)
 from fabricusd.appearance.horizon_lookup import (
     above_horizon,
+    diamond,
     horizon_at,
     soft_edge,
 )
@@ -47,6 +59,9 @@ from fabricusd.fabric import Fabric
 
 METHODS = ("none", "peak", "horizon", "traced")
 NONE, PEAK, HORIZON, TRACED = range(4)
+
+TRACED_SOFTNESS = 1e-3
+"""Width [rad] of the edge with which the mean of the marched `g` is taken; its own is hard."""
 
 PEAK_SOFTNESS = math.radians(5.0)
 """Width of the edge of a `peak` shadow. The horizon it asks about is a guess; a sharper edge would
@@ -70,6 +85,8 @@ class Shadow(NamedTuple):
     table : (I, J, slots, along, across, azimuths) uint8 - sine of the horizon's elevation times
         255, see `horizon`; one zero for the other methods
     texels : the same memory in one row
+    mean : (elevations, azimuths + 1) real - what `shade` divides by, see `horizon.mean_light`; ones
+        for `none` and `peak`
     """
 
     method: int
@@ -81,6 +98,7 @@ class Shadow(NamedTuple):
     crest_height: NDArray[Any]
     table: NDArray[np.uint8]
     texels: NDArray[np.uint8]
+    mean: NDArray[Any]
 
 
 def compile_shadow(
@@ -118,6 +136,11 @@ def compile_shadow(
         else:
             table = found_table
             softness = softness or horizon_error(cloth, rounded, highest, table)
+    mean = np.ones((ELEVATIONS, AZIMUTHS + 1))
+    if method in ("horizon", "traced"):
+        kept = table if method == "horizon" else None
+        edge = softness if method == "horizon" and softness else TRACED_SOFTNESS
+        mean = mean_light(fabric, cloth, rounded, highest, edge, kept)
     found = [crest(t.curve) for t in fabric.thread_list]
     first = np.ones((len(found), max(len(c) for c in found)))
     last = np.zeros_like(first)
@@ -133,7 +156,36 @@ def compile_shadow(
         crest_height=np.array([peak(t.curve) for t in fabric.thread_list], precision),
         table=table,
         texels=table.reshape(-1),
+        mean=mean.astype(precision),
     )
+
+
+@njit(**INLINE)
+def mean_lit(R, shadow, x, y, z):
+    """Mean of `g` over the cloth for light from (x, y, z) above it."""
+    rows, columns = shadow.mean.shape[0], shadow.mean.shape[1]
+    e = math.sqrt(min(max(z, R(0)), R(1))) * R(rows - 1)
+    row = min(int(e), rows - 2)
+    turn = diamond(R, x, y) * R(0.25) * R(columns - 1)
+    column = min(int(turn), columns - 2)
+    a, b = e - R(row), turn - R(column)
+    low = shadow.mean[row, column]
+    low += (shadow.mean[row, column + 1] - low) * b
+    high = shadow.mean[row + 1, column]
+    high += (shadow.mean[row + 1, column + 1] - high) * b
+    return low + (high - low) * a
+
+
+@njit(**INLINE)
+def shade(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
+    """What the value at a point is multiplied by for light from (x, y, z): see the module's text.
+
+    Arguments as for `lit`.
+    """
+    g = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
+    if shadow.method < HORIZON or not g > R(0):
+        return g
+    return g / mean_lit(R, shadow, x, y, z)
 
 
 @njit(**INLINE)
@@ -257,28 +309,43 @@ def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
 
 
 @njit(**LEAN)
-def _lit_one_by_one(R, cloth, shadow, uv, begin, wi, out):
-    """`lit` at as many places from `begin` on as `out` holds."""
+def mean_block(R, shadow, wi, begin, size, reals):
+    """Divide the row LIT by the mean of `g`."""
+    for k in range(size):
+        z = wi[2, begin + k]
+        # What is not a number has its answer, and must not index the table.
+        if reals[LIT + k] > R(0):
+            reals[LIT + k] /= mean_lit(R, shadow, wi[0, begin + k], wi[1, begin + k], z)
+
+
+@njit(**LEAN)
+def _one_by_one(R, cloth, shadow, shaded, uv, begin, wi, out):
+    """`shade`, or else `lit`, at as many places from `begin` on as `out` holds."""
     for k in range(out.size):
         u, v = uv[begin + k, 0], uv[begin + k, 1]
         x, y, z = wi[0, begin + k], wi[1, begin + k], wi[2, begin + k]
         which, thread, s, w, _, length = find(R, cloth, u, v)
-        out[k] = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
+        g = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
+        if shaded and shadow.method >= HORIZON and g > R(0):
+            g /= mean_lit(R, shadow, x, y, z)
+        out[k] = g
 
 
 @njit(parallel=True, **KERNEL)
-def lit_all(R, cloth, shadow, uv, wi, out):
-    """`lit` at weave coordinates uv (n, 2) float64 for light wi (3, n), into out (n,)."""
+def lit_all(R, cloth, shadow, shaded, uv, wi, out):
+    """`lit`, or `shade` if `shaded`, at places uv (n, 2) float64 for light wi (3, n): out (n,)."""
     n = uv.shape[0]
     for b in prange((n + BLOCK - 1) // BLOCK):
         begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
         found = out[begin : begin + size]
         if shadow.method != HORIZON:
-            _lit_one_by_one(R, cloth, shadow, uv, begin, wi, found)
+            _one_by_one(R, cloth, shadow, shaded, uv, begin, wi, found)
         else:
             ints, reals = np.empty(INT_ROWS * BLOCK, np.int32), np.empty(REAL_ROWS * BLOCK, R)
             look_up_block(R, cloth, shadow.table, uv, begin, size, ints, reals)
             horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
+            if shaded:
+                mean_block(R, shadow, wi, begin, size, reals)
             found[:] = reals[LIT : LIT + size]
 
 
@@ -317,5 +384,5 @@ def shadowing(
                 f"{int(np.argmax(bad))}",
             )
     out = np.empty(len(uv), real)
-    lit_all(real, cloth, shadow, uv, np.ascontiguousarray(light.T), out)
+    lit_all(real, cloth, shadow, False, uv, np.ascontiguousarray(light.T), out)
     return out

@@ -58,6 +58,7 @@ from fabricusd.appearance.shadow import (
     compile_shadow,
     horizon_block,
     lit_all,
+    mean_block,
 )
 from fabricusd.appearance.weave import WeaveHit, lookup
 from fabricusd.errors import FabricError
@@ -199,11 +200,11 @@ def _shadowed(fabric: Fabric, method: str, level: str) -> tuple[CompiledFabric, 
 
 
 def _lit(fabric: Fabric, method: str, level: str, uv: Floats, wi: Floats) -> Floats:
-    """(n,) share of the light from wi (3, n) that reaches each place."""
+    """(n,) what `shadow.shade` multiplies by at each place, for light from wi (3, n)."""
     cloth, shadow = _shadowed(fabric, method, level)
     out = np.empty(len(uv))
     real: Any = np.float64
-    lit_all(real, cloth, shadow, uv, wi, out)
+    lit_all(real, cloth, shadow, True, uv, wi, out)
     return out
 
 
@@ -328,6 +329,7 @@ def _weave_chunk(R, cloth, shadow, tables, uv, wi, wo, out, first, last):
         size = min(BLOCK, last - begin)
         look_up_block(R, cloth, shadow.table, uv, begin, size, ints, reals)
         horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
+        mean_block(R, shadow, wi, begin, size, reals)
         point_block(
             R, tables, False, ints[SET:], ints[THREAD_ROW:], reals[ANGLE:], reals[S:], 0,
             wi, wo, out, begin, size, block,

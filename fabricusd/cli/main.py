@@ -25,6 +25,7 @@ COMMANDS = {
     "material": "write the materials of a bake for USD and MaterialX",
     "render": "path-trace a scene for look-dev review",
     "compare": "measure how far one picture is from another",
+    "chart": "measure speed against accuracy, and draw it",
     "plugin-path": "print the folder that PXR_PLUGINPATH_NAME needs",
     "demo": "author, check and print every preset into a folder",
 }

@@ -8,7 +8,7 @@ import sys
 EPILOG = """example:
   fabricusd material baked
   fabricusd material baked --scene coat.usda -o coat_look.usda --surface openpbr gltf_pbr
-  fabricusd material baked --usdz coat.usdz --u3m coat.u3m"""
+  fabricusd material baked --usdz coat.usdz --osl"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,6 +25,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="openpbr, standard_surface, gltf_pbr; USD takes the first",
     )
+    parser.add_argument("--usdz", metavar="FILE", help="also package the look in one file")
+    parser.add_argument(
+        "--osl", action="store_true", help="also each fabric's threads as an OSL shader"
+    )
+    parser.add_argument(
+        "--u3m", metavar="FOLDER", help="also a U3M swatch of each fabric, for garment CAD"
+    )
     parser.add_argument("--no-fit", action="store_true", help="leave the textures as they are")
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
     parser.add_argument("--no-clobber", action="store_true", help="never overwrite a look")
@@ -32,6 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the look; print the names of the files."""
+    from pathlib import Path
+
     from fabricusd.preview.materials import write_materials
     from fabricusd.preview.recipes import Settings
 
@@ -40,7 +49,11 @@ def run(options: argparse.Namespace) -> int:
 
     made = write_materials(
         options.bake, options.output,
-        Settings(surfaces=tuple(options.surface), fitted=not options.no_fit),
+        Settings(
+            surfaces=tuple(options.surface), fitted=not options.no_fit, osl=options.osl,
+            usdz=Path(options.usdz) if options.usdz else None,
+            u3m=Path(options.u3m) if options.u3m else None,
+        ),
         scene=options.scene, clobber=not options.no_clobber, dry_run=options.dry_run,
         progress=say if options.verbose else None,
     )  # fmt: skip

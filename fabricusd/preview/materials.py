@@ -11,12 +11,16 @@ from pxr import Sdf, Tf, Usd, UsdGeom
 from fabricusd import __version__
 from fabricusd.bake.manifest import write_json
 from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
 from fabricusd.preview.bake_folder import BakeFolder, read_bake_folder
 from fabricusd.preview.layer import write_baked_look, write_scene_look
 from fabricusd.preview.mtlx import write_mtlx
+from fabricusd.preview.osl import write_osl
+from fabricusd.preview.package import write_usdz
 from fabricusd.preview.paths import asset_path
 from fabricusd.preview.recipes import Progress, Settings, Written, recipes
 from fabricusd.preview.surfaces import GRAPHS
+from fabricusd.preview.u3m import write_u3m
 from fabricusd.preview.wearers import find_wearers
 
 
@@ -72,7 +76,23 @@ def write_materials(
     write_mtlx(path.with_suffix(".mtlx"), documents)
     write_json(path.with_suffix(".json"), _report(made))
     made.files += [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
+    for name, fabric in _fabrics(folder).items():
+        if settings.osl:
+            shader = path.with_name(f"{path.stem}.{name}.osl")
+            write_osl(fabric, shader)
+            made.files.append(shader)
+        if settings.u3m is not None:
+            swatch = settings.u3m / f"{name}.u3m"
+            made.files += write_u3m(fabric, swatch, fitted=settings.fitted)
+    if settings.usdz is not None:
+        write_usdz(path, settings.usdz, clobber=clobber)
+        made.files.append(settings.usdz)
     return made
+
+
+def _fabrics(folder: BakeFolder) -> dict[str, Fabric]:
+    """The fabrics of a bake by their names."""
+    return {lay.name: lay.fabric for one in folder.garments for lay in one.lays if lay.fabric}
 
 
 def _check_target(path: Path, clobber: bool) -> None:

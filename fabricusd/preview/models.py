@@ -22,8 +22,9 @@ Floats = NDArray[np.float64]
 SMALLEST = 1e-6
 """Floor of cosines and alphas, MaterialX's M_FLOAT_EPS."""
 
-KINDS = ("openpbr", "standard_surface", "gltf_pbr", "preview")
-"""Surfaces that can be evaluated; `preview` is UsdPreviewSurface, metallic workflow, metallic 0."""
+KINDS = ("openpbr", "standard_surface", "gltf_pbr", "preview", "principled")
+"""Surfaces that can be evaluated; `preview` is UsdPreviewSurface, metallic workflow, metallic 0,
+`principled` is Blender's Principled BSDF, which differs from OpenPBR in what the tint colours."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,23 +54,23 @@ def evaluate(kind: str, s: Surface, wi: Floats, wo: Floats) -> Floats:
     diffuse = s.base * (cos_i / np.pi)[..., None]
     spec, under_spec = specular(kind, s, wi, wo, cos_i, cos_o)
     if kind == "preview":
-        out = spec + under_spec[..., None] * diffuse
+        out = spec + under_spec * diffuse
     elif kind == "standard_surface":
         fuzz, under_fuzz = conty_kulla(s, s.fuzz_roughness, wi, wo, cos_i, cos_o)
-        out = spec + under_spec[..., None] * (fuzz + under_fuzz[..., None] * diffuse)
+        out = spec + under_spec * (fuzz + under_fuzz[..., None] * diffuse)
     else:
-        if kind == "openpbr":
+        if kind in ("openpbr", "principled"):
             fuzz, under_fuzz = zeltner(s, wi, wo, cos_o)
         else:
             fuzz, under_fuzz = conty_kulla(s, s.fuzz_roughness**2, wi, wo, cos_i, cos_o)
-        out = fuzz + under_fuzz[..., None] * (spec + under_spec[..., None] * diffuse)
+        out = fuzz + under_fuzz[..., None] * (spec + under_spec * diffuse)
     return np.where(above[..., None], out, 0.0)
 
 
 def specular(
     kind: str, s: Surface, wi: Floats, wo: Floats, cos_i: Floats, cos_o: Floats
 ) -> tuple[Floats, Floats]:
-    """(..., 3) GGX reflection, and the share (...) that it leaves to the layer below."""
+    """(..., 3) GGX reflection, and the share (..., 1) that it leaves to the layer below."""
     h = wi + wo
     h = h / np.maximum(np.linalg.norm(h, axis=-1, keepdims=True), SMALLEST)
     ax = np.clip(s.alpha_rough, SMALLEST, 1.0)
@@ -83,16 +84,30 @@ def specular(
     lambda_o = np.sqrt(a2 + (1.0 - a2) * cos_o**2)
     g = 2.0 * cos_i * cos_o / (lambda_i * cos_o + lambda_o * cos_i)
     cos_h = np.clip(np.sum(wo * h, axis=-1), SMALLEST, 1.0)
-    f0 = ((s.ior - 1.0) / (s.ior + 1.0)) ** 2
-    if kind in ("openpbr", "standard_surface"):
-        fresnel = dielectric_fresnel(cos_h, s.ior)
-    else:
-        fresnel = f0 + (1.0 - f0) * (1.0 - cos_h) ** 5
-    whole = ggx_albedo(cos_o, mean, 1.0, 1.0)
+    f0, fresnel, tint = _fresnel(kind, s, cos_h)
+    whole = ggx_albedo(cos_o, mean, 1.0, 1.0)[..., None]
     gain = 1.0 + fresnel * (1.0 - whole) / whole
-    albedo = ggx_albedo(cos_o, mean, f0, 1.0) * gain
-    value = d * fresnel * g * gain / (4.0 * cos_o)
-    return value[..., None] * s.tint, 1.0 - albedo
+    albedo = ggx_albedo(cos_o[..., None], mean[..., None], f0, 1.0) * gain
+    reduce = np.max if kind == "principled" else np.mean
+    albedo = reduce(albedo, axis=-1, keepdims=True)
+    value = fresnel * gain * (d * g / (4.0 * cos_o))[..., None]
+    return value * tint, 1.0 - albedo
+
+
+def _fresnel(kind: str, s: Surface, cos_h: Floats) -> tuple[Floats, Floats, Floats]:
+    """Reflectance at normal incidence and at cos_h, and a factor on the whole: (..., 1 or 3)."""
+    ior, c = s.ior[..., None], cos_h[..., None]
+    f0 = ((ior - 1.0) / (ior + 1.0)) ** 2
+    if kind in ("openpbr", "standard_surface"):
+        return f0, dielectric_fresnel(c, ior), s.tint
+    if kind == "principled":
+        # The tint colours normal incidence alone; between, the dielectric's own curve.
+        rise = (dielectric_fresnel(c, ior) - f0) / np.maximum(1.0 - f0, SMALLEST)
+        tinted = f0 * s.tint
+        return tinted, tinted + (1.0 - tinted) * rise, np.ones(1)
+    # UsdPreviewSurface has no tint, glTF's colours normal incidence alone.
+    tinted = f0 if kind == "preview" else np.minimum(f0 * s.tint, 1.0)
+    return tinted, tinted + (1.0 - tinted) * (1.0 - c) ** 5, np.ones(1)
 
 
 def dielectric_fresnel(c: Floats, ior: Floats) -> Floats:

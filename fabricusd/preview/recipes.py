@@ -22,6 +22,9 @@ from fabricusd.schema.write import prim_name
 
 Progress = Callable[[str], None]
 
+BLENDER = "principled:"
+"""Prefix of the material's inputs for Blender's own surface: the hook reads them."""
+
 OPAQUE = 0.9995
 """Mean cover from which a material has no opacity: blending costs renderers dear."""
 
@@ -42,10 +45,16 @@ class Settings:
 
     surfaces : MaterialX surfaces, names of `surfaces.GRAPHS`; USD takes the first, the document all
     fitted : whether the parameters are sought; otherwise the textures stand as they are
+    usdz : a package of the look to write as well
+    u3m : a folder for a U3M swatch of each fabric as well
+    osl : whether each fabric is written as an OSL shader beside the look
     """
 
     surfaces: tuple[str, ...] = ("openpbr",)
     fitted: bool = True
+    usdz: Path | None = None
+    osl: bool = False
+    u3m: Path | None = None
 
 
 @dataclass(kw_only=True)
@@ -83,7 +92,8 @@ def recipes(
                         ("", preview(inputs, looks["preview"], opaque)),
                         ("", graphs[first]),
                     ),
-                    parameters=parameter_values(looks[first]),
+                    parameters=parameter_values(looks[first])
+                    | parameter_values(looks["principled"], BLENDER),
                 )
                 for surface, graph in graphs.items():
                     tail = "" if len(graphs) == 1 else f"_{surface}"
@@ -138,7 +148,7 @@ def _looks(
 ) -> dict[str, Look]:  # fmt: skip
     """The look for each surface that is written; lays of one fabric and scale share a fit."""
     lay = maps.lays[number]
-    kinds = ("preview", *settings.surfaces)
+    kinds = ("preview", "principled", *settings.surfaces)
     plain = dict.fromkeys(kinds, Look())
     if not settings.fitted:
         return plain

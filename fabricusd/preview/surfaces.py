@@ -37,9 +37,9 @@ PARAMETERS = {
 """Fields of `Look` that are inputs of the material, and their types."""
 
 
-def parameter_values(look: Look) -> dict[str, Value]:
+def parameter_values(look: Look, prefix: str = "") -> dict[str, Value]:
     """The material's own inputs."""
-    return {name: Value(kind, getattr(look, name)) for name, kind in PARAMETERS.items()}
+    return {prefix + name: Value(kind, getattr(look, name)) for name, kind in PARAMETERS.items()}
 
 
 def _one(value: float) -> Value:

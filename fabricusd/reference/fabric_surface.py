@@ -27,7 +27,7 @@ from fabricusd.appearance.law import (
 )
 from fabricusd.appearance.levels import point_values
 from fabricusd.appearance.real import INLINE, LEAN
-from fabricusd.appearance.shadow import NONE, Shadow, compile_shadow, lit
+from fabricusd.appearance.shadow import NONE, Shadow, compile_shadow, shade
 from fabricusd.appearance.weave import back_of, find
 from fabricusd.fabric import Fabric
 from fabricusd.reference.embree import aligned_empty
@@ -264,11 +264,11 @@ def _finish_point(
         light, bounce = R(1), R(1)
         if shadow.method != NONE:
             # Light from behind the cloth has threads of its own before it.
-            light = R(1) if wi[2, k] <= R(0) else lit(
+            light = R(1) if wi[2, k] <= R(0) else shade(
                 R, cloth, shadow, u, v, sets[k], threads[k], along[k], across[k], length[k],
                 wi[0, k], wi[1, k], wi[2, k],
             )  # fmt: skip
-            bounce = R(1) if go[2, k] <= R(0) else lit(
+            bounce = R(1) if go[2, k] <= R(0) else shade(
                 R, cloth, shadow, u, v, sets[k], threads[k], along[k], across[k], length[k],
                 go[0, k], go[1, k], go[2, k],
             )  # fmt: skip

@@ -47,7 +47,8 @@ class RenderResult:
 
     layers : AOV name -> (h, w, c) float32; of the last frame, if there were several
     paths : the files written; notes : what was left out or assumed, one line each
-    rays : rays traced, shadow rays included; seconds : of sampling, without reading the scene
+    rays : rays traced, shadow rays included; seconds : of sampling, without reading the scene;
+        processor_seconds : of this process, all workers together, meanwhile
     not_finite : values that were left out because they were not finite
     noise : the relative error that 99 % of the pixels' means stay below, estimated
     complete : False after Ctrl-C
@@ -58,6 +59,7 @@ class RenderResult:
     notes: tuple[str, ...] = ()
     rays: int = 0
     seconds: float = 0.0
+    processor_seconds: float = 0.0
     not_finite: int = 0
     samples: float = 0.0
     noise: float = 0.0
@@ -201,9 +203,9 @@ def render_scene(
     film = Film(width, height, aovs)
     count = worker_count(workers)
     counters = np.zeros((count, 3), np.int64)
-    built = time.perf_counter()
+    built, busy = time.perf_counter(), time.process_time()
     complete = _sample(tracer, lens, film, count, counters, most, noise, progress, built)
-    seconds = time.perf_counter() - built
+    seconds, busy = time.perf_counter() - built, time.process_time() - busy
     rays, shadow_rays, not_finite = (int(x) for x in counters.sum(axis=0))
     if not_finite:
         scene.note("the picture", f"lost {not_finite} values that were not finite")
@@ -227,6 +229,7 @@ def render_scene(
         notes=tuple(scene.notes),
         rays=rays + shadow_rays,
         seconds=seconds,
+        processor_seconds=busy,
         not_finite=not_finite,
         samples=float(film.samples.mean()),
         noise=_typical_worst(error),

@@ -23,7 +23,7 @@ from fabricusd.appearance.law import (
 )
 from fabricusd.appearance.levels import point_value, point_values
 from fabricusd.appearance.quadrature import POINTS, Rule, curve_nodes
-from fabricusd.appearance.shadow import METHODS, compile_shadow
+from fabricusd.appearance.shadow import METHODS, compile_shadow, mean_lit, shadowing
 from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.weave import lookup
 from fabricusd.fabric import MODELS
@@ -79,19 +79,19 @@ def test_the_mean_of_conserving_weave_over_shared_nodes_is_far(name):
 
 @pytest.mark.parametrize(("name", "model"), [(n, m) for n in PRESETS for m in MODELS])
 def test_the_mean_of_weave_over_places_is_far(name, model):
+    """With the same `Q` or `G1` on both sides; the default rule's own is 0.2 % off on velvet."""
     fabric = with_model(PRESETS[name], model)
     # Narrow lobes and steep pile: few places carry much of the value.
     few = name in ("velvet", "polyester_satin_charmeuse")
     places = spread_places(300_000 if few else 60_000)
+    hit = lookup(fabric, places)
     law = surface_law(fabric, precision=np.float64, rule=Rule(POINTS, 0.03), multiple=False)
     over_places, far = np.zeros(3), np.zeros(3)
     for wi, wo in zip(WI[:4], WO[:4], strict=True):
-        value = surface.evaluate(fabric, wi, wo, uv=places, level="weave", multiple=False)
-        over_places += value.mean(axis=0)
+        i, o = (np.repeat(w[:, None], len(places), axis=1) for w in (wi, wo))
+        over_places += surface._evaluate(law, "weave", hit, i, o).mean(axis=1)
         far += law_value(R, law, FAR, 0, 0, 0.0, 0.0, *wi, *wo)
-    # The conserving integrand has corners, on pile at 85 degrees too: MODEL section 7's 0.2 %.
-    corners = model == "conserving"
-    assert over_places == pytest.approx(far, rel=2e-3 if corners else 1e-3)
+    assert over_places == pytest.approx(far, rel=1e-3)
 
 
 @pytest.mark.parametrize(("name", "model"), [(n, m) for n in PRESETS for m in MODELS])
@@ -162,13 +162,17 @@ def test_a_gap_reflects_nothing_and_a_thread_does(level, model):
 
 @pytest.mark.parametrize("level", ["weave", "thread"])
 @pytest.mark.parametrize("shadow", METHODS)
-def test_shadowing_only_darkens(level, shadow):
+def test_shadowing_multiplies_by_the_light_that_arrives_over_its_mean(level, shadow):
     fabric = PRESETS["polyester_satin_charmeuse"]
     places, wi = spread_places(400), random_directions(400, 4)
     open_sky = surface.evaluate(fabric, wi, VIEWS["normal"], uv=places, level=level)
     shadowed = surface.evaluate(fabric, wi, VIEWS["normal"], uv=places, level=level, shadow=shadow)
-    assert (shadowed <= open_sky * (1 + 1e-12)).all()
-    assert (shadowed.sum() < open_sky.sum()) == (shadow != "none")
+    g = shadowing(fabric, wi, places, shadow, level=level)
+    tables = compile_shadow(fabric, shadow, level=level, precision=np.float64)
+    mean = np.array([mean_lit(R, tables, *w) for w in wi])
+    assert shadowed == pytest.approx(open_sky * (g / mean)[:, None], rel=1e-9)
+    assert (g.sum() < len(g)) == (shadow != "none")
+    assert (mean.min() < 1) == (shadow in ("horizon", "traced"))
 
 
 def test_level_far_has_no_place_and_takes_no_shadow():

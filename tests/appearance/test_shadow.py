@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fabricusd.appearance import surface
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.height import highest_point
 from fabricusd.appearance.horizon import shape_repeat
@@ -284,7 +285,7 @@ def test_what_is_not_a_number_is_counted_or_stays(linen: tuple[CompiledFabric, S
     uv, wi = np.full((3, 2), 0.5), np.full((3, 3), 0.5, np.float32)
     uv[0, 0] = wi[0, 1] = wi[2, 2] = math.nan
     g = np.zeros(3, np.float32)
-    lit_all(np.float32, cloth, shadow, uv, wi, g)
+    lit_all(np.float32, cloth, shadow, False, uv, wi, g)
     assert np.isnan(g).all()
 
 
@@ -320,3 +321,31 @@ def test_float32_agrees_with_float64_away_from_the_edges() -> None:
             g[real] = shadowing(fabric, wi, uv, compiled=(cloth, shadow))
         error = np.abs(g[np.float32] - g[np.float64])
         assert np.quantile(error, 0.995) < 1e-3, method
+
+
+@pytest.mark.parametrize("name", ["silk_crepe_de_chine", "polyester_satin_charmeuse", "silk_shot"])
+def test_shade_keeps_the_light_that_the_masking_term_left(name: str) -> None:
+    """What `g` alone takes again, its mean gives back: within 12 % over lights and viewers."""
+    fabric = WOVEN[name]
+    uv = places(fabric, 1000, 3)
+    even, shaded, dimmed = 0.0, 0.0, 0.0
+    for wi, wo in zip(lights(16, 5, 30.0, 70.0), lights(16, 6, 30.0, 90.0), strict=True):
+        f = surface.evaluate(fabric, wi, wo, uv, "weave").mean(axis=1)
+        even += f.mean()
+        shaded += surface.evaluate(fabric, wi, wo, uv, "weave", "horizon").mean()
+        dimmed += (f * shadowing(fabric, np.tile(wi, (len(uv), 1)), uv, "horizon")).mean()
+    assert shaded == pytest.approx(even, rel=0.12)
+    assert dimmed < 0.88 * even
+
+
+def test_the_mean_of_light_is_that_of_the_threads_slopes() -> None:
+    """Straight down all arrives; on a cloth without heights all arrives from anywhere."""
+    for name, fabric in WOVEN.items():
+        mean = compile_shadow(fabric, "horizon", precision=np.float64).mean
+        assert (mean > 0).all(), name
+        assert (mean <= 1 + 1e-12).all(), name
+        assert mean[-1] == pytest.approx(1.0, abs=1e-6)
+        assert (mean[:, 0] == mean[:, -1]).all()
+        assert (np.diff(mean, axis=0) > -0.02).all()
+    flat = compile_shadow(PRESETS["velvet"], "traced", precision=np.float64).mean
+    assert flat == pytest.approx(np.ones_like(flat))

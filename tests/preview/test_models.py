@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -59,6 +61,26 @@ def test_the_highlight_is_longer_along_the_rougher_axis():
     along = evaluate("openpbr", glossy, np.array([[s, 0, np.sqrt(1 - s * s)]]), view)
     across = evaluate("openpbr", glossy, np.array([[0, s, np.sqrt(1 - s * s)]]), view)
     assert (along > across * 1.5).all()
+
+
+VALUES = json.loads(Path(__file__).with_name("materialx_values.json").read_text())
+
+
+@pytest.mark.parametrize("row", VALUES["rows"], ids=lambda r: r["kind"])
+def test_values_are_those_of_the_shaders_that_materialx_generates(row):
+    """`bench/materialx_values.py` ran them; they compute in float32."""
+    s, kind = row["surface"], row["kind"]
+    one = np.ones(len(VALUES["wi"]))
+    # UsdPreviewSurface knows neither anisotropy nor a tint.
+    rough, tint = (s["smooth"], [1.0] * 3) if kind == "preview" else (s["rough"], s["tint"])
+    made = Surface(
+        base=np.array(s["base"]), ior=s["ior"] * one, alpha_rough=rough * one,
+        alpha_smooth=s["smooth"] * one, tint=np.array(tint),
+        fuzz_weight=s["fuzz_weight"] * one, fuzz_color=np.array(s["fuzz_color"]),
+        fuzz_roughness=s["fuzz_roughness"] * one,
+    )  # fmt: skip
+    got = evaluate(kind, made, np.array(VALUES["wi"]), np.array(VALUES["wo"]))
+    assert np.allclose(got, row["values"], rtol=2e-4, atol=1e-6)
 
 
 def texels(**changes):

@@ -147,7 +147,7 @@ def test_materialx_validates_and_generates_every_language(tmp_path):
     mx.loadLibraries(mx.getDefaultDataLibraryFolders(), search, library)
     document = mx.createDocument()
     mx.readFromXmlFile(document, str(path))
-    document.setDataLibrary(library)
+    document.importLibrary(library)
     valid, message = document.validate()
     assert valid, message
     generators = (
@@ -156,11 +156,12 @@ def test_materialx_validates_and_generates_every_language(tmp_path):
         PyMaterialXGenMdl.MdlShaderGenerator,
     )
     for kind in generators:
-        context = shaders.GenContext(kind.create())
+        generator = kind.create()
+        context = shaders.GenContext(generator)
         context.registerSourceCodeSearchPath(search)
         for material in document.getMaterialNodes():
             surface = mx.getShaderNodes(material)[0]
-            made = context.getShaderGenerator().generate(material.getName(), surface, context)
+            made = generator.generate(material.getName(), surface, context)
             assert len(made.getSourceCode("pixel")) > 1000
 
 

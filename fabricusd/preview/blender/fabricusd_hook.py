@@ -50,8 +50,9 @@ class Network:
         )
 
     def constant(self, name: str) -> Any:
-        """The value of an input of the material."""
-        return self.material.GetInput(name).Get()
+        """A parameter of the look: the one fitted to Principled BSDF, or else OpenPBR's."""
+        own = self.material.GetInput(f"principled:{name}")
+        return (own or self.material.GetInput(name)).Get()
 
     def file(self, name: str) -> str | None:
         """The texture of a map, `<UDIM>` in it for tiles; None where a constant stands in."""

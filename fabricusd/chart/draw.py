@@ -1,0 +1,93 @@
+"""Panels as pictures. Drawing needs matplotlib, which only the extra `docs` installs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from fabricusd.chart.panel import Panel, Row
+from fabricusd.errors import FabricError
+from fabricusd.files import whole_file
+
+COLUMNS = 3
+
+
+def pyplot() -> Any:
+    """matplotlib's pyplot, drawing without a display; FabricError where it is not installed."""
+    try:
+        import matplotlib
+    except ImportError:
+        raise FabricError(
+            "matplotlib", "is not installed; pip install 'fabricusd[docs]' draws charts"
+        ) from None
+    matplotlib.use("Agg")
+    # The same drawing gives the same file.
+    matplotlib.rcParams["svg.hashsalt"] = "fabricusd"
+    import matplotlib.pyplot
+
+    return matplotlib.pyplot
+
+
+def draw_panel(panel: Panel, rows: Sequence[Row], stem: Path) -> list[Path]:
+    """`<stem>.png` and `<stem>.svg` of a panel's rows."""
+    plt = pyplot()
+    groups = list(dict.fromkeys(row.group for row in rows))
+    lines = 2 if panel.draw else -(-len(groups) // COLUMNS)
+    figure = plt.figure(figsize=(13, 0.6 + 3.6 * lines), layout="constrained")
+    figure.suptitle(panel.title)
+    if panel.draw:
+        panel.draw(figure, rows)
+    else:
+        _scatter(figure, panel, rows, groups, lines)
+    return save(figure, stem)
+
+
+def save(figure: Any, stem: Path, suffixes: Sequence[str] = (".png", ".svg")) -> list[Path]:
+    """Write a figure whole in each format, and close it; returns the files."""
+    written = []
+    for suffix in suffixes:
+        path = stem.with_suffix(suffix)
+        metadata = {"Date": None} if suffix == ".svg" else None
+        with whole_file(path) as temporary:
+            figure.savefig(temporary, dpi=90, metadata=metadata)
+        written.append(path)
+    pyplot().close(figure)
+    return written
+
+
+def _scatter(
+    figure: Any, panel: Panel, rows: Sequence[Row], groups: Sequence[str], lines: int
+) -> None:
+    """Error against cost, logarithmic, a small plot a group; the front joined and named."""
+    plots = figure.subplots(lines, COLUMNS, squeeze=False).ravel()
+    for axes, group in zip(plots, groups, strict=False):
+        mine = [row for row in rows if row.group == group]
+        for front, color in ((True, "C0"), (False, "0.65")):
+            some = [row for row in mine if row.on_front == front]
+            axes.errorbar(
+                [r.cost for r in some], [max(r.error, 1e-9) for r in some],
+                xerr=[r.cost_spread for r in some], yerr=[_below(r) for r in some],
+                fmt="o", ms=4, lw=0.8, color=color,
+            )  # fmt: skip
+            for row in some:
+                axes.annotate(
+                    row.method, (row.cost, max(row.error, 1e-9)), xytext=(4, 3 if front else -8),
+                    textcoords="offset points", fontsize=6, color="k" if front else "0.45",
+                )  # fmt: skip
+        front_rows = sorted((r for r in mine if r.on_front), key=lambda r: r.cost)
+        axes.step(
+            [r.cost for r in front_rows], [max(r.error, 1e-9) for r in front_rows],
+            where="post", lw=0.8,
+        )  # fmt: skip
+        axes.set(xscale="log", yscale="log", xlabel=panel.cost, ylabel=panel.error)
+        axes.set_title(group, fontsize=8)
+        axes.margins(x=0.25)
+        axes.grid(alpha=0.3)
+    for axes in plots[len(groups) :]:
+        axes.set_axis_off()
+
+
+def _below(row: Row) -> float:
+    # A spread as large as the error itself has no place on a logarithmic axis.
+    return min(row.error_spread, 0.9 * max(row.error, 1e-9))

@@ -1,0 +1,78 @@
+"""How wrong each level is at each width of a pixel: what level `auto` has to choose between.
+
+The truth is level `thread` averaged over the pixel, a square turned against the weave. A pixel's
+mean is the cloth's spectrum times that of the square, so that errors are sums over the spectrum,
+exact for pixels that lie anywhere: root mean squares over all places, over the cloth's mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.appearance.footprint import LEVELS, weights
+from fabricusd.chart.cloth_picture import FINE, TURN, View, cloth_spectrum
+from fabricusd.fabric import Fabric
+
+Floats = NDArray[np.float64]
+Direction = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Zoom:
+    """A cloth at a row of distances.
+
+    widths : (k,) - of a pixel [threads]
+    products : (k, 3, 3) - mean over all places of the product of two levels' pixels, each less the
+        truth, over the square of the cloth's mean
+    inside : (k, 3) - standard deviation of a level's values within a pixel, over the cloth's mean
+    weights : (k, 3) - with which `auto` takes the levels
+    """
+
+    widths: Floats
+    products: Floats
+    inside: Floats
+    weights: Floats
+
+    @property
+    def errors(self) -> Floats:
+        """(k, 3) of the levels alone, in the order of LEVELS; `thread` has none."""
+        return np.asarray(np.sqrt(np.einsum("kll->kl", self.products)), np.float64)
+
+    @property
+    def auto_errors(self) -> Floats:
+        """(k,) of what `auto` shows, in the mean over its choices."""
+        square = np.einsum("kl,klm,km->k", self.weights, self.products, self.weights)
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)), np.float64)
+
+
+def zoom(
+    fabric: Fabric, widths: Floats, wi: Direction, wo: Direction, shadow: str = "horizon"
+) -> Zoom:
+    """Levels and `auto` at pixels of `widths` [threads], lit from wi and seen from wo."""
+    view = View(fabric=fabric, wi=wi, wo=wo, a=1, b=0, shadow=shadow)
+    spectra = np.stack([_spectrum(view, level) for level in LEVELS])
+    mean = float(spectra[2, 0, 0].real)
+    power = np.abs(spectra) ** 2 / mean**2
+    missing = ((spectra - spectra[2]) / mean).reshape(3, -1)
+    k = np.fft.fftfreq(FINE, 1.0 / FINE) / view.repeat
+    v, u = np.meshgrid(k, k, indexing="ij")
+    c, s = np.cos(TURN), np.sin(TURN)
+    products, inside = np.empty((len(widths), 3, 3)), np.empty((len(widths), 3))
+    for n, width in enumerate(widths):
+        square = (np.sinc(width * (c * u + s * v)) * np.sinc(width * (c * v - s * u))) ** 2
+        weighted = missing * square.ravel()
+        products[n] = (weighted @ missing.conj().T).real
+        inside[n] = np.sqrt(np.maximum((power * (1.0 - square)).sum(axis=(1, 2)), 0.0))
+    extents = np.stack((widths, widths), axis=1)
+    return Zoom(widths=widths, products=products, inside=inside, weights=weights(fabric, extents))
+
+
+def _spectrum(view: View, level: str) -> NDArray[np.complex128]:
+    if level != "far":
+        return cloth_spectrum(view, level)
+    flat = np.zeros((FINE, FINE), np.complex128)
+    flat[0, 0] = view.value(np.zeros((1, 2)), "far")[0]
+    return flat

@@ -1,0 +1,88 @@
+"""The chart command's work: measure the panels, write tables, pictures and the page."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from fabricusd.chart.draw import draw_panel, pyplot
+from fabricusd.chart.page import Charts, markdown, write_csv, write_json
+from fabricusd.chart.panel import Panel, Row, measure
+from fabricusd.chart.registry import PANELS
+from fabricusd.chart.sheets import SHEETS
+from fabricusd.errors import FabricError
+from fabricusd.files import whole_file
+
+
+def chosen_panels(names: Sequence[str] | None) -> list[Panel]:
+    """The panels of these names, all without any; FabricError for a name that there is not."""
+    known = {panel.name: panel for panel in PANELS}
+    for name in names or ():
+        if name not in known:
+            raise FabricError("--panel", f"is '{name}'; it must be one of {', '.join(known)}")
+    return [known[name] for name in names or known]
+
+
+def chosen_sheets(names: Sequence[str] | None, everything: bool) -> list[str]:
+    """The sheets of these names; without any all or none."""
+    for name in names or ():
+        if name not in SHEETS:
+            raise FabricError("--sheet", f"is '{name}'; it must be one of {', '.join(SHEETS)}")
+    return list(names or (SHEETS if everything else ()))
+
+
+def make_charts(
+    folder: Path,
+    *,
+    quick: bool = False,
+    names: Sequence[str] | None = None,
+    sheets: Sequence[str] | None = None,
+    page: Path | None = None,
+    say: Callable[[str], None] = lambda _line: None,
+) -> list[Path]:
+    """Write `charts.csv`, `charts.json`, a PNG and an SVG a panel, the sheets, and `charts.md`.
+
+    names, sheets : those alone; without either everything, or when quick the panels
+    page : where the page goes, if not into `folder`; its pictures stay there
+
+    Returns the files.
+    """
+    drawn = chosen_sheets(sheets, everything=not (quick or names))
+    panels = [] if sheets and not names else chosen_panels(names)
+    pyplot()
+    folder.mkdir(parents=True, exist_ok=True)
+    begun = time.perf_counter()
+    charts: dict[str, tuple[Panel, list[Row]]] = {}
+    for panel in panels:
+        start = time.perf_counter()
+        charts[panel.name] = (panel, measure(panel, quick))
+        say(f"{panel.name}: {time.perf_counter() - start:.0f} s")
+    written = []
+    for name in drawn:
+        start = time.perf_counter()
+        written += SHEETS[name][1](folder, quick)
+        say(f"{name}: {time.perf_counter() - start:.0f} s")
+    if charts:
+        written += _write(folder, charts, drawn, page, quick, time.perf_counter() - begun)
+    return written
+
+
+def _write(
+    folder: Path, charts: Charts, sheets: Sequence[str], page: Path | None, quick: bool,
+    seconds: float,
+) -> list[Path]:  # fmt: skip
+    """Tables, pictures and the page."""
+    written = [folder / "charts.csv", folder / "charts.json", page or folder / "charts.md"]
+    write_csv(written[0], [row for _, rows in charts.values() for row in rows])
+    write_json(written[1], charts, seconds, quick)
+    for name, (panel, rows) in charts.items():
+        written += draw_panel(panel, rows, folder / name)
+    images = "" if page is None else f"{folder.relative_to(page.parent).as_posix()}/"
+    command = f"fabricusd chart -o {folder.as_posix()}" + (" --quick" if quick else "")
+    if page is not None:
+        command += f" --page {page.as_posix()}"
+    shown = {name: SHEETS[name][0] for name in sheets}
+    with whole_file(written[2]) as temporary:
+        temporary.write_text(markdown(charts, shown, images, command), encoding="utf-8")
+    return written

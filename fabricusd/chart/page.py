@@ -1,0 +1,113 @@
+"""Panels as CSV, JSON and Markdown."""
+
+from __future__ import annotations
+
+import csv
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import fabricusd
+from fabricusd.chart.panel import Panel, Row, relative_costs
+from fabricusd.files import whole_file
+
+Charts = Mapping[str, tuple[Panel, Sequence[Row]]]
+
+
+def write_csv(path: Path, rows: Sequence[Row]) -> None:
+    """One line a row; further figures are columns of their own."""
+    lines = [
+        {**row.as_dict(), "relative_cost": relative}
+        for row, relative in zip(rows, relative_costs(rows), strict=True)
+    ]
+    names = list(dict.fromkeys(name for line in lines for name in line))
+    with whole_file(path) as temporary, temporary.open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, names)
+        writer.writeheader()
+        writer.writerows(lines)
+
+
+def write_json(path: Path, charts: Charts, seconds: float, quick: bool) -> None:
+    """Every panel with its axes and rows, and what they were measured with."""
+    content = {
+        "software": f"fabricusd {fabricusd.__version__}",
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+        "seconds": round(seconds, 1),
+        "quick": quick,
+        "panels": {
+            name: {
+                "title": panel.title,
+                "cost": panel.cost,
+                "error": panel.error,
+                "rows": [row.as_dict() for row in rows],
+            }
+            for name, (panel, rows) in charts.items()
+        },
+    }
+    with whole_file(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+
+
+def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: str) -> str:
+    """The page: a picture, the front, and who is dominated by whom, for each panel; the sheets."""
+    parts = [
+        "# Speed against accuracy\n",
+        f"Made by `{command}`: every method in one process on one machine, in turns. Cost is given "
+        "as a multiple of the cheapest method's in its group; ± is half the range between the "
+        "quartiles over repeats. A method is dominated when another is no dearer and no worse, and "
+        "better in either by more than both spreads. `charts.csv` and `charts.json` hold every "
+        "figure, absolute costs included.\n",
+    ]
+    for name, (panel, rows) in charts.items():
+        parts += [
+            f"## {panel.title}\n",
+            f"{panel.about}\n",
+            f"Cost: {panel.cost}. Error: {panel.error}.\n",
+            f"![{panel.title}]({images}{name}.png)\n",
+            *_tables(rows),
+        ]
+    if sheets:
+        parts.append("## The thesis's pictures\n")
+    for name, about in sheets.items():
+        parts += [f"{about}.\n", f"![{name}]({images}{name}.png)\n"]
+    return "\n".join(parts)
+
+
+def _tables(rows: Sequence[Row]) -> list[str]:
+    """The front's rows as a table, the others in a line a group."""
+    relative = relative_costs(rows)
+    lines = ["| measured on | method on the front | cost | error |", "|---|---|---|---|"]
+    beaten: dict[str, list[str]] = {}
+    last = ""
+    for row, cost in zip(rows, relative, strict=True):
+        if row.on_front:
+            spread = row.cost_spread / row.cost * cost if row.cost else 0.0
+            group = "" if row.group == last else row.group
+            last = row.group
+            lines.append(
+                f"| {group} | {row.method} | {number(cost)} ± {number(spread)} "
+                f"| {number(row.error)} ± {number(row.error_spread)} |"
+            )
+        else:
+            beaten.setdefault(row.group, []).append(f"{row.method} (by {row.dominated_by})")
+    lines.append("")
+    if beaten:
+        lines.append("<details><summary>Dominated</summary>\n")
+        lines += [f"- {group}: {'; '.join(methods)}" for group, methods in beaten.items()]
+        lines.append("\n</details>\n")
+    return lines
+
+
+def number(x: float) -> str:
+    """Two digits, without an exponent where that reads well."""
+    return (
+        "0"
+        if x == 0
+        else f"{x:.2g}"
+        if 1e-3 <= abs(x) < 100
+        else f"{x:.0f}"
+        if x >= 100
+        else f"{x:.1e}"
+    )

@@ -1,0 +1,14 @@
+"""The panels, in the order of the page. To add one: a module with a PANEL, and its line here."""
+
+from __future__ import annotations
+
+from fabricusd.chart import baked, pictures, reflectance, shadows, zoom
+from fabricusd.chart.panel import Panel
+
+PANELS: tuple[Panel, ...] = (
+    reflectance.PANEL,
+    pictures.PANEL,
+    zoom.PANEL,
+    shadows.PANEL,
+    *baked.PANELS,
+)
