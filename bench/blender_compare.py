@@ -48,6 +48,7 @@ TOWARDS = np.array([0.45, 0.5, 0.74]) / np.linalg.norm([0.45, 0.5, 0.74])
 IRRADIANCE = math.pi
 SIZE = (300, 200)
 KINDS = ("preview", "hook", "osl")
+ROW = ("reference", *KINDS)
 
 
 class Subject:
@@ -158,11 +159,20 @@ def compare(picture, truth):
     return found, relative
 
 
-def strip(paths, out):
-    """The pictures in a row as PNG."""
-    rows = [read_exr_layers(p)[0]["beauty"][..., :3] for p in paths]
-    codes = srgb_encode(np.clip(np.concatenate(rows, axis=1), 0.0, 1.0))
-    write_png(out, np.rint(codes * 255).astype(np.uint8))
+def stack(folder, names):
+    """All rows of pictures under one another at half size, as `side_by_side.png`."""
+    rows = [
+        np.concatenate(
+            [read_exr_layers(folder / f"{name}.{kind}.exr")[0]["beauty"][..., :3] for kind in ROW],
+            axis=1,
+        )
+        for name in names
+    ]
+    pixels = np.clip(np.concatenate(rows, axis=0), 0.0, 1.0)
+    h, w = pixels.shape[0] // 2, pixels.shape[1] // 2
+    small = pixels.reshape(h, 2, w, 2, 3).mean(axis=(1, 3))
+    out = folder / "side_by_side.png"
+    write_png(out, np.rint(srgb_encode(small) * 255).astype(np.uint8))
 
 
 def main() -> None:
@@ -177,6 +187,7 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     print("| subject | preset | material | mean radiance | delta E mean | 95th |")
     print("|---|---|---|---|---|---|")
+    done: list[str] = []
     for subject in (s for s in (CYLINDER, GARMENT) if s.name in options.subjects):
         for preset in options.presets:
             scene = make_scene(subject, preset, folder)
@@ -195,7 +206,8 @@ def main() -> None:
                     f"| {error.delta_e_mean:.2f} | {error.delta_e_95:.2f} |",
                     flush=True,
                 )
-            strip([truth, *(Path(j["picture"]) for j in jobs)], folder / f"{scene.stem}.png")
+            done.append(scene.stem)
+    stack(folder, done)
 
 
 if __name__ == "__main__":

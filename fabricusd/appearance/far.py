@@ -147,7 +147,7 @@ def far_values(R, tables, wi, wo, out, begin, end):
             out[2, start + x] = R(0) if dark else block[BLUE + x] * inverse
 
 
-@njit(**INLINE)
+@njit(**LEAN)
 def _add_node(R, tables, k, size, block):
     """Node k's share of `Q` and of the value, for a block, by the loop that its kind needs."""
     thread = tables.node_thread[k]

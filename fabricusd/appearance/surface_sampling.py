@@ -18,7 +18,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.blocks import node_range
@@ -181,11 +181,11 @@ def _in_single_precision(tables: SurfaceTables) -> SurfaceTables:
     )
 
 
-@njit(**KERNEL, parallel=True)
+@njit(**KERNEL)
 def _measure(R, tables, stretches, owner, energy):
     """Energy of every stretch at every view, by directions drawn from its lobes, shared by them."""
-    for view in prange(ELEVATIONS * AZIMUTHS):
-        drawn = np.empty((3 * STRATA[0] * STRATA[1], 4), stretches.dtype)
+    drawn = np.empty((3 * STRATA[0] * STRATA[1], 4), stretches.dtype)
+    for view in range(ELEVATIONS * AZIMUTHS):
         _measure_view(R, tables, stretches, owner, view // AZIMUTHS, view % AZIMUTHS, drawn, energy)
 
 
@@ -204,7 +204,7 @@ def _measure_view(R, tables, stretches, owner, e, a, drawn, energy):
             energy[e, a, 3 * y + lobe] = total * shares[lobe]
 
 
-@njit(**INLINE)
+@njit(**LEAN)
 def _draw_lobe(R, tables, stretches, owner, y, lobe, ox, oy, oz, drawn):
     """The stretch's part of the far value and the densities of its lobes, at one lobe's draws.
 

@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=["openpbr"],
         metavar="NAME",
-        help="openpbr, standard_surface, gltf_pbr; USD takes the first",
+        help="openpbr, standard_surface, gltf_pbr, hair; USD takes the first",
     )
     parser.add_argument("--usdz", metavar="FILE", help="also package the look in one file")
     parser.add_argument(

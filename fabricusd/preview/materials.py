@@ -45,12 +45,8 @@ def write_materials(
     overwrite, a scene that was not baked.
     """
     settings = settings or Settings()
-    unknown = [s for s in settings.surfaces if s not in GRAPHS]
-    if unknown:
-        raise FabricError(
-            f"surface '{unknown[0]}'", f"is unknown; it must be of {', '.join(GRAPHS)}"
-        )
     folder = read_bake_folder(bake)
+    _check_surfaces(folder, settings)
     path = Path(out) if out is not None else folder.path / "look.usda"
     _check_target(path, clobber)
     made = Written()
@@ -69,13 +65,32 @@ def write_materials(
     if dressed is not None:
         assert scene is not None
         write_scene_look(path, Path(scene), dressed, made_of, custom)
-        if dressed.uv:
-            made.files.append(path.with_suffix(".uv.usdc"))
+        made.files += [path.with_suffix(".uv.usdc")] if dressed.uv else []
     else:
         write_baked_look(path, folder.garments, made_of, custom, _up_axis(folder))
     write_mtlx(path.with_suffix(".mtlx"), documents)
     write_json(path.with_suffix(".json"), _report(made))
     made.files += [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
+    _write_more(folder, path, settings, made, clobber)
+    return made
+
+
+def _check_surfaces(folder: BakeFolder, settings: Settings) -> None:
+    known = (*GRAPHS, "hair")
+    for name in settings.surfaces:
+        if name not in known:
+            raise FabricError(f"surface '{name}'", f"is unknown; it must be of {', '.join(known)}")
+    nameless = [lay.name for one in folder.garments for lay in one.lays if lay.fabric is None]
+    if "hair" in settings.surfaces and nameless:
+        raise FabricError(
+            f"fabric '{nameless[0]}'", "is not in the folder; surface 'hair' needs it, bake again"
+        )
+
+
+def _write_more(
+    folder: BakeFolder, path: Path, settings: Settings, made: Written, clobber: bool
+) -> None:
+    """What is written only when asked for."""
     for name, fabric in _fabrics(folder).items():
         if settings.osl:
             shader = path.with_name(f"{path.stem}.{name}.osl")
@@ -87,7 +102,6 @@ def write_materials(
     if settings.usdz is not None:
         write_usdz(path, settings.usdz, clobber=clobber)
         made.files.append(settings.usdz)
-    return made
 
 
 def _fabrics(folder: BakeFolder) -> dict[str, Fabric]:

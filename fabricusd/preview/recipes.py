@@ -13,6 +13,7 @@ from fabricusd.errors import FabricError
 from fabricusd.preview.bake_folder import BakeFolder, MapSet
 from fabricusd.preview.fit import Fitted, fit
 from fabricusd.preview.graph import Texture, Value
+from fabricusd.preview.hair import hair
 from fabricusd.preview.layer import MaterialRecipe, Recipes
 from fabricusd.preview.look import Look
 from fabricusd.preview.surfaces import GRAPHS, MAPS, Inputs, parameter_values, preview
@@ -43,7 +44,8 @@ NEUTRAL = {
 class Settings:
     """What is written.
 
-    surfaces : MaterialX surfaces, names of `surfaces.GRAPHS`; USD takes the first, the document all
+    surfaces : MaterialX surfaces, names of `surfaces.GRAPHS` or "hair"; USD takes the first, the
+        document all
     fitted : whether the parameters are sought; otherwise the textures stand as they are
     usdz : a package of the look to write as well
     u3m : a folder for a U3M swatch of each fabric as well
@@ -75,7 +77,7 @@ def recipes(
     documents = []
     for maps in folder.garments:
         textures = texture_inputs(maps, path, made)
-        for number in range(len(maps.lays)):
+        for number, lay in enumerate(maps.lays):
             name = prim_name(maps.name if len(maps.lays) == 1 else f"{maps.name}_{number}")
             looks = _looks(maps, number, settings, made, progress)
             means = mean_inputs(maps, number)
@@ -84,7 +86,10 @@ def recipes(
             opaque = cover > OPAQUE
             for variant, inputs in (("baked", textures), ("procedural", means)):
                 title = name if variant == "baked" else f"{name}_plain"
-                graphs = {s: GRAPHS[s](inputs, opaque) for s in settings.surfaces}
+                graphs = {
+                    s: GRAPHS[s](inputs, opaque) if s in GRAPHS else hair(inputs, opaque, lay)
+                    for s in settings.surfaces
+                }
                 first = settings.surfaces[0]
                 found[maps.name, number, variant] = MaterialRecipe(
                     name=title,
@@ -148,8 +153,8 @@ def _looks(
 ) -> dict[str, Look]:  # fmt: skip
     """The look for each surface that is written; lays of one fabric and scale share a fit."""
     lay = maps.lays[number]
-    kinds = ("preview", "principled", *settings.surfaces)
-    plain = dict.fromkeys(kinds, Look())
+    kinds = ("preview", "principled", *(s for s in settings.surfaces if s in GRAPHS))
+    plain = dict.fromkeys(("preview", "principled", *settings.surfaces), Look())
     if not settings.fitted:
         return plain
     if lay.fabric is None:
@@ -167,4 +172,4 @@ def _looks(
             progress(f"fitting {kind} to {lay.name} on {maps.name}")
         found[kind] = fit(kind, texels, lay.fabric)
     made.fits[f"{maps.name} {lay.name}"] = found
-    return {kind: one.look for kind, one in found.items()}
+    return plain | {kind: one.look for kind, one in found.items()}

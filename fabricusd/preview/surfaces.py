@@ -42,17 +42,19 @@ def parameter_values(look: Look, prefix: str = "") -> dict[str, Value]:
     return {prefix + name: Value(kind, getattr(look, name)) for name, kind in PARAMETERS.items()}
 
 
-def _one(value: float) -> Value:
+def one(value: float) -> Value:
+    """A number as a source."""
     return Value("float", value)
 
 
-class _Maps:
+class Maps:
     """The image nodes of a MaterialX network, made when they are asked for."""
 
     def __init__(self, builder: Builder, maps: Inputs) -> None:
         self.builder, self.maps = builder, maps
 
     def __call__(self, name: str) -> Source:
+        """An image node's output, or the constant that stands in for it."""
         source, kind = self.maps[name], MAPS[name]
         if isinstance(source, Value):
             return source
@@ -63,7 +65,7 @@ class _Maps:
         )  # fmt: skip
 
 
-def _alphas(b: Builder, read: _Maps) -> tuple[Link, Link]:
+def _alphas(b: Builder, read: Maps) -> tuple[Link, Link]:
     """Microfacet alphas along the smoother and the rougher axis, at most 1."""
     found = []
     for name, texture in (("smooth", "roughness_along"), ("rough", "roughness_across")):
@@ -71,18 +73,18 @@ def _alphas(b: Builder, read: _Maps) -> tuple[Link, Link]:
             f"{name}_root", "multiply", "float", read(texture), Parameter(f"{name}_scale")
         )
         square = b.math(f"{name}_square", "multiply", "float", scaled, scaled)
-        found.append(b.math(f"{name}_alpha", "min", "float", square, _one(1.0)))
+        found.append(b.math(f"{name}_alpha", "min", "float", square, one(1.0)))
     return found[0], b.math("wide_alpha", "max", "float", found[1], found[0])
 
 
 def _anisotropy(b: Builder, smooth: Link, rough: Link) -> Link:
     """1 - smooth/rough."""
-    safe = b.math("rough_floor", "max", "float", rough, _one(1e-6))
+    safe = b.math("rough_floor", "max", "float", rough, one(1e-6))
     ratio = b.math("alpha_ratio", "divide", "float", smooth, safe)
-    return b.math("anisotropy", "subtract", "float", _one(1.0), ratio)
+    return b.math("anisotropy", "subtract", "float", one(1.0), ratio)
 
 
-def _frame(b: Builder, read: _Maps) -> dict[str, Source]:
+def _frame(b: Builder, read: Maps) -> dict[str, Source]:
     """Normal and tangent in the world; the tangent runs along the rougher axis, so that is the
     map's direction turned by a quarter."""
     space = Value("string", "world")
@@ -96,7 +98,7 @@ def _frame(b: Builder, read: _Maps) -> dict[str, Source]:
         inputs: dict[str, Source] = {"in": read("tangent"), "index": Value("integer", axis)}
         name = f"tangent_{'xy'[axis]}"
         parts.append(b.add(name, "extract", "float", "ND_extract_vector3", **inputs))
-    minus = b.math("tangent_minus_y", "multiply", "float", parts[1], _one(-1.0))
+    minus = b.math("tangent_minus_y", "multiply", "float", parts[1], one(-1.0))
     first = b.math("tangent_u", "multiply", "vector3", t, minus, short=True)
     second = b.math("tangent_v", "multiply", "vector3", s, parts[0], short=True)
     turned = b.math("tangent_sum", "add", "vector3", first, second)
@@ -106,16 +108,16 @@ def _frame(b: Builder, read: _Maps) -> dict[str, Source]:
     return {"normal": normal, "tangent": tangent}
 
 
-def _base(b: Builder, read: _Maps) -> Link:
+def _base(b: Builder, read: Maps) -> Link:
     scaled = b.math(
         "base_scaled", "multiply", "color3", read("base_color"), Parameter("base_color_scale")
     )
-    inputs: dict[str, Source] = {"in": scaled, "low": _one(0.0), "high": _one(1.0)}
+    inputs: dict[str, Source] = {"in": scaled, "low": one(0.0), "high": one(1.0)}
     return b.add("base", "clamp", "color3", "ND_clamp_color3FA", **inputs)
 
 
 def _fourth_root(b: Builder, value: Link) -> Link:
-    return b.math("roughness", "power", "float", value, _one(0.25))
+    return b.math("roughness", "power", "float", value, one(0.25))
 
 
 def _finished(b: Builder, node: Node) -> Graph:
@@ -126,14 +128,14 @@ def _finished(b: Builder, node: Node) -> Graph:
 def openpbr(maps: Inputs, opaque: bool) -> Graph:
     """OpenPBR 1.1: base, anisotropic reflection with a tangent map, fuzz, opacity, thin wall."""
     b = Builder()
-    read = _Maps(b, maps)
+    read = Maps(b, maps)
     smooth, rough = _alphas(b, read)
     squares = b.math(
         "alpha_squares", "add", "float",
         b.math("smooth_alpha_square", "multiply", "float", smooth, smooth),
         b.math("rough_alpha_square", "multiply", "float", rough, rough),
     )  # fmt: skip
-    mean = b.math("alpha_mean_square", "multiply", "float", squares, _one(0.5))
+    mean = b.math("alpha_mean_square", "multiply", "float", squares, one(0.5))
     frame = _frame(b, read)
     inputs: dict[str, Source] = {
         "base_color": _base(b, read),
@@ -162,14 +164,14 @@ def openpbr(maps: Inputs, opaque: bool) -> Graph:
 def standard_surface(maps: Inputs, opaque: bool) -> Graph:
     """Autodesk Standard Surface."""
     b = Builder()
-    read = _Maps(b, maps)
+    read = Maps(b, maps)
     smooth, rough = _alphas(b, read)
     product = b.math("alpha_product", "multiply", "float", smooth, rough)
     frame = _frame(b, read)
     inputs: dict[str, Source] = {
-        "base": _one(1.0),
+        "base": one(1.0),
         "base_color": _base(b, read),
-        "specular": _one(1.0),
+        "specular": one(1.0),
         "specular_color": Parameter("specular_tint"),
         "specular_IOR": Parameter("specular_ior"),
         "specular_roughness": _fourth_root(b, product),
@@ -198,11 +200,11 @@ def gltf_pbr(maps: Inputs, opaque: bool) -> Graph:
     """glTF PBR with KHR_materials_anisotropy and _sheen: alpha along the tangent is
     `mix(roughness^2, 1, strength^2)`."""
     b = Builder()
-    read = _Maps(b, maps)
+    read = Maps(b, maps)
     smooth, rough = _alphas(b, read)
     room = b.math(
         "alpha_room", "max", "float",
-        b.math("alpha_free", "subtract", "float", _one(1.0), smooth), _one(1e-6),
+        b.math("alpha_free", "subtract", "float", one(1.0), smooth), one(1e-6),
     )  # fmt: skip
     gain = b.math("alpha_gain", "subtract", "float", rough, smooth)
     square = b.math("strength_square", "divide", "float", gain, room)
@@ -213,9 +215,9 @@ def gltf_pbr(maps: Inputs, opaque: bool) -> Graph:
     )  # fmt: skip
     inputs: dict[str, Source] = {
         "base_color": _base(b, read),
-        "metallic": _one(0.0),
-        "roughness": b.math("roughness", "power", "float", smooth, _one(0.5)),
-        "anisotropy_strength": b.math("strength", "power", "float", square, _one(0.5)),
+        "metallic": one(0.0),
+        "roughness": b.math("roughness", "power", "float", smooth, one(0.5)),
+        "anisotropy_strength": b.math("strength", "power", "float", square, one(0.5)),
         "specular_color": Parameter("specular_tint"),
         "ior": Parameter("specular_ior"),
         "sheen_color": sheen,
@@ -261,9 +263,9 @@ def preview(maps: Inputs, look: Look, opaque: bool) -> Graph:
     inputs: dict[str, Source] = {
         "useSpecularWorkflow": Value("integer", 0),
         "diffuseColor": read("base_color", "rgb", (*look.base_color_scale, 1.0)),
-        "metallic": _one(0.0),
+        "metallic": one(0.0),
         "roughness": read("roughness_along", "r", (look.smooth_scale,) * 4),
-        "ior": _one(look.specular_ior),
+        "ior": one(look.specular_ior),
         "normal": read("normal", "rgb", (2.0, 2.0, 2.0, 1.0), -1.0),
     }
     if not opaque:

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
+from numpy.typing import NDArray
+from scipy.cluster.vq import kmeans2
 
 from fabricusd.preview.bake_folder import BakedLay, MapSet
 from fabricusd.preview.fit import TexelSample
 from fabricusd.reference.images import read_mip_level
 
-COUNT = 24
-"""Texels drawn of each lay: enough for the threads of a repeat at several tangent angles."""
+DRAWN, KINDS = 2048, 12
+"""Texels drawn of each lay, and the kinds that they are sorted into, each standing for its share:
+the threads of a repeat at several tangent angles."""
 
 NEEDED = ("base_color", "roughness_along", "roughness_across", "normal", "tangent", "opacity")
 
 
 def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
-    """COUNT texels of the lay `number`, None where the bake lacks a map that the fit needs."""
+    """Kinds of texels of the lay `number`; None where the bake lacks a map that a fit needs."""
     if any(name not in maps.textures for name in NEEDED):
         return None
     tile = next(iter(maps.textures["base_color"]))
@@ -27,7 +32,7 @@ def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
     places = np.flatnonzero(mine.ravel())
     if not len(places):
         return None
-    chosen = places[np.random.default_rng(1).integers(0, len(places), COUNT)]
+    chosen = places[np.random.default_rng(1).integers(0, len(places), DRAWN)]
     value = {
         name: pixels.reshape(-1, pixels.shape[-1])[chosen].astype(np.float64)
         for name, pixels in read.items()
@@ -46,9 +51,7 @@ def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
         ),
         axis=1,
     )  # fmt: skip
-    # Where a texel spans whole repeats all texels are alike, and one stands for them.
-    _, first, counts = np.unique(np.round(rows, 2), axis=0, return_index=True, return_counts=True)
-    rows = rows[first]
+    rows, weight = _kinds(rows)
     return TexelSample(
         base=rows[:, :3],
         smooth=rows[:, 3],
@@ -56,8 +59,24 @@ def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
         opacity=rows[:, 5],
         normal=rows[:, 6:9] / np.maximum(np.linalg.norm(rows[:, 6:9], axis=1, keepdims=True), 1e-9),
         tangent=rows[:, 9:],
-        weight=counts / counts.sum(),
+        weight=weight,
     )
+
+
+def _kinds(
+    rows: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(n, c) texels -> at most KINDS means of like ones, and their shares."""
+    different, counts = np.unique(np.round(rows, 2), axis=0, return_counts=True)
+    if len(different) <= KINDS:
+        # Where a texel spans whole repeats all texels are alike, and one stands for them.
+        return different, counts / counts.sum()
+    with warnings.catch_warnings():
+        # A kind may stay empty; its share is then 0.
+        warnings.simplefilter("ignore", UserWarning)
+        means, kind = kmeans2(rows, KINDS, minit="++", seed=1)
+    counts = np.bincount(kind, minlength=KINDS)
+    return means[counts > 0], counts[counts > 0] / counts.sum()
 
 
 def mean_texel(maps: MapSet, number: int) -> dict[str, tuple[float, ...]]:

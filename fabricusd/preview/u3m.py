@@ -10,6 +10,7 @@ import hashlib
 import math
 import tempfile
 import uuid
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -56,7 +57,7 @@ def write_u3m(
         maps = _swatch(fabric, Path(folder), ends, picks, resolution)
         lay = maps.lays[0]
         texels = draw_texels(maps, 0, lay)
-        look = fit("openpbr", texels, fabric).look if fitted and texels is not None else Look()
+        look = fit("principled", texels, fabric).look if fitted and texels is not None else Look()
         images, depth = pictures(maps, look)
     size = (1e3 * ends * fabric.warp.pitch, 1e3 * picks * fabric.weft.pitch)
     written = []
@@ -70,7 +71,8 @@ def write_u3m(
         codes = np.rint(np.clip(pixels, 0.0, 1.0) * 65535).astype(np.uint16)
         write_png(target, codes, color_space="sRGB" if name == "basecolor" else "raw")
         written.append(target)
-    write_json(path, material(fabric, images, look, depth, folder_name, size, resolution))
+    sheet = _Sheet(folder_name, size, resolution)
+    write_json(path, material(fabric, images, look, depth, sheet))
     return [path, *written]
 
 
@@ -125,58 +127,38 @@ def pictures(maps: MapSet, look: Look) -> tuple[dict[str, NDArray[np.float64]], 
     return found, depth
 
 
-def material(
-    fabric: Fabric, images: dict[str, NDArray[np.float64]], look: Look, depth: float,
-    folder: str, size: tuple[float, float], resolution: int,
-) -> dict[str, Any]:  # fmt: skip
-    """The document, by the schema of version 1.1."""
-    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    digest = hashlib.sha256(repr((fabric.name, fabric.threads, size)).encode()).digest()
-    dpi = {"x": resolution / size[0] * 25.4, "y": resolution / size[1] * 25.4}
+class _Sheet:
+    """Writes values as the schema wants them, with the images' common size."""
 
-    def image(name: str) -> dict[str, Any]:
+    def __init__(self, folder: str, size: tuple[float, float], resolution: int) -> None:
+        self.folder, self.size = folder, size
+        self.dpi = {k: resolution / mm * 25.4 for k, mm in zip("xy", size, strict=True)}
+
+    def image(self, name: str) -> dict[str, Any]:
+        """One picture."""
         return {
-            "path": f"{folder}/{name}.png", "width": size[0], "height": size[1], "dpi": dpi,
-            "repeat": {"rotation": 0.0, "mode": "normal"},
+            "path": f"{self.folder}/{name}.png", "width": self.size[0], "height": self.size[1],
+            "dpi": self.dpi, "repeat": {"rotation": 0.0, "mode": "normal"},
         }  # fmt: skip
 
-    def number(constant: float, name: str = "", factor: float = 1.0) -> dict[str, Any]:
-        texture = {"factor": factor, "offset": 0.0, "image": image(name)} if name else None
+    def number(self, constant: float, name: str = "", factor: float = 1.0) -> dict[str, Any]:
+        """A number, with a picture where it has one."""
+        texture = {"factor": factor, "offset": 0.0, "image": self.image(name)} if name else None
         return {"constant": constant, "texture": texture}
 
-    def color(rgb: tuple[float, ...], name: str = "") -> dict[str, Any]:
+    def color(self, rgb: Iterable[float], name: str = "") -> dict[str, Any]:
+        """A colour, with a picture where it has one."""
         white = {"r": 1.0, "g": 1.0, "b": 1.0}
-        texture = {"mode": "multiply", "factor": white, "image": image(name)} if name else None
-        return {"constant": dict(zip("rgb", rgb, strict=True)), "texture": texture}
+        texture = {"mode": "multiply", "factor": white, "image": self.image(name)} if name else None
+        return {"constant": dict(zip("rgb", map(float, rgb), strict=True)), "texture": texture}
 
-    mean = {name: values.mean(axis=(0, 1)) for name, values in images.items()}
-    up = {"x": 0.0, "y": 0.0, "z": 1.0}
-    reflected = ((look.specular_ior - 1.0) / (look.specular_ior + 1.0)) ** 2
-    front = {
-        "shader": "principled",
-        "basecolor": color(tuple(map(float, mean["basecolor"])), "basecolor"),
-        "normal": {"constant": up, "texture": {"scale": 1.0, "image": image("normal")}},
-        "roughness": number(float(mean["roughness"][0]), "roughness"),
-        "anisotropy_value": number(float(mean["anisotropy"][0]), "anisotropy"),
-        "anisotropy_rotation": number(float(mean["anisotropy_rotation"][0]), "anisotropy_rotation"),
-        "alpha": number(float(mean["alpha"][0]), "alpha"),
-        # A length, so in millimetres as all of the format's.
-        "displacement": number(depth * float(mean["displacement"][0]), "displacement", depth),
-        "ior": number(look.specular_ior),
-        "specular_value": number(reflected / 0.08),
-        "specular_tint": number(0.0),
-        "metalness": number(0.0),
-        "sheen_value": number(look.fuzz_weight),
-        "sheen_tint": number(1.0),
-        "clearcoat_value": number(0.0),
-        "clearcoat_roughness": number(0.0),
-        "clearcoat_normal": {"constant": up, "texture": None},
-        "subsurface_value": number(0.0),
-        "subsurface_radius": number(0.0),
-        "subsurface_color": color((0.0, 0.0, 0.0)),
-        "transmission": number(0.0),
-        "preview": None,
-    }
+
+def material(
+    fabric: Fabric, images: dict[str, NDArray[np.float64]], look: Look, depth: float, sheet: _Sheet
+) -> dict[str, Any]:
+    """The document, by the schema of version 1.1. depth : of the relief [mm]."""
+    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    digest = hashlib.sha256(repr((fabric.name, fabric.threads, sheet.size)).encode()).digest()
     return {
         "schema": "1.1",
         "custom": None,
@@ -184,10 +166,40 @@ def material(
             "id": str(uuid.UUID(bytes=digest[:16], version=4)),
             "name": fabric.name, "description": fabric.documentation,
             "created": now, "modified": now,
-            "front": front, "back": None, "side": None,
+            "front": _front(images, look, depth, sheet), "back": None, "side": None,
             "physics": physics(fabric), "metadata": None,
         },
     }  # fmt: skip
+
+
+def _front(
+    images: dict[str, NDArray[np.float64]], look: Look, depth: float, sheet: _Sheet
+) -> dict[str, Any]:
+    mean = {name: values.mean(axis=(0, 1)) for name, values in images.items()}
+    up = {"x": 0.0, "y": 0.0, "z": 1.0}
+    reflected = ((look.specular_ior - 1.0) / (look.specular_ior + 1.0)) ** 2
+    pictured = {
+        "roughness": "roughness", "anisotropy_value": "anisotropy",
+        "anisotropy_rotation": "anisotropy_rotation", "alpha": "alpha",
+    }  # fmt: skip
+    plain = {
+        "ior": look.specular_ior, "specular_value": reflected / 0.08, "specular_tint": 0.0,
+        "metalness": 0.0, "sheen_value": look.fuzz_weight, "sheen_tint": 1.0,
+        "clearcoat_value": 0.0, "clearcoat_roughness": 0.0, "subsurface_value": 0.0,
+        "subsurface_radius": 0.0, "transmission": 0.0,
+    }  # fmt: skip
+    return {
+        "shader": "principled",
+        "basecolor": sheet.color(mean["basecolor"], "basecolor"),
+        "normal": {"constant": up, "texture": {"scale": 1.0, "image": sheet.image("normal")}},
+        **{key: sheet.number(float(mean[name][0]), name) for key, name in pictured.items()},
+        # A length, so in millimetres as all of the format's.
+        "displacement": sheet.number(depth * float(mean["displacement"][0]), "displacement", depth),
+        **{key: sheet.number(value) for key, value in plain.items()},
+        "clearcoat_normal": {"constant": up, "texture": None},
+        "subsurface_color": sheet.color((0.0, 0.0, 0.0)),
+        "preview": None,
+    }
 
 
 def physics(fabric: Fabric) -> dict[str, Any]:

@@ -21,6 +21,7 @@ _TYPES = {
     "string": Sdf.ValueTypeNames.String,
     "token": Sdf.ValueTypeNames.Token,
     "surfaceshader": Sdf.ValueTypeNames.Token,
+    "BSDF": Sdf.ValueTypeNames.Token,
 }
 _PREVIEW_TYPES = {
     "result": Sdf.ValueTypeNames.Float2,

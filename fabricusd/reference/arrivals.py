@@ -14,7 +14,6 @@ from numba import njit
 
 from fabricusd.appearance.footprint import level_weights, pick_level
 from fabricusd.appearance.real import INLINE, KERNEL, LEAN
-from fabricusd.reference.counter import four_uniform
 from fabricusd.reference.embree import (
     DX,
     DY,
@@ -35,6 +34,7 @@ from fabricusd.reference.embree import (
 from fabricusd.reference.hit_frames import (
     BLOCK,
     BLOCK_ROWS,
+    CHOSEN,
     MADE,
     NUMBERS,
     RAY,
@@ -42,9 +42,10 @@ from fabricusd.reference.hit_frames import (
     make_frames,
     make_numbers,
 )
-from fabricusd.reference.lights import KIND, VISIBLE, choose_light, hit_light, sample_light
+from fabricusd.reference.light_sampling import no_lights, sample_evenly, sample_lights
+from fabricusd.reference.lights import VISIBLE, hit_light
 from fabricusd.reference.preview_surface import emission_at
-from fabricusd.reference.scene import DOME
+from fabricusd.reference.sobol import four_numbers
 from fabricusd.reference.triangles import RATE, RECORD
 from fabricusd.reference.triangles import T as TANGENTS
 from fabricusd.reference.wave import (
@@ -54,29 +55,22 @@ from fabricusd.reference.wave import (
     CORNERS,
     DEPTH,
     DIRECT,
-    DISTANCE,
     FAR_LEVEL,
     FOOTPRINT,
-    FRONT,
     INDIRECT,
     LANE_BETA,
     LANE_PDF,
     LANE_SPREAD,
     LANE_WIDTH,
     LEVEL,
-    LIGHT,
     LIGHT_PDF,
     MATERIAL,
     PATH,
     PLACE,
     SIDE,
     SPREAD,
-    TO_LIGHT,
     WI,
     WIDTH,
-    N,
-    U,
-    V,
 )  # fmt: skip
 from fabricusd.reference.wave import PRIMITIVE as TRIANGLE
 
@@ -88,7 +82,7 @@ MIS, LIGHT_ONLY, SURFACE_ONLY, UNIFORM = range(4)
 
 AUTO_LEVEL = 3
 NUMBERS_PER_STEP = 4
-"""Counters that a step of a path may use, see `counter.four_uniform`."""
+"""Places that a step of a path may use, see `sobol.four_numbers`."""
 
 QUEUES = 6
 """Queues of a material: three levels, two sides."""
@@ -97,7 +91,7 @@ QUEUES = 6
 @njit(**LEAN)
 def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, dome, film, keys,
            triangle_material, repeats, records, level, path_pixel, path_sample,
-           seed, counts):  # fmt: skip
+           numbers, counts):  # fmt: skip
     """Add the light that rays met, and give each lane that goes on the key of its queue, else -1.
 
     repeats : (materials, 2) float32 - ends and picks of a fabric's repeat, 0 where the surface has
@@ -132,12 +126,10 @@ def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, do
             if level == AUTO_LEVEL:
                 width = lanes[LANE_WIDTH, k] + reach * lanes[LANE_SPREAD, k]
                 path = lane_tags[0, k]
-                u, _, _, _ = four_uniform(
-                    path_pixel[path],
-                    path_sample[path],
+                u, _, _, _ = four_numbers(
+                    numbers, path_pixel[path], path_sample[path],
                     np.uint32(2 + NUMBERS_PER_STEP * step + 2),
-                    seed,
-                )
+                )  # fmt: skip
                 inverse = (nx * nx + ny * ny + nz * nz) / max(cosine * cosine, R(1e-30))
                 record = records[triangle]
                 queue = _level_of(record, width, inverse, repeats[material], dx, dy, dz, u)
@@ -186,7 +178,7 @@ def _meet_lights(k, depth, estimator, lights, dome, reach, lanes, lane_tags, fil
 
 @njit(**KERNEL)
 def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, records, lights, dome,
-            epsilon, path_pixel, path_sample, seed, hits, tags):  # fmt: skip
+            epsilon, path_pixel, path_sample, numbers, hits, tags):  # fmt: skip
     """Turn each lane with a key into a hit at the next place of its queue.
 
     offsets : (queues,) int64 - where each queue starts; advanced to where it ends.
@@ -194,6 +186,7 @@ def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, recor
     block = np.empty(BLOCK_ROWS * BLOCK, np.float32)
     counters = np.empty(2 * BLOCK, np.uint32)
     places = np.empty(BLOCK, np.int64)
+    choice, where = np.empty(BLOCK, np.int32), np.empty(BLOCK + 1, np.int32)
     k = 0
     while k < count:
         fill = 0
@@ -207,7 +200,15 @@ def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, recor
                       block, counters, hits, tags)  # fmt: skip
                 fill += 1
             k += 1
-        _flush(step, estimator, fill, places, block, counters, lights, dome, epsilon, seed, hits)
+        make_frames(fill, epsilon, block)
+        make_numbers(numbers, fill, np.uint32(2 + NUMBERS_PER_STEP * step), counters, block)
+        if estimator == UNIFORM:
+            sample_evenly(fill, block)
+        elif estimator == SURFACE_ONLY or lights.shape[0] == 0:
+            no_lights(fill, block)
+        else:
+            sample_lights(lights, dome, fill, choice, where, block)
+        _bring(fill, places, block, hits)
 
 
 @njit(**INLINE)
@@ -237,19 +238,16 @@ def _take(k, h, key, x, rays, lanes, lane_tags, records, path_pixel, path_sample
 
 
 @njit(**INLINE)
-def _flush(step, estimator, fill, places, block, counters, lights, dome, epsilon, seed, hits):
-    """Bring the block's frames and numbers to their hits, and choose a light for each."""
-    make_frames(fill, epsilon, block)
-    make_numbers(fill, np.uint32(2 + NUMBERS_PER_STEP * step), seed, counters, block)
+def _bring(fill, places, block, hits):
+    """Bring the block's frames, numbers and lights to their hits."""
     for x in range(fill):
         h = places[x]
         for row in range(SIDE + 1):
             hits[row, h] = block[MADE + row * BLOCK + x]
         for row in range(4):
             hits[CHANCE + row, h] = block[NUMBERS + row * BLOCK + x]
-        c0, c1 = block[NUMBERS + 4 * BLOCK + x], block[NUMBERS + 5 * BLOCK + x]
-        c2, c3 = block[NUMBERS + 6 * BLOCK + x], block[NUMBERS + 7 * BLOCK + x]
-        _choose_direction(estimator, lights, dome, c0, c1, c2, c3, hits, h)
+        for row in range(LIGHT_PDF + 1 - WI):
+            hits[WI + row, h] = block[CHOSEN + row * BLOCK + x]
 
 
 @njit(**LEAN)
@@ -265,35 +263,3 @@ def add_emission(count, surfaces, hits, tags, film):
             film[row, path] += red * hits[BETA, h]
             film[row + 1, path] += green * hits[BETA + 1, h]
             film[row + 2, path] += blue * hits[BETA + 2, h]
-
-
-@njit(**INLINE)
-def _choose_direction(estimator, lights, dome, c0, c1, c2, c3, hits, h):
-    """Write the direction to a light, what arrives from there, and its pdf."""
-    hits[LIGHT_PDF, h] = R(0)
-    hits[DISTANCE, h] = FAR
-    hits[LIGHT, h], hits[LIGHT + 1, h], hits[LIGHT + 2, h] = R(0), R(0), R(0)
-    if estimator == UNIFORM:
-        z = R(1) - R(2) * c1
-        r = math.sqrt(max(R(1) - z * z, R(0)))
-        phi = R(2 * math.pi) * c2
-        hits[WI, h], hits[WI + 1, h], hits[WI + 2, h] = r * math.cos(phi), r * math.sin(phi), z
-        return
-    hits[WI, h], hits[WI + 1, h], hits[WI + 2, h] = R(0), R(0), R(1)
-    if lights.shape[0] == 0 or estimator == SURFACE_ONLY:
-        return
-    light = lights[choose_light(lights, c0)]
-    dx, dy, dz, distance, red, green, blue, pdf = sample_light(
-        light, dome, hits[FRONT, h], hits[FRONT + 1, h], hits[FRONT + 2, h], c1, c2, c3
-    )
-    if pdf == R(0):
-        return
-    inverse = R(1) / abs(pdf)
-    hits[WI, h] = dx * hits[U, h] + dy * hits[U + 1, h] + dz * hits[U + 2, h]
-    hits[WI + 1, h] = dx * hits[V, h] + dy * hits[V + 1, h] + dz * hits[V + 2, h]
-    hits[WI + 2, h] = dx * hits[N, h] + dy * hits[N + 1, h] + dz * hits[N + 2, h]
-    hits[TO_LIGHT, h], hits[TO_LIGHT + 1, h], hits[TO_LIGHT + 2, h] = dx, dy, dz
-    hits[DISTANCE, h] = distance if light[KIND] != R(DOME) else FAR
-    hits[LIGHT, h], hits[LIGHT + 1, h] = red * inverse, green * inverse
-    hits[LIGHT + 2, h] = blue * inverse
-    hits[LIGHT_PDF, h] = pdf

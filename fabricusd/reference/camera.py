@@ -13,11 +13,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.real import INLINE, LEAN, cos, sin
+from fabricusd.appearance.real import INLINE, KERNEL, cos, exp, log, sin
 from fabricusd.errors import FabricError
-from fabricusd.reference.counter import four_uniform
-from fabricusd.reference.embree import DX, DY, DZ, GEOMETRY, MISS, OX, OY, OZ, TFAR, TNEAR
+from fabricusd.reference.embree import DX, DY, DZ, GEOMETRY, LANES, MISS, OX, OY, OZ, TFAR, TNEAR
 from fabricusd.reference.scene import Camera, Scene
+from fabricusd.reference.sobol import four_numbers
 
 R = np.float32
 FILTERS = ("box", "tent", "spline")
@@ -86,65 +86,107 @@ def build_lens(
 
 
 @njit(**INLINE)
-def _filter_offset(kind, u, v):
-    """Place in a pixel's filter, its centre at 0."""
-    if kind == 0:
-        return u - R(0.5)
-    tent = math.sqrt(R(2) * u) - R(1) if u < R(0.5) else R(1) - math.sqrt(R(2) - R(2) * u)
-    if kind == 1:
-        return tent
-    return tent + v - R(0.5)
+def _nearer(x, u):
+    """One of Newton's steps towards where the middle of the spline's integral is u."""
+    return x - (x * (R(0.75) - x * x * R(1 / 3)) - (u - R(0.5))) / (R(0.75) - x * x)
 
 
-@njit(**LEAN)
-def camera_rays(lens, width, pixels, first, samples, seed, rays, cone, path_pixel, path_sample):
+@njit(**INLINE)
+def filter_offset(kind, u):
+    """Place in a pixel's filter, its centre at 0: the inverse of the filter's integral."""
+    upper = u >= R(0.5)
+    half = R(1) - u if upper else u
+    tent = math.sqrt(R(2) * half) - R(1)
+    # The spline's tail is a cube; its middle, x (3/4 - x^2/3) = half - 1/2, takes three of Newton's
+    # steps from the line that joins its ends.
+    tail = exp(R, log(R, max(R(6) * half, R(1e-30))) * R(1 / 3)) - R(1.5)
+    x = R(1.5) * (half - R(0.5))
+    x = _nearer(_nearer(_nearer(x, half), half), half)
+    spline = tail if half < R(1 / 6) else x
+    place = u - R(0.5)
+    smooth = tent if kind == 1 else spline
+    smooth = -smooth if upper else smooth
+    return place if kind == 0 else smooth
+
+
+# Rows of what a packet of camera rays is made from: column and row of the pixel, and the spread of
+# its cone.
+_COLUMN, _ROW, _SPREAD = (row * LANES for row in range(3))
+
+
+@njit(**KERNEL)
+def camera_rays(lens, width, pixels, first, samples, numbers, packets, cone, path_pixel,
+                path_sample):  # fmt: skip
     """Write the rays of `samples` samples of each of `pixels`, from sample `first` on.
 
     pixels : (n,) int32 - row times `width` plus column; path `k` is sample `k % samples` of pixel
-    `k // samples`. rays : packets; cone : (2, n samples) - width and spread of each ray.
-    path_pixel, path_sample : (n samples,) uint32 - the counters of each path's random numbers.
+    `k // samples`. packets : (packets, ROWS 16); cone : (2, n samples) - width and spread of each
+    ray. path_pixel, path_sample : (n samples,) uint32 - which numbers each path gets.
     """
-    whole = rays.view(np.uint32)
     count = pixels.shape[0] * samples
-    for k in range(count):
-        p, lane = k >> 4, k & 15
-        pixel = pixels[k // samples]
-        sample = np.uint32(first + k % samples)
-        path_pixel[k], path_sample[k] = np.uint32(pixel), sample
-        u0, u1, u2, u3 = four_uniform(np.uint32(pixel), sample, np.uint32(0), seed)
-        v0, v1 = R(0.5), R(0.5)
-        if lens.filter == 2:
-            v0, v1, _, _ = four_uniform(np.uint32(pixel), sample, np.uint32(1), seed)
-        x = R(pixel % width) + R(0.5) + _filter_offset(lens.filter, u0, v0)
-        y = R(pixel // width) + R(0.5) + _filter_offset(lens.filter, u1, v1)
-        ax = lens.forward[0] + x * lens.across[0] + y * lens.down[0]
-        ay = lens.forward[1] + x * lens.across[1] + y * lens.down[1]
-        az = lens.forward[2] + x * lens.across[2] + y * lens.down[2]
-        ox, oy, oz = lens.eye[0], lens.eye[1], lens.eye[2]
-        if lens.orthographic:
-            ox, oy, oz = ox + ax, oy + ay, oz + az
-            ax, ay, az = lens.axis[0], lens.axis[1], lens.axis[2]
-        elif lens.aperture_radius > R(0):
-            r, phi = lens.aperture_radius * math.sqrt(u2), R(2 * math.pi) * u3
-            a, b = r * cos(R, phi), r * sin(R, phi)
-            sx = a * lens.right[0] + b * lens.up[0]
-            sy = a * lens.right[1] + b * lens.up[1]
-            sz = a * lens.right[2] + b * lens.up[2]
-            ox, oy, oz = ox + sx, oy + sy, oz + sz
-            ax, ay, az = ax * lens.focus - sx, ay * lens.focus - sy, az * lens.focus - sz
+    places = np.empty(3 * LANES, np.float32)
+    counters = np.empty(2 * LANES, np.uint32)
+    pixel, sample = 0, 0
+    for p in range((count + LANES - 1) // LANES):
+        start = p * LANES
+        size = min(LANES, count - start)
+        for lane in range(size):
+            number = pixels[pixel]
+            counters[lane], counters[LANES + lane] = np.uint32(number), np.uint32(first + sample)
+            path_pixel[start + lane] = counters[lane]
+            path_sample[start + lane] = counters[LANES + lane]
+            row = number // width
+            places[_COLUMN + lane], places[_ROW + lane] = R(number - row * width), R(row)
+            sample += 1
+            if sample == samples:
+                pixel, sample = pixel + 1, 0
+        _packet(lens, numbers, size, counters, places, packets[p])
+        whole = packets[p].view(np.uint32)
+        for lane in range(size):
+            whole[GEOMETRY * LANES + lane] = MISS
+            cone[0, start + lane] = lens.spread if lens.orthographic else R(0)
+            cone[1, start + lane] = places[_SPREAD + lane]
+        for lane in range(size, LANES):
+            packets[p, TNEAR * LANES + lane], packets[p, TFAR * LANES + lane] = R(0), R(-1)
+
+
+@njit(**INLINE)
+def _packet(lens, numbers, size, counters, places, packet):
+    """One packet of rays, by a loop that LLVM vectorises: what it needs is read before it."""
+    flat = R(0) if lens.orthographic else R(1)
+    round_ = R(1) - flat
+    radius, focus, spread, kind = lens.aperture_radius, lens.focus, lens.spread, lens.filter
+    near, far = lens.near, lens.far
+    fx, fy, fz = lens.forward[0], lens.forward[1], lens.forward[2]
+    cx, cy, cz = lens.across[0], lens.across[1], lens.across[2]
+    hx, hy, hz = lens.down[0], lens.down[1], lens.down[2]
+    rx, ry, rz = lens.right[0], lens.right[1], lens.right[2]
+    vx, vy, vz = lens.up[0], lens.up[1], lens.up[2]
+    zx, zy, zz = lens.axis[0], lens.axis[1], lens.axis[2]
+    ex, ey, ez = lens.eye[0], lens.eye[1], lens.eye[2]
+    for lane in range(size):
+        u0, u1, u2, u3 = four_numbers(numbers, counters[lane], counters[LANES + lane], np.uint32(0))
+        x = places[_COLUMN + lane] + R(0.5) + filter_offset(kind, u0)
+        y = places[_ROW + lane] + R(0.5) + filter_offset(kind, u1)
+        ax, ay = fx + x * cx + y * hx, fy + x * cy + y * hy
+        az = fz + x * cz + y * hz
+        # Where on the lens: a pinhole's radius is 0, and so is an orthographic camera's.
+        r, phi = radius * math.sqrt(u2), R(2 * math.pi) * u3
+        a, b = r * cos(R, phi), r * sin(R, phi)
+        sx, sy = a * rx + b * vx + round_ * ax, a * ry + b * vy + round_ * ay
+        sz = a * rz + b * vz + round_ * az
+        ax, ay = flat * (ax * focus - sx) + round_ * zx, flat * (ay * focus - sy) + round_ * zy
+        az = flat * (az * focus - sz) + round_ * zz
         inverse = R(1) / math.sqrt(ax * ax + ay * ay + az * az)
         ax, ay, az = ax * inverse, ay * inverse, az * inverse
-        rays[p, OX, lane], rays[p, OY, lane], rays[p, OZ, lane] = ox, oy, oz
-        rays[p, DX, lane], rays[p, DY, lane], rays[p, DZ, lane] = ax, ay, az
-        cosine = max(ax * lens.axis[0] + ay * lens.axis[1] + az * lens.axis[2], R(1e-3))
-        rays[p, TNEAR, lane] = lens.near / cosine
-        rays[p, TFAR, lane] = lens.far / cosine if lens.far < R(1e29) else FAR
-        whole[p, GEOMETRY, lane] = MISS
-        cone[0, k] = lens.spread if lens.orthographic else R(0)
-        cone[1, k] = R(0) if lens.orthographic else lens.spread * cosine
-    for k in range(count, ((count + 15) >> 4) << 4):
-        rays[k >> 4, TNEAR, k & 15] = R(0)
-        rays[k >> 4, TFAR, k & 15] = R(-1)
+        packet[OX * LANES + lane], packet[OY * LANES + lane] = ex + sx, ey + sy
+        packet[OZ * LANES + lane] = ez + sz
+        packet[DX * LANES + lane], packet[DY * LANES + lane] = ax, ay
+        packet[DZ * LANES + lane] = az
+        cosine = max(ax * zx + ay * zy + az * zz, R(1e-3))
+        packet[TNEAR * LANES + lane] = near / cosine
+        packet[TFAR * LANES + lane] = far / cosine if far < R(1e29) else FAR
+        places[_SPREAD + lane] = flat * spread * cosine
 
 
 def default_camera(scene: Scene, width: int, height: int) -> Camera:

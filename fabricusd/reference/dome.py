@@ -14,83 +14,73 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.real import INLINE, KERNEL, acos, atan2, cos, sin
+from fabricusd.appearance.real import INLINE, acos, atan2, cos, sin
 
 R = np.float32
 _PI = R(math.pi)
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
-DENSITY, KEPT, OTHER, CELL = 3, 4, 5, 8
+DENSITY, UPTO, GUIDE, CELL = 3, 4, 5, 8
 """Columns of `Dome.cells` after the radiance, and how many there are: two to a cache line."""
 
 
 class Dome(NamedTuple):
     """cells : (h w, CELL) float32 - all that is known of a texel in one place of memory: radiance
-    r, g, b, density [1/sr] times sin(theta), and Walker's table, the chance to keep the texel and
-    the other choice; size : (2,) int64 - h, w; rotation : (3, 3) float32, world to dome."""
+    r, g, b, density [1/sr], the share of its row's brightness up to its end, and the first texel
+    of the row to look at for numbers from k/w on, where k is its own place in the row
+    rows : (h, 2) float32 - the same share and guide for rows
+    size : (2,) int64 - h, w; rotation : (3, 3) float32, world to dome."""
 
     cells: NDArray[np.float32]
+    rows: NDArray[np.float32]
     size: NDArray[np.int64]
     rotation: NDArray[np.float32]
 
 
 def build_dome(image: NDArray[Any], rotation: NDArray[Any]) -> Dome:
-    """Tables for a picture (h, w, 3) of radiance; `rotation` (3, 3) goes from world to dome.
-
-    A picture has at most 2^24 texels, which float32 can number.
-    """
+    """Tables for a picture (h, w, 3) of radiance; `rotation` (3, 3) goes from world to dome."""
     picture = np.ascontiguousarray(image, np.float32)
     h, w = picture.shape[:2]
     brightness = np.maximum(picture.astype(np.float64) @ LUMINANCE, 0.0)
     edges = np.cos(np.pi * np.arange(h + 1) / h)
-    bands = np.repeat((edges[:-1] - edges[1:])[:, None], w, axis=1)
-    weight = brightness * bands
-    if not weight.sum() > 0:
-        weight = bands
-    share = weight / weight.sum()
-    cells = np.zeros((h * w, CELL), np.float32)
-    cells[:, :3] = picture.reshape(-1, 3)
-    # Inside a texel a sample is uniform in longitude and latitude.
-    cells[:, DENSITY] = (share * (h * w) / (2 * np.pi**2)).ravel()
-    cells[:, OTHER], cells[:, KEPT] = alias_table(share.ravel())
-    return Dome(cells, np.array([h, w]), np.ascontiguousarray(rotation, np.float32))
+    solid = (edges[:-1] - edges[1:]) * (2 * np.pi / w)
+    if not brightness.sum() > 0:
+        brightness[:] = 1.0
+    of_rows = brightness.sum(axis=1) * solid
+    # A black row is never chosen; its shares only have to be numbers.
+    inside = np.where(of_rows[:, None] > 0, brightness, 1.0)
+    cells = np.zeros((h, w, CELL), np.float32)
+    cells[..., :3] = picture
+    cells[..., DENSITY] = brightness / of_rows.sum()
+    cells[..., UPTO], cells[..., GUIDE] = shares_and_guides(inside)
+    upto, guide = shares_and_guides(of_rows[None])
+    rows = np.stack([upto[0], guide[0]], axis=1)
+    return Dome(
+        cells.reshape(-1, CELL), rows, np.array([h, w]), np.ascontiguousarray(rotation, np.float32)
+    )
 
 
-def alias_table(share: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Walker's table of probabilities that sum to 1: (the other choice, chance to keep the own)."""
-    kept = np.ones(len(share))
-    other = np.arange(len(share), dtype=np.int32)
-    _fill_alias(np.ascontiguousarray(share * len(share)), kept, other)
-    return other, kept.astype(np.float32)
+def shares_and_guides(
+    weight: NDArray[np.float64],
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """For rows (m, n) of weights: cumulative shares, and where a search for k/n may begin.
 
-
-@njit(**KERNEL)
-def _fill_alias(level, kept, other):
-    n = len(level)
-    small, large = np.empty(n, np.int64), np.empty(n, np.int64)
-    few, many = 0, 0
-    for k in range(n):
-        if level[k] < 1.0:
-            small[few] = k
-            few += 1
-        else:
-            large[many] = k
-            many += 1
-    while few > 0 and many > 0:
-        few -= 1
-        a, b = small[few], large[many - 1]
-        kept[a] = level[a]
-        other[a] = b
-        level[b] -= 1.0 - level[a]
-        if level[b] < 1.0:
-            many -= 1
-            small[few] = b
-            few += 1
+    [Chen1974]: from its guide a number finds its place in less than two steps on average.
+    """
+    n = weight.shape[1]
+    upto = np.cumsum(weight, axis=1)
+    shares = np.asarray(upto / upto[:, -1:], np.float32)
+    # Numbers are below 1, and a search may not run over the end.
+    last = n - np.argmax(weight[:, ::-1] > 0, axis=1)
+    shares[np.arange(n) >= last[:, None] - 1] = 2.0
+    starts = (np.arange(n) / n).astype(np.float32)
+    guide = np.stack([np.searchsorted(row, starts, side="right") for row in shares])
+    return shares, guide.astype(np.float32)
 
 
 @njit(**INLINE)
 def place_of(dome, x, y, z):
-    """World direction to picture coordinates (column, row) in texels, sin of the polar angle."""
+    """World direction to picture coordinates (column, row) in texels."""
     m = dome.rotation
     a = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z
     b = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z
@@ -99,8 +89,7 @@ def place_of(dome, x, y, z):
     u = (longitude + R(0.5) * _PI) * R(0.5 / math.pi)
     u = u - math.floor(u)
     v = acos(R, b) * R(1.0 / math.pi)
-    sine = math.sqrt(max(a * a + c * c, R(1e-12)))
-    return R(u) * R(dome.size[1]), v * R(dome.size[0]), sine
+    return R(u) * R(dome.size[1]), v * R(dome.size[0])
 
 
 @njit(**INLINE)
@@ -129,30 +118,41 @@ def smooth_radiance(dome, column, row):
 
 
 @njit(**INLINE)
-def sample_dome(dome, u0, u1, u2):
-    """A world direction from three uniform numbers: (x, y, z, r, g, b, pdf [1/sr])."""
+def _find(table, start, count, upto, guide, u):
+    """(place of u among `count` cumulative shares, how far into it) [0, 1)."""
+    k = min(int(u * R(count)), count - 1)
+    k = int(table[start + k, guide])
+    while u >= table[start + k, upto]:
+        k += 1
+    low = table[start + k - 1, upto] if k > 0 else R(0)
+    rest = (u - low) / (min(table[start + k, upto], R(1)) - low)
+    return k, min(max(rest, R(0)), R(0.9999999))
+
+
+@njit(**INLINE)
+def choose_cell(dome, u0, u1):
+    """A texel by its brightness from two uniform numbers: (row, how far down in it, column, how far
+    along in it)."""
     h, w = dome.size[0], dome.size[1]
-    k = min(int(u0 * R(h * w)), h * w - 1)
-    kept = dome.cells[k, KEPT]
-    # What is left of the number after the choice is uniform again.
-    if u2 < kept:
-        rest = u2 / kept
-    else:
-        rest = (u2 - kept) / (R(1) - kept)
-        k = int(dome.cells[k, OTHER])
-    j = k // w
-    column = R(k - j * w) + min(max(rest, R(0)), R(0.9999999))
-    theta = (R(j) + u1) * (_PI / R(h))
-    longitude = column * (R(2) * _PI / R(w)) - R(0.5) * _PI
-    sine, b = sin(R, theta), cos(R, theta)
+    if h * w == 1:
+        return 0, u0, 0, u1
+    j, down = _find(dome.rows, 0, h, 0, 1, u0)
+    i, along = _find(dome.cells, j * w, w, UPTO, GUIDE, u1)
+    return j, down, i, along
+
+
+@njit(**INLINE)
+def direction_in(dome, row, down, column):
+    """World direction of a place `down` and `column` in texels; even by solid angle down a row."""
+    top = cos(R, row * (_PI / R(dome.size[0])))
+    bottom = cos(R, (row + R(1)) * (_PI / R(dome.size[0])))
+    b = top + down * (bottom - top)
+    sine = math.sqrt(max((R(1) - b) * (R(1) + b), R(0)))
+    longitude = column * (R(2) * _PI / R(dome.size[1])) - R(0.5) * _PI
     a, c = sine * cos(R, longitude), sine * sin(R, longitude)
     m = dome.rotation
     return (
         m[0, 0] * a + m[1, 0] * b + m[2, 0] * c,
         m[0, 1] * a + m[1, 1] * b + m[2, 1] * c,
         m[0, 2] * a + m[1, 2] * b + m[2, 2] * c,
-        dome.cells[k, 0],
-        dome.cells[k, 1],
-        dome.cells[k, 2],
-        dome.cells[k, DENSITY] / max(sine, R(1e-6)),
     )

@@ -76,8 +76,16 @@ class _Side:
 
     def __init__(self, fabric: Fabric, shadow: str) -> None:
         self.fabric, self.method = fabric, shadow
-        self.law: SurfaceLaw = surface_law(fabric, precision=np.float32)
+        self._law: SurfaceLaw | None = None
         self._near: dict[int, tuple[CompiledFabric, Shadow]] = {}
+
+    @property
+    def law(self) -> SurfaceLaw:
+        """The surface law, made when first needed: many a cloth never shows its back."""
+        with _ONE_AT_A_TIME:
+            if self._law is None:
+                self._law = surface_law(self.fabric, precision=np.float32)
+            return self._law
 
     def near(self, level: int) -> tuple[CompiledFabric, Shadow]:
         """Weave and shadowing of level `weave` or `thread`, made when first needed."""

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.real import INLINE, LEAN
-from fabricusd.reference.counter import four_uniform
+from fabricusd.reference.sobol import four_numbers
 from fabricusd.reference.triangles import D1, D2, E1, E2, HAND, P0, RATE, RECORD, ST
 from fabricusd.reference.triangles import N as NORMALS
 from fabricusd.reference.triangles import T as TANGENTS
@@ -32,19 +32,25 @@ MADE = (RECORD + 5) * BLOCK
 NUMBERS = MADE + (SIDE + 1) * BLOCK
 """Where eight rows of random numbers start."""
 
-BLOCK_ROWS = RECORD + 5 + SIDE + 1 + 8
+CHOSEN = NUMBERS + 8 * BLOCK
+"""Where the light starts: the rows of `Wave.hits` from WI to LIGHT_PDF, in their order."""
+
+DRAWN = CHOSEN + 11 * BLOCK
+"""Where what `light_sampling` works with starts."""
+
+BLOCK_ROWS = RECORD + 5 + SIDE + 1 + 8 + 11 + 13
 
 
 @njit(**LEAN)
-def make_numbers(count, dimension, seed, counters, block):
+def make_numbers(numbers, count, place, counters, block):
     """Eight uniform numbers a hit, by its path's pixel and sample."""
     for x in range(count):
-        a, b, c, d = four_uniform(counters[x], counters[BLOCK + x], dimension, seed)
+        a, b, c, d = four_numbers(numbers, counters[x], counters[BLOCK + x], place)
         block[NUMBERS + x], block[NUMBERS + BLOCK + x] = a, b
         block[NUMBERS + 2 * BLOCK + x], block[NUMBERS + 3 * BLOCK + x] = c, d
-    following = np.uint32(dimension + np.uint32(1))
+    following = np.uint32(place + np.uint32(1))
     for x in range(count):
-        a, b, c, d = four_uniform(counters[x], counters[BLOCK + x], following, seed)
+        a, b, c, d = four_numbers(numbers, counters[x], counters[BLOCK + x], following)
         block[NUMBERS + 4 * BLOCK + x], block[NUMBERS + 5 * BLOCK + x] = a, b
         block[NUMBERS + 6 * BLOCK + x], block[NUMBERS + 7 * BLOCK + x] = c, d
 
@@ -136,9 +142,12 @@ def make_frames(count, epsilon, block):
             -(dx * nx + dy * ny + dz * nz),
         )  # fmt: skip
         block[MADE + SIDE * BLOCK + x] = side
-        for axis in range(2):
-            at = TAKEN + axis * BLOCK + x
-            block[MADE + (PLACE + axis) * BLOCK + x] = (
-                block[at + ST * BLOCK] + u * block[at + D1 * BLOCK] + v * block[at + D2 * BLOCK]
-            )
+        at = TAKEN + x
+        block[MADE + PLACE * BLOCK + x] = (
+            block[at + ST * BLOCK] + u * block[at + D1 * BLOCK] + v * block[at + D2 * BLOCK]
+        )
+        at += BLOCK
+        block[MADE + (PLACE + 1) * BLOCK + x] = (
+            block[at + ST * BLOCK] + u * block[at + D1 * BLOCK] + v * block[at + D2 * BLOCK]
+        )
         block[MADE + FOOTPRINT * BLOCK + x] *= block[TAKEN + RATE * BLOCK + x]

@@ -29,6 +29,7 @@ from fabricusd.reference.preview_surface import (
     shade_preview,
 )
 from fabricusd.reference.scene import FabricSurface, Scene
+from fabricusd.reference.sobol import new_numbers
 from fabricusd.reference.triangles import build_tables
 from fabricusd.reference.wave import (
     BEAUTY_ROWS,
@@ -59,6 +60,7 @@ class Tracer:
     """A scene made ready for rays.
 
     estimator : "mis", or for tests one of "light", "surface", "uniform"; all have the same mean.
+    sampler : "sobol", or for tests "random".
     """
 
     def __init__(
@@ -70,6 +72,7 @@ class Tracer:
         shadow: str = "horizon",
         seed: int = 0,
         estimator: str = "mis",
+        sampler: str = "sobol",
     ) -> None:
         if level not in LEVELS:
             raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
@@ -84,7 +87,7 @@ class Tracer:
         self.max_bounces = max_bounces
         self.level = LEVELS[level]
         self.estimator = ESTIMATORS[estimator]
-        self.seed = np.uint32(seed & 0xFFFFFFFF)
+        self.numbers = new_numbers(seed, independent=sampler == "random")
         self.epsilon = np.float32(1e-7 * self.tables.radius + 1e-12)
         count = max(len(scene.materials), 1)
         self.shaders: list[Any] = [None] * count
@@ -118,8 +121,9 @@ class Tracer:
         aovs = len(wave.film) > BEAUTY_ROWS
         wave.film[:, :count] = 0.0
         camera_rays(
-            lens, width, pixels, first, samples, self.seed, wave.rays,
-            wave.lanes[LANE_WIDTH : LANE_SPREAD + 1], wave.path_pixel, wave.path_sample,
+            lens, width, pixels, first, samples, self.numbers,
+            wave.rays.reshape(len(wave.rays), -1), wave.lanes[LANE_WIDTH : LANE_SPREAD + 1],
+            wave.path_pixel, wave.path_sample,
         )  # fmt: skip
         wave.lanes[LANE_BETA : LANE_BETA + 3, :count] = 1.0
         wave.lanes[LANE_PDF, :count] = -1.0
@@ -134,7 +138,7 @@ class Tracer:
                 step, self.max_bounces, self.estimator, count, wave.rays, wave.lanes,
                 wave.lane_tags, self.lights, self.dome, wave.film, wave.keys,
                 self.tables.material, self._repeats, self.tables.records, self.level,
-                wave.path_pixel, wave.path_sample, self.seed, counts,
+                wave.path_pixel, wave.path_sample, self.numbers, counts,
             )  # fmt: skip
             ends = np.cumsum(counts)
             hits = int(ends[-1])
@@ -143,7 +147,7 @@ class Tracer:
             prepare(
                 step, self.estimator, count, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
                 ends - counts, self.tables.records, self.lights, self.dome, self.epsilon,
-                wave.path_pixel, wave.path_sample, self.seed, wave.hits, wave.tags,
+                wave.path_pixel, wave.path_sample, self.numbers, wave.hits, wave.tags,
             )  # fmt: skip
             if self.shines:
                 add_emission(hits, self.surfaces, wave.hits, wave.tags, wave.film)

@@ -1,4 +1,4 @@
-"""Lights as rows of one table: chosen by power, sampled by area or solid angle, hit by rays.
+"""Lights as rows of one table: chosen by power, hit by rays; `light_sampling` draws from them.
 
 Lights are no obstacles: a ray goes on behind them, so what a ray sees is the sum over all that it
 passes before its first triangle. That keeps sampling and hitting two estimators of one integral.
@@ -21,7 +21,6 @@ from fabricusd.reference.dome import (
     build_dome,
     cell_at,
     place_of,
-    sample_dome,
     smooth_radiance,
 )
 from fabricusd.reference.scene import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE, Light
@@ -133,7 +132,7 @@ def _add_dome(total, dome):
             longitude = (R(i) + R(0.5)) * (R(2) * _PI / R(w)) - R(0.5) * _PI
             sine = sin(R, theta)
             x, y, z = sine * cos(R, longitude), cos(R, theta), sine * sin(R, longitude)
-            column, row, _ = place_of(dome, x, y, z)
+            column, row = place_of(dome, x, y, z)
             red, green, blue = smooth_radiance(dome, column, row)
             total[j, i, 0] += red
             total[j, i, 1] += green
@@ -150,101 +149,6 @@ def _rotation(frame: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @njit(**INLINE)
-def choose_light(table, u):
-    """Index of the light that a uniform number chooses."""
-    last = table.shape[0] - 1
-    for k in range(last):
-        u = u - table[k, CHANCE]
-        if u < R(0):
-            return k
-    return last
-
-
-@njit(**INLINE)
-def _to_surface(light, px, py, pz, qx, qy, qz, cosine_of):
-    """Direction, distance and pdf towards a point q of the light whose normal is `cosine_of`."""
-    dx, dy, dz = qx - px, qy - py, qz - pz
-    square = max(dx * dx + dy * dy + dz * dz, R(1e-20))
-    distance = math.sqrt(square)
-    inverse = R(1) / distance
-    dx, dy, dz = dx * inverse, dy * inverse, dz * inverse
-    nx, ny, nz = cosine_of
-    cosine = -(dx * nx + dy * ny + dz * nz)
-    if cosine <= R(1e-6):
-        return dx, dy, dz, distance, R(0)
-    return dx, dy, dz, distance, light[CHANCE] * square / (cosine * light[AREA])
-
-
-@njit(**INLINE)
-def _cone(light, ax, ay, az, one_minus_cos, u0, u1):
-    """A direction in the cone around the unit axis a, uniform by solid angle, and its pdf."""
-    down = u0 * one_minus_cos
-    sine = math.sqrt(max(down * (R(2) - down), R(0)))
-    phi = R(2) * _PI * u1
-    a, b, c = sine * cos(R, phi), sine * sin(R, phi), R(1) - down
-    sign = R(1) if az >= R(0) else R(-1)
-    k = R(-1) / (sign + az)
-    m = ax * ay * k
-    x = a * (R(1) + sign * ax * ax * k) + b * m + c * ax
-    y = a * sign * m + b * (sign + ay * ay * k) + c * ay
-    z = -a * sign * ax - b * ay + c * az
-    return x, y, z, light[CHANCE] / (R(2) * _PI * one_minus_cos)
-
-
-@njit(**INLINE)
-def sample_light(light, dome, px, py, pz, u0, u1, u2):
-    """Towards one light from p, by three uniform numbers: (dx, dy, dz, distance, r, g, b, pdf).
-
-    pdf is 0 where the light does not shine on p, and *minus* the chance of the choice for a light
-    without extent, whose (r, g, b) is an irradiance and which no ray hits.
-    """
-    kind = int(light[KIND])
-    far = R(1e30)
-    red, green, blue = light[RED], light[RED + 1], light[RED + 2]
-    if kind == DOME:
-        dx, dy, dz, red, green, blue, pdf = sample_dome(dome, u0, u1, u2)
-        return dx, dy, dz, far, red, green, blue, pdf * light[CHANCE]
-    zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
-    if kind == DISTANT:
-        if light[AREA] <= R(0):
-            return zx, zy, zz, far, red, green, blue, -light[CHANCE]
-        dx, dy, dz, pdf = _cone(light, zx, zy, zz, light[AREA], u0, u1)
-        return dx, dy, dz, far, red, green, blue, pdf
-    cx, cy, cz = light[P], light[P + 1], light[P + 2]
-    if kind == SPHERE:
-        ax, ay, az = cx - px, cy - py, cz - pz
-        square = ax * ax + ay * ay + az * az
-        radius2 = light[SIZE] * light[SIZE]
-        if square <= radius2:
-            return zx, zy, zz, far, red, green, blue, R(0)
-        distance = math.sqrt(square)
-        ax, ay, az = ax / distance, ay / distance, az / distance
-        sine2 = radius2 / square
-        one_minus_cos = sine2 / (R(1) + math.sqrt(R(1) - sine2))
-        dx, dy, dz, pdf = _cone(light, ax, ay, az, one_minus_cos, u0, u1)
-        along = (dx * ax + dy * ay + dz * az) * distance
-        reach = along - math.sqrt(max(radius2 - square + along * along, R(0)))
-        return dx, dy, dz, reach, red, green, blue, pdf
-    xx, xy, xz = light[X], light[X + 1], light[X + 2]
-    yx, yy, yz = light[Y], light[Y + 1], light[Y + 2]
-    if kind == CYLINDER:
-        a, phi = R(2) * u0 - R(1), R(2) * _PI * u1
-        c, s = cos(R, phi), sin(R, phi)
-        nx, ny, nz = c * yx + s * zx, c * yy + s * zy, c * yz + s * zz
-        r = light[SIZE]
-        qx, qy, qz = cx + a * xx + r * nx, cy + a * xy + r * ny, cz + a * xz + r * nz
-    else:
-        nx, ny, nz = zx, zy, zz
-        a, b = R(2) * u0 - R(1), R(2) * u1 - R(1)
-        if kind == DISK:
-            r, phi = math.sqrt(u0), R(2) * _PI * u1
-            a, b = r * cos(R, phi), r * sin(R, phi)
-        qx, qy, qz = cx + a * xx + b * yx, cy + a * xy + b * yy, cz + a * xz + b * yz
-    dx, dy, dz, distance, pdf = _to_surface(light, px, py, pz, qx, qy, qz, (nx, ny, nz))
-    return dx, dy, dz, distance, red, green, blue, pdf
-
-
-@njit(**INLINE)
 def hit_light(light, dome, to_camera, px, py, pz, dx, dy, dz, reach):
     """What a ray sees of one light nearer than `reach`: (r, g, b, pdf); pdf 0 where nothing.
 
@@ -256,12 +160,12 @@ def hit_light(light, dome, to_camera, px, py, pz, dx, dy, dz, reach):
     if kind == DOME:
         if reach < R(1e29):
             return none, none, none, none
-        column, row, sine = place_of(dome, dx, dy, dz)
+        column, row = place_of(dome, dx, dy, dz)
         if to_camera:
             red, green, blue = smooth_radiance(dome, column, row)
             return red, green, blue, R(1)
         cell = dome.cells[cell_at(dome, column, row)]
-        return cell[0], cell[1], cell[2], cell[DENSITY] / sine * light[CHANCE]
+        return cell[0], cell[1], cell[2], cell[DENSITY] * light[CHANCE]
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
     if kind == DISTANT:
         if light[AREA] <= R(0) or reach < R(1e29):

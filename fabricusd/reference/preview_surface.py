@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.real import INLINE, LEAN, cos, sin
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, cos, sin
 from fabricusd.reference.scene import PreviewSurface, Scene, Texture
 from fabricusd.reference.wave import (
     CHANCE,
@@ -153,11 +153,9 @@ def _fresnel(f0, f90, c):
     return f0 + (f90 - f0) * d2 * d2 * d
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _evaluate(red, green, blue, metallic, alpha, f0, share, ox, oy, oz, ix, iy, iz):
-    """f times cosine (r, g, b) and pdf of `wi`, both directions above the surface."""
-    if iz <= R(0) or oz <= R(0):
-        return R(0), R(0), R(0), R(0)
+    """f times cosine (r, g, b) and pdf of `wi`; 0 unless both directions are above the surface."""
     hx, hy, hz = ix + ox, iy + oy, iz + oz
     inverse = R(1) / math.sqrt(max(hx * hx + hy * hy + hz * hz, R(1e-20)))
     hx, hy, hz = hx * inverse, hy * inverse, hz * inverse
@@ -176,24 +174,24 @@ def _evaluate(red, green, blue, metallic, alpha, f0, share, ox, oy, oz, ix, iy, 
     diffuse = (R(1) - metallic) * through * iz / _PI
     dielectric = _fresnel(f0, f90, c) * (R(1) - metallic)
     pdf = share * distribution / max(R(2) * (oz + go), R(1e-20)) + (R(1) - share) * iz / _PI
+    above = iz > R(0) and oz > R(0)
+    red = red * diffuse + specular * (dielectric + metallic * _fresnel(red, R(1), c))
+    green = green * diffuse + specular * (dielectric + metallic * _fresnel(green, R(1), c))
+    blue = blue * diffuse + specular * (dielectric + metallic * _fresnel(blue, R(1), c))
     return (
-        red * diffuse + specular * (dielectric + metallic * _fresnel(red, R(1), c)),
-        green * diffuse + specular * (dielectric + metallic * _fresnel(green, R(1), c)),
-        blue * diffuse + specular * (dielectric + metallic * _fresnel(blue, R(1), c)),
-        pdf,
-    )
+        red if above else R(0), green if above else R(0), blue if above else R(0),
+        pdf if above else R(0),
+    )  # fmt: skip
 
 
-@njit(**LEAN)
+@njit(**INLINE)
 def _sample(alpha, share, ox, oy, oz, u0, u1, u2):
     """A direction for `wi`: GGX by visible normals with the chance `share`, else by cosine."""
     phi = R(2) * _PI * u1
     c, s = cos(R, phi), sin(R, phi)
-    if u0 >= share:
-        r = math.sqrt(u2)
-        return r * c, r * s, math.sqrt(max(R(1) - u2, R(0)))
+    flat = math.sqrt(u2)
     sx, sy, sz = alpha * ox, alpha * oy, oz
-    inverse = R(1) / math.sqrt(sx * sx + sy * sy + sz * sz)
+    inverse = R(1) / math.sqrt(max(sx * sx + sy * sy + sz * sz, R(1e-20)))
     sx, sy, sz = sx * inverse, sy * inverse, sz * inverse
     z = (R(1) - u2) * (R(1) + sz) - sz
     r = math.sqrt(max(R(1) - z * z, R(0)))
@@ -201,54 +199,112 @@ def _sample(alpha, share, ox, oy, oz, u0, u1, u2):
     inverse = R(1) / math.sqrt(hx * hx + hy * hy + hz * hz)
     hx, hy, hz = hx * inverse, hy * inverse, hz * inverse
     d = R(2) * (hx * ox + hy * oy + hz * oz)
-    return d * hx - ox, d * hy - oy, d * hz - oz
+    even = u0 >= share
+    return (
+        flat * c if even else d * hx - ox,
+        flat * s if even else d * hy - oy,
+        math.sqrt(max(R(1) - u2, R(0))) if even else d * hz - oz,
+    )
+
+
+BLOCK = 128
+_STEP = BLOCK + 16
+"""Between rows of a block: a power of two would put all of them into the same few cache lines."""
+
+# Rows of a block: what `Wave.hits` brings, the surface's properties there, what is made.
+(_O, _I, _CHANCE, _RED, _GREEN, _BLUE, _METALLIC, _ALPHA, _OPACITY, _F, _F_PDF, _GO, _WEIGHT,
+ _GO_PDF) = (
+    row * _STEP for row in (0, 3, 6, 10, 11, 12, 13, 14, 15, 16, 19, 20, 23, 26)
+)  # fmt: skip
+_ROWS = 27
+
+
+@njit(**KERNEL)
+def shade_preview(surfaces, hits, tags, first, last):
+    """Evaluate and sample the surface of hits first..last, all of one material: rows F, F_PDF, GO,
+    WEIGHT, GO_PDF, KEEP, THREAD."""
+    block = np.empty(_ROWS * _STEP, np.float32)
+    row = surfaces.table[tags[MATERIAL, first]]
+    f0 = (row[IOR] - R(1)) / (row[IOR] + R(1))
+    f0 = f0 * f0
+    for start in range(first, last, BLOCK):
+        size = min(BLOCK, last - start)
+        for x in range(size):
+            for k in range(3):
+                block[_O + k * _STEP + x] = hits[WO + k, start + x]
+                block[_I + k * _STEP + x] = hits[WI + k, start + x]
+            for k in range(4):
+                block[_CHANCE + k * _STEP + x] = hits[CHANCE + k, start + x]
+        _look_up(surfaces, tags[MATERIAL, first], hits, start, size, block)
+        _shade(f0, size, block)
+        for x in range(size):
+            h = start + x
+            for k in range(3):
+                hits[F + k, h], hits[GO + k, h] = (
+                    block[_F + k * _STEP + x],
+                    block[_GO + k * _STEP + x],
+                )
+                hits[WEIGHT + k, h] = block[_WEIGHT + k * _STEP + x]
+            hits[F_PDF, h], hits[GO_PDF, h] = block[_F_PDF + x], block[_GO_PDF + x]
+            hits[KEEP, h], hits[THREAD, h] = block[_OPACITY + x], R(-1)
+            hits[CHANCE + 3, h] = block[_CHANCE + 3 * _STEP + x]
 
 
 @njit(**LEAN)
-def shade_preview(surfaces, hits, tags, first, last):
-    """Evaluate and sample the surface of hits first..last: rows F, F_PDF, GO, WEIGHT, GO_PDF."""
-    for k in range(first, last):
-        material = tags[MATERIAL, k]
-        row = surfaces.table[material]
-        u, v = hits[PLACE, k], hits[PLACE + 1, k]
-        red, green, blue = row[DIFFUSE], row[DIFFUSE + 1], row[DIFFUSE + 2]
-        metallic, roughness = row[METALLIC], row[ROUGHNESS]
+def _look_up(surfaces, material, hits, start, size, block):
+    """The surface's properties at each hit of a block."""
+    row = surfaces.table[material]
+    for x in range(size):
+        block[_RED + x], block[_GREEN + x] = row[DIFFUSE], row[DIFFUSE + 1]
+        block[_BLUE + x], block[_METALLIC + x] = row[DIFFUSE + 2], row[METALLIC]
+        # Below 0.02 a lobe is a mirror, which light sampling would turn into sparks.
+        block[_ALPHA + x] = max(row[ROUGHNESS] * row[ROUGHNESS], R(4e-4))
+        block[_OPACITY + x] = min(max(row[OPACITY], R(0)), R(1))
+    textured = row[OPACITY_MAP] >= R(0) or row[THRESHOLD] > R(0)
+    if not textured and max(row[DIFFUSE_MAP], max(row[METALLIC_MAP], row[ROUGHNESS_MAP])) < R(0):
+        return
+    for x in range(size):
+        u, v = hits[PLACE, start + x], hits[PLACE + 1, start + x]
         if row[DIFFUSE_MAP] >= R(0):
             red, green, blue = texture_at(surfaces, int(row[DIFFUSE_MAP]), u, v)
+            block[_RED + x], block[_GREEN + x], block[_BLUE + x] = red, green, blue
         if row[METALLIC_MAP] >= R(0):
-            metallic, _, _ = texture_at(surfaces, int(row[METALLIC_MAP]), u, v)
+            block[_METALLIC + x], _, _ = texture_at(surfaces, int(row[METALLIC_MAP]), u, v)
         if row[ROUGHNESS_MAP] >= R(0):
-            roughness, _, _ = texture_at(surfaces, int(row[ROUGHNESS_MAP]), u, v)
-        # Below 0.02 a lobe is a mirror, which light sampling would turn into sparks.
-        alpha = max(roughness * roughness, R(4e-4))
-        f0 = (row[IOR] - R(1)) / (row[IOR] + R(1))
-        f0 = f0 * f0
-        ox, oy, oz = hits[WO, k], hits[WO + 1, k], hits[WO + 2, k]
+            rough, _, _ = texture_at(surfaces, int(row[ROUGHNESS_MAP]), u, v)
+            block[_ALPHA + x] = max(rough * rough, R(4e-4))
+        block[_OPACITY + x] = opacity_at(surfaces, material, u, v)
+
+
+@njit(**LEAN)
+def _shade(f0, size, block):
+    """The values of a block: one loop without branches, which LLVM vectorises."""
+    for x in range(size):
+        red, green, blue = block[_RED + x], block[_GREEN + x], block[_BLUE + x]
+        metallic, alpha, opacity = block[_METALLIC + x], block[_ALPHA + x], block[_OPACITY + x]
+        ox, oy, oz = block[_O + x], block[_O + _STEP + x], block[_O + 2 * _STEP + x]
         gloss = metallic + (R(1) - metallic) * _fresnel(f0, min(R(50) * f0, R(1)), oz)
         base = max(red, max(green, blue)) * (R(1) - metallic)
         share = gloss / max(gloss + base, R(1e-6))
         share = R(0) if gloss <= R(0) else min(max(share, R(0.1)), R(1))
-        opacity = opacity_at(surfaces, material, u, v)
         fr, fg, fb, pdf = _evaluate(
-            red, green, blue, metallic, alpha, f0, share,
-            ox, oy, oz, hits[WI, k], hits[WI + 1, k], hits[WI + 2, k],
+            red, green, blue, metallic, alpha, f0, share, ox, oy, oz,
+            block[_I + x], block[_I + _STEP + x], block[_I + 2 * _STEP + x],
         )  # fmt: skip
-        hits[F, k], hits[F + 1, k], hits[F + 2, k] = opacity * fr, opacity * fg, opacity * fb
-        hits[F_PDF, k] = opacity * pdf
-        hits[KEEP, k] = opacity
-        hits[THREAD, k] = R(-1)
-        if hits[CHANCE + 3, k] >= opacity:
-            hits[GO_PDF, k] = R(-1)
-            continue
-        hits[CHANCE + 3, k] = hits[CHANCE + 3, k] / opacity
+        block[_F + x], block[_F + _STEP + x] = opacity * fr, opacity * fg
+        block[_F + 2 * _STEP + x], block[_F_PDF + x] = opacity * fb, opacity * pdf
         gx, gy, gz = _sample(
-            alpha, share, ox, oy, oz, hits[CHANCE, k], hits[CHANCE + 1, k], hits[CHANCE + 2, k]
-        )
+            alpha, share, ox, oy, oz,
+            block[_CHANCE + x], block[_CHANCE + _STEP + x], block[_CHANCE + 2 * _STEP + x],
+        )  # fmt: skip
         wr, wg, wb, pdf = _evaluate(
             red, green, blue, metallic, alpha, f0, share, ox, oy, oz, gx, gy, gz
         )
-        hits[GO, k], hits[GO + 1, k], hits[GO + 2, k] = gx, gy, gz
+        block[_GO + x], block[_GO + _STEP + x], block[_GO + 2 * _STEP + x] = gx, gy, gz
         inverse = R(1) / pdf if pdf > R(0) else R(0)
-        hits[WEIGHT, k], hits[WEIGHT + 1, k] = wr * inverse, wg * inverse
-        hits[WEIGHT + 2, k] = wb * inverse
-        hits[GO_PDF, k] = opacity * pdf
+        block[_WEIGHT + x], block[_WEIGHT + _STEP + x] = wr * inverse, wg * inverse
+        block[_WEIGHT + 2 * _STEP + x] = wb * inverse
+        chance = block[_CHANCE + 3 * _STEP + x]
+        straight = chance >= opacity
+        block[_GO_PDF + x] = R(-1) if straight else opacity * pdf
+        block[_CHANCE + 3 * _STEP + x] = chance if straight else chance / opacity

@@ -28,7 +28,7 @@ from fabricusd.reference.view_transform import view
 from fabricusd.reference.wave import Wave
 from fabricusd.reference.workers import Batches, pixels_along_z_curve, worker_count
 
-BATCH = 1 << 15
+BATCH = 1 << 12
 """Paths in a batch: enough that starting a stage costs little, few enough to stay in cache."""
 
 PASS = 16
@@ -186,6 +186,7 @@ def render_scene(
     workers: int | None = None,
     pixel_filter: str = "tent",
     estimator: str = "mis",
+    sampler: str = "sobol",
     progress: Progress | None = None,
 ) -> RenderResult:
     """As `render`, for a `Scene` in memory, without files."""
@@ -195,8 +196,9 @@ def render_scene(
         scene.lights = default_lights(scene)
     camera = scene.camera or default_camera(scene, width, height)
     tracer = Tracer(
-        scene, max_bounces=max_bounces, level=level, shadow=shadow, seed=seed, estimator=estimator
-    )
+        scene, max_bounces=max_bounces, level=level, shadow=shadow, seed=seed,
+        estimator=estimator, sampler=sampler,
+    )  # fmt: skip
     if not len(tracer.tables.triangles):
         scene.note("the scene", "has no triangles to render; only its lights are seen")
     lens = build_lens(camera, width, height, tracer.tables.centre, pixel_filter)
@@ -238,7 +240,7 @@ def render_scene(
     )
 
 
-def _typical_worst(error: NDArray[np.float64]) -> float:
+def _typical_worst(error: NDArray[np.float32]) -> float:
     """The relative error that 99 % of the pixels stay below; infinite where none is known."""
     known = error[np.isfinite(error)]
     return float(np.quantile(known, 0.99)) if known.size else float("inf")
@@ -260,7 +262,7 @@ def _sample(
     size = BATCH
     # A small picture still makes work for many workers. Their number must not matter here: rounding
     # depends on which lane of a vector a ray falls into, and that on the batch.
-    while size > 2048 and len(order) * min(PASS, most) < 16 * size:
+    while size > 1024 and len(order) * min(PASS, most) < 16 * size:
         size //= 2
     waves = [Wave(size, aovs=film.extra) for _ in range(workers)]
     done = 0

@@ -178,7 +178,7 @@ def smooth_normals(points: NDArray[Any], tri: NDArray[Any]) -> NDArray[np.float3
             b = corners[:, (k + 2) % 3] - corners[:, k]
             sine = np.linalg.norm(np.cross(a, b), axis=1)
             angle = np.arctan2(sine, np.einsum("ij,ij->i", a, b))
-            np.add.at(total, shared[:, k], angle[:, None] * face)
+            _add_at(total, shared[:, k], angle[:, None] * face)
     normals = np.empty((len(tri), 3, 3), np.float32)
     for part in _parts(len(tri)):
         face = _face_normals(points[tri[part]])
@@ -186,6 +186,12 @@ def smooth_normals(points: NDArray[Any], tri: NDArray[Any]) -> NDArray[np.float3
         cosine = np.einsum("mkc,mc->mk", mean, face)
         normals[part] = np.where((cosine < math.cos(CREASE))[..., None], face[:, None], mean)
     return normals
+
+
+def _add_at(total: NDArray[Any], index: NDArray[np.int64], vectors: NDArray[Any]) -> None:
+    """`total[index] += vectors`, (n, 3), also where an index occurs often."""
+    for axis in range(3):
+        total[:, axis] += np.bincount(index, vectors[:, axis], len(total))
 
 
 def _face_normals(corners: NDArray[Any]) -> NDArray[Any]:
@@ -285,7 +291,7 @@ def _grain(
     for part in _parts(len(tri)):
         weighted = along[part] * np.linalg.norm(np.cross(e1[part], e2[part]), axis=1)[:, None]
         for k in range(3):
-            np.add.at(total, group[part, k], weighted)
+            _add_at(total, group[part, k], weighted)
     tangents = np.empty((len(tri), 3, 3), np.float32)
     for part in _parts(len(tri)):
         mean, own = _unit(total[group[part]], along[part, None]), normals[part]

@@ -18,6 +18,8 @@ from fabricusd.preview.fit import (
 )
 from fabricusd.preview.look import Look
 from fabricusd.preview.models import KINDS, Surface, evaluate
+from fabricusd.preview.texels import KINDS as KINDS_OF_TEXELS
+from fabricusd.preview.texels import _kinds
 from fabricusd.schema import load
 
 
@@ -111,6 +113,17 @@ def test_a_fit_to_cloth_is_nearer_than_the_textures_alone():
     found = fit("openpbr", texels(base=np.array([[0.05, 0.2, 0.25]])), load("linen_plain"))
     assert found.delta_e < 0.8 * found.start_delta_e
     assert found.albedo < 0.2
+
+
+def test_kinds_of_texels_keep_the_mean_and_share_out_the_whole():
+    rows = np.random.default_rng(2).normal(size=(500, 4))
+    means, share = _kinds(rows)
+    assert len(means) <= KINDS_OF_TEXELS
+    assert share.sum() == pytest.approx(1.0)
+    assert share @ means == pytest.approx(rows.mean(axis=0))
+    alike, one = _kinds(np.tile([0.5, 0.25], (500, 1)))
+    assert alike.tolist() == [[0.5, 0.25]]
+    assert one.tolist() == [1.0]
 
 
 def test_half_the_cover_is_half_the_light():

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdShade
 
+from fabricusd.preview.bake_folder import BakedLay
 from fabricusd.preview.graph import Link, Parameter, Texture, Value
+from fabricusd.preview.hair import absorption, hair
 from fabricusd.preview.look import Look
 from fabricusd.preview.mtlx import write_mtlx
 from fabricusd.preview.surfaces import GRAPHS, MAPS, parameter_values, preview
 from fabricusd.preview.write_usd import write_material
+from fabricusd.schema import load
 
 LOOK = Look(smooth_scale=0.8, rough_scale=0.9, base_color_scale=(1.5, 1.0, 0.5), fuzz_weight=0.25)
 CONSTANTS = {
@@ -98,6 +101,11 @@ def networks():
     for kind, make in GRAPHS.items():
         yield f"{kind}_textures", make(textures, False)
         yield f"{kind}_constants", make(CONSTANTS, True)
+    lay = BakedLay(
+        name="silk_shot", fabric=load("silk_shot"), matrix=np.array([[30.0, 10.0], [-10.0, 30.0]]),
+        offset=np.zeros(2),
+    )  # fmt: skip
+    yield "hair", hair(textures, False, lay)
 
 
 def _here():
@@ -163,6 +171,19 @@ def test_materialx_validates_and_generates_every_language(tmp_path):
             surface = mx.getShaderNodes(material)[0]
             made = generator.generate(material.getName(), surface, context)
             assert len(made.getSourceCode("pixel")) > 1000
+
+
+def test_hair_runs_along_its_threads_with_their_widths():
+    graph = dict(networks())["hair"]
+    weft, warp = graph.node("weft"), graph.node("warp")
+    green, red = load("silk_shot").thread_list
+    assert weft.inputs["roughness_R"].value[0] == pytest.approx((2 * green.gamma_surface) ** 2)
+    assert warp.inputs["ior"].value == pytest.approx(red.ior)
+    # Threads = matrix @ uv: the weft runs where the second coordinate stands still.
+    axis = [graph.node(f"weft_{k}").inputs["in2"].value for k in "uv"]
+    assert np.array([-10.0, 30.0]) @ axis == pytest.approx(0.0)
+    assert graph.node("threads").inputs["mix"].value == pytest.approx(0.14)
+    assert np.all(np.diff(absorption((0.9, 0.5, 0.1))) > 0)
 
 
 def test_the_preview_surface_takes_the_look_into_its_readers():

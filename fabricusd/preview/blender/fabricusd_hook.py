@@ -100,10 +100,9 @@ class Nodes:
     def image(self, path: str, *, data: bool) -> Any:
         """The colour of an image, which is loaded once."""
         node = self.tree.nodes.new("ShaderNodeTexImage")
-        tiled = "<UDIM>" in path
-        first = path.replace("<UDIM>", "1001")
-        node.image = bpy.data.images.load(first, check_existing=True)
-        if tiled:
+        known = (i for i in bpy.data.images if bpy.path.abspath(i.filepath) == path)
+        node.image = next(known, None) or bpy.data.images.load(path.replace("<UDIM>", "1001"))
+        if "<UDIM>" in path:
             node.image.source = "TILED"
         node.image.colorspace_settings.name = "Non-Color" if data else "Linear Rec.709"
         node.extension = "EXTEND"

@@ -1,0 +1,40 @@
+"""Render the samples' pictures of docs/path_tracer.md: python docs/make_pictures.py [--spp N]."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+from fabricusd.reference import render
+from fabricusd.reference.images import write_png
+from fabricusd.reference.view_transform import view
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "samples"))
+
+SIZES = {"cylinders": (720, 400), "drape": (640, 480), "skirt": (480, 640)}
+
+
+def main() -> None:
+    """Make the pictures named, or all."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", default=list(SIZES))
+    parser.add_argument("--spp", type=int, default=128)
+    options = parser.parse_args()
+    from make_samples import make_cylinders, make_drape, make_skirt
+
+    made = {"cylinders": make_cylinders, "drape": make_drape, "skirt": make_skirt}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in options.names:
+            width, height = SIZES[name]
+            scene = made[name](Path(folder))
+            result = render(scene, width=width, height=height, spp=options.spp)
+            target = HERE / "images" / f"sample_{name}.png"
+            write_png(target, view(result.layers["beauty"][..., :3], 0.0))
+            print(f"{target}: {result.samples:.0f} samples, {result.seconds:.1f} s")
+
+
+if __name__ == "__main__":
+    main()

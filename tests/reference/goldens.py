@@ -1,0 +1,75 @@
+"""Golden pictures: what each shows, and the command that makes them anew after a wanted change.
+
+    python -m tests.reference.goldens [NAME...]
+
+24 x 24 pixels, 4096 samples; an EXR holds the mean and the variance of the mean.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fabricusd.reference.film import AOVS
+from fabricusd.reference.images import write_exr
+from fabricusd.reference.render import RenderResult
+from fabricusd.reference.scene import DOME, RECT, Camera, Light, PreviewSurface
+from fabricusd.schema import load
+from tests.reference.scenes import cloth, grid, lambert, looking, picture
+
+FOLDER = Path(__file__).parent / "golden"
+SIZE = 24
+SAMPLES = 4096
+
+CASES: dict[str, dict[str, Any]] = {
+    # name: fabric and level; all on the same folds over a floor, under a picture and a lamp
+    "satin_far": {"preset": "polyester_satin_charmeuse", "level": "far"},
+    "silk_thread": {"preset": "silk_shot", "level": "thread", "threads": 12.0},
+    "linen_auto": {"preset": "linen_plain", "level": "auto", "threads": 40.0},
+    "velvet_weave": {"preset": "velvet", "level": "weave", "threads": 12.0},
+}
+
+
+def render_case(
+    name: str, *, spp: int, seed: int, brightness: float = 1.0, sampler: str = "sobol"
+) -> RenderResult:
+    """One golden picture's scene; `brightness` scales its lamp."""
+    case = CASES[name]
+    folds = grid(lambda x, z: 0.12 * np.sin(9 * x) * np.cos(5 * z), cells=40)
+    floor = replace(grid(size=3.0, material=1), path="floor")
+    floor = replace(floor, points=floor.points - [0.0, 0.3, 0.0])
+    plate = replace(grid(size=0.5, material=2), path="plate")
+    plate = replace(plate, points=plate.points - [-0.5, 0.1, -0.3])
+    image = np.random.default_rng(3).uniform(0.2, 1.0, (8, 16, 3)).astype(np.float32)
+    lights = [
+        Light(path="sky", kind=DOME, radiance=(1, 1, 1), image=image),
+        Light(
+            path="lamp", kind=RECT, width=0.8, height=0.8,
+            radiance=(6 * brightness,) * 3, frame=looking((0.6, 1.0, 0.4)),
+        ),
+    ]  # fmt: skip
+    gloss = PreviewSurface(diffuse=(0.5, 0.3, 0.1), roughness=0.3)
+    material = cloth(load(case["preset"]), case.get("threads", 40.0))
+    camera = Camera(frame=looking((0.7, 1.4, 1.0)), aperture=(0.03, 0.03))
+    return picture(
+        [folds, floor, plate], [material, lambert(0.6), gloss], lights, camera, size=SIZE, spp=spp,
+        level=case["level"], shadow="none", seed=seed, sampler=sampler, pixel_filter="spline",
+    )  # fmt: skip
+
+
+def main() -> None:
+    """Make the goldens named, or all."""
+    FOLDER.mkdir(exist_ok=True)
+    for name in sys.argv[1:] or CASES:
+        r = render_case(name, spp=SAMPLES, seed=1)
+        path = FOLDER / f"{name}.exr"
+        write_exr(path, {k: r.layers[k] for k in ("beauty", "variance")}, AOVS, {})
+        print(path)
+
+
+if __name__ == "__main__":
+    main()
