@@ -1,9 +1,9 @@
-"""How long a bake takes: against plain NumPy in one run, and by the number of texels.
+"""How long a bake takes: against plain NumPy in one run, and as a whole.
 
-    python bench/bench_bake.py [--full SCENE] [--btf]
+    python bench/bench_bake.py [--full SCENE]
 
-Ratios in one run, so that a busy machine does not matter. `--full` bakes the whole map set of SCENE
-at 4K and prints seconds and peak memory; `--btf` prints error against megabytes of the BTF's forms.
+Ratios of processor time in one run, so that a busy machine does not matter. `--full` bakes the
+whole map set of SCENE at 4K and prints seconds and peak memory. See bench/bake_charts.py too.
 """
 
 from __future__ import annotations
@@ -12,17 +12,18 @@ import argparse
 import resource
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fabricusd.appearance.coverage import WARP
-from fabricusd.bake import moments as m
 from fabricusd.bake import planes
 from fabricusd.bake.angle_rows import steepness
 from fabricusd.bake.bake import Settings, bake
-from fabricusd.bake.btf.write import FORMS, write_btf
+from fabricusd.bake.blocks import composed, layers_of
 from fabricusd.bake.garment import garments
+from fabricusd.bake.maps import Texels, chosen_maps
 from fabricusd.bake.recipe import Recipe, recipe
 from fabricusd.bake.reflectance import reflectance_table
 from fabricusd.bake.sheet import sheets_of, texel_step
@@ -30,8 +31,8 @@ from fabricusd.fabric import Binding, Fabric
 from fabricusd.reference.scene import FabricSurface, Mesh, Scene
 from fabricusd.schema import load
 
-SIDE = 6
-"""Samples along a texel's side, of both."""
+SIDE = 4
+"""Samples along a texel's side in NumPy, as the baker's own where it computes texels one by one."""
 
 
 def square(fabric: Fabric, threads: float) -> Scene:
@@ -117,59 +118,60 @@ def _heights(fabric: Fabric) -> tuple[np.ndarray, np.ndarray]:
 
 
 def against_numpy() -> None:
+    """Every map of a sheet's finest level, tables included, against the same in plain NumPy."""
     fabric = load("linen_plain")
-    size, threads = 256, 448.0
+    size, threads = 1024, 448.0
     one = garments(square(fabric, threads))[0]
     made = recipe(fabric)
-    sheet = sheets_of(one, (made,), {1001: (0, 0)}, size, 0)[0]
-    step = np.abs(texel_step(sheet, 0))
-    owner = np.zeros((size, size), np.int32)
-    out = np.empty((planes.PLANES, size, size), np.float32)
-    sums = np.empty(planes.PLANES, np.float32)
+    maps = chosen_maps(None, light=False)
 
-    def ours() -> None:
-        m.texels(made, step, step, np.zeros(2), (0, 0), owner, 0, SIDE, sums, out)
+    def ours(tables: bool) -> None:
+        sheet = sheets_of(one, (made,), {1001: (0, 0)}, size, 0)[0]
+        assert sheet.tables[0] is not None
+        sheet = sheet if tables else replace(sheet, tables=(None,))
+        for bx in range(sheet.across):
+            for by in range(sheet.across):
+                layers = next(layers_of(sheet, bx, by))
+                for texture in maps:
+                    composed(texture, layers, sheet.block)
 
-    ours()
-    seconds = [_timed(f) for f in (ours, lambda: plain_planes(made, fabric, step, size))]
-    plain = plain_planes(made, fabric, step, size)
-    close = float(np.abs(out.mean(axis=(1, 2)) - plain.mean(axis=(1, 2))).max())
+    def plain() -> None:
+        sheet = sheets_of(one, (made,), {1001: (0, 0)}, size, 0)[0]
+        step = np.abs(texel_step(sheet, 0))
+        for _ in range(sheet.across**2):
+            found = plain_planes(made, fabric, step, sheet.block)
+            texels = Texels.of_planes(found.reshape(planes.PLANES, -1), made, one.lays[0])
+            for texture in maps:
+                if not texture.exact:
+                    texture.function(texels).astype(texture.kind)
+
+    ours(True), ours(False)
+    looked_up, computed = _timed(lambda: ours(True)), _timed(lambda: ours(False))
+    numpy = _timed(plain, 1)
     print(
-        f"planes of {size} x {size} texels, {SIDE}x{SIDE} samples, 1 worker: {seconds[0]:.3f} s "
-        f"plain NumPy {seconds[1]:.3f} s, ratio {seconds[1] / seconds[0]:.1f} "
-        f"(means of the {planes.PLANES} planes differ by at most {close:.4f})"
+        f"{len(maps)} maps of {size} x {size} texels, 1 worker: looked up {looked_up:.2f} s, "
+        f"computed one by one {computed:.2f} s, plain NumPy without ids {numpy:.2f} s: "
+        f"ratios {numpy / looked_up:.0f} and {numpy / computed:.1f}"
     )
 
 
-def _timed(function) -> float:  # type: ignore[no-untyped-def]
+def _timed(function, times: int = 3) -> float:  # type: ignore[no-untyped-def]
     best = np.inf
-    for _ in range(3):
+    for _ in range(times):
         began = time.process_time()
         function()
         best = min(best, time.process_time() - began)
     return best
 
 
-def by_texels() -> None:
-    fabric = load("linen_plain")
-    binding = Binding(fabric=fabric, threads_per_uv=(300.0, 300.0))
-    with tempfile.TemporaryDirectory() as folder:
-        path = f"{folder}/square.obj"
-        with open(path, "w") as stream:
-            stream.write(
-                "v 0 0 0\nv .1 0 0\nv .1 .1 0\nv 0 .1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
-                "f 1/1 2/2 3/3 4/4\n"
-            )
-        bake(path, f"{folder}/warm", Settings(resolution=64), fabric=binding)
-        for resolution in (512, 1024, 2048):
-            began = time.process_time()
-            bake(path, f"{folder}/{resolution}", Settings(resolution=resolution), fabric=binding)
-            seconds = time.process_time() - began
-            print(
-                f"{resolution:5} x {resolution:<5} {seconds:7.2f} processor seconds, "
-                f"{seconds / resolution**2 * 1e6:.2f} microseconds a texel, "
-                f"peak {_peak():.2f} GB"
-            )
+def write_square(folder: str) -> str:
+    """An OBJ file of a square of 10 cm."""
+    path = Path(folder) / "square.obj"
+    path.write_text(
+        "v 0 0 0\nv .1 0 0\nv .1 .1 0\nv 0 .1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+        "f 1/1 2/2 3/3 4/4\n"
+    )
+    return str(path)
 
 
 def _peak() -> float:
@@ -186,26 +188,10 @@ def full(scene: str) -> None:
         )
 
 
-def btf_curve() -> None:
-    for name in ("linen_plain", "polyester_satin_charmeuse", "velvet"):
-        for bound in (8.0, 4.0, 2.0, 1.0, 0.5):
-            with tempfile.TemporaryDirectory() as folder:
-                records = write_btf(load(name), Path(folder), FORMS, max_error=bound)
-            for r in records:
-                print(
-                    f"{name:26} {r['form']:10} {r['megabytes']:6.2f} MB  rank {max(r['rank']):3}  "
-                    f"delta E {r['delta_e']:.2f}, between directions {r['delta_e_between']:.2f}"
-                )
-
-
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--full", metavar="SCENE")
-    parser.add_argument("--btf", action="store_true")
     options = parser.parse_args()
     against_numpy()
-    by_texels()
     if options.full:
         full(options.full)
-    if options.btf:
-        btf_curve()

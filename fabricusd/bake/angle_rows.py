@@ -13,13 +13,16 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.coverage import WARP
 from fabricusd.appearance.curve import height_at
-from fabricusd.appearance.quadrature import curve_nodes
+from fabricusd.appearance.quadrature import CELLS, Rule, curve_nodes
 from fabricusd.bake import planes as p
 from fabricusd.bake.reflectance import ANGLES, reflectance_table
 from fabricusd.fabric import PILE_ANGLE, Fabric
 
 STEPS = 721
 """Angles from -90 to 90 degrees, a quarter of a degree apart: a tenth of the narrowest lobe."""
+
+FINE = Rule(CELLS, math.radians(0.1))
+"""Tangent angles as they lie along the curves."""
 
 HEIGHTS = 1025
 """Places that the height along a run is kept at, linear between."""
@@ -31,7 +34,7 @@ def steepness(fabric: Fabric) -> NDArray[np.float64]:
     Where the angles on either side vary least about their mean: spreads are then narrow against
     the lobes, and it matters little how the angles lie inside them.
     """
-    nodes = curve_nodes(fabric)
+    nodes = curve_nodes(fabric, FINE)
     found = np.zeros(2)
     for which in range(2):
         mine = slice(0, nodes.warp_start) if which != WARP else slice(nodes.warp_start, None)
@@ -49,6 +52,11 @@ def steepness(fabric: Fabric) -> NDArray[np.float64]:
     return found
 
 
+def part_of(psi: NDArray[np.float64], split: float) -> NDArray[np.int64]:
+    """Part of each angle [rad]: falling gently or steeply, rising gently or steeply."""
+    return 2 * (psi < 0) + (np.abs(psi) > split)
+
+
 def angle_rows(fabric: Fabric) -> NDArray[np.float32]:
     """(2, k, STEPS, LIT) planes before LIT, by thread set (weft, warp), thread type and angle.
 
@@ -60,7 +68,7 @@ def angle_rows(fabric: Fabric) -> NDArray[np.float32]:
     split, reflected = steepness(fabric), reflectance_table(fabric)
     known = np.linspace(-0.5 * math.pi, 0.5 * math.pi, ANGLES)
     for which in range(2):
-        part = p.PARTS * which + 2 * (psi < 0) + (np.abs(psi) > split[which])
+        part = p.PARTS * which + part_of(psi, split[which])
         # A thread is a cylinder: across it every normal is there, along it the lobe's width.
         along = 1 if which == WARP else 0
         for kind, thread in enumerate(fabric.thread_list):

@@ -42,7 +42,7 @@ SAMPLES = 2**22
 MOST_PHASES = 2**19
 """Phases of all tables of a garment: 210 MB, planes and maps."""
 
-WORTH = 0.25
+WORTH = 0.5
 """Share of the sheet's own samples that a table may cost at most."""
 
 

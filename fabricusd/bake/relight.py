@@ -1,8 +1,8 @@
 """A baked set under any light and view: the loader of our own maps.
 
 Each thread set of a texel is re-lit from the share that it covers, its `A`, and the mean and
-standard deviation of its tangent angle, taken as even around the mean - which a straight piece of
-a tangent curve is. So a fine level gives the appearance level `weave`, the coarsest nearly `far`.
+standard deviation of its tangent angle, about which the angles lie as in the fabric. So a fine
+level gives the appearance level `weave`, the coarsest `far`.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from fabricusd.appearance.real import KERNEL
 from fabricusd.appearance.segment import along_set, seen_along, segment
 from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.thread_terms import GAMMA_SURFACE, MODEL, THESIS
+from fabricusd.bake.angle_shape import COUNTS, angle_shapes
 from fabricusd.bake.encoding import Encoding
 from fabricusd.bake.maps import GAP_ID
 from fabricusd.bake.planes import PARTS
@@ -46,9 +47,6 @@ RELIT = tuple(
 
 NEEDED = RELIT[-1]
 """Those that lose least."""
-
-MOST_NODES = 64
-"""Tangent angles that a texel's spread is cut into at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,10 +126,14 @@ def relight(
     share = area / np.maximum(area.sum(axis=1, keepdims=True), 1e-30)
     ids = np.asarray(maps["thread_id"][:, 0])
     sets = np.stack([_set_of(maps, noun) for noun in ("weft", "warp")], axis=1)
+    shapes = angle_shapes(fabric)
+    if "weft_share" not in maps:
+        # The one part is the whole set.
+        shapes[:, 0] = shapes[:, PARTS]
     kinds = np.where(ids == GAP_ID, -1, ids).astype(np.int64)
     out = np.zeros((len(ids), 3))
     i, o = (np.asarray(w, np.float64) for w in (wi, wo))
-    _relight(surface_tables(fabric), share, types, sets, kinds, i, o, out)
+    _relight(surface_tables(fabric), share, shapes, types, sets, kinds, i, o, out)
     return out
 
 
@@ -158,7 +160,7 @@ def _set_of(maps: Mapping[str, NDArray[Any]], noun: str) -> Floats:
 
 @njit(parallel=True, **KERNEL)
 def _relight(  # type: ignore[no-untyped-def]
-    tables, share, types, sets, kinds, wi, wo, out
+    tables, share, shapes, types, sets, kinds, wi, wo, out
 ):
     """sets (n, 2, 16): `A` and share; shares, angles and deviations of the parts.
 
@@ -188,7 +190,7 @@ def _relight(  # type: ignore[no-untyped-def]
                         continue
                     middle, spread = sets[k, j, 8 + part], sets[k, j, 12 + part]
                     surface, volume = _stretch(
-                        R, tables, row, middle, math.sqrt(3.0) * spread,
+                        R, tables, row, middle, spread, shapes[j, part],
                         a_i, b_i, wi[2], s_i, a_o, b_o, wo[2], s_o, u,
                     )  # fmt: skip
                     for channel in range(3):
@@ -198,13 +200,17 @@ def _relight(  # type: ignore[no-untyped-def]
 
 @njit(**KERNEL)
 def _stretch(  # type: ignore[no-untyped-def]
-    R, tables, row, middle, reach, a_i, b_i, iz, s_i, a_o, b_o, oz, s_o, u
+    R, tables, row, middle, spread, shape, a_i, b_i, iz, s_i, a_o, b_o, oz, s_o, u
 ):
-    """Surface and volume term of a thread whose angle goes evenly `reach` to both sides."""
-    nodes = int(min(MOST_NODES, max(1.0, math.ceil(3.0 * reach / row[GAMMA_SURFACE]))))
+    """Surface and volume term of a thread whose angles have this mean, deviation and shape."""
+    fewest = 3.0 * math.sqrt(3.0) * spread / row[GAMMA_SURFACE]
+    kind = 0
+    while kind < len(COUNTS) - 1 and COUNTS[kind] < fewest:
+        kind += 1
+    nodes = COUNTS[kind]
     first, second = 0.0, 0.0
     for node in range(nodes):
-        angle = middle + reach * ((2 * node + 1) / nodes - 1.0)
+        angle = middle + spread * shape[kind, node]
         angle = min(max(angle, -0.5 * math.pi), 0.5 * math.pi)
         c, s = math.cos(angle), math.sin(angle)
         surface, volume = segment(

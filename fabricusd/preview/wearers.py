@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from fabricusd.bake.garment import Garment, fitted, garments
 from fabricusd.errors import FabricError
 from fabricusd.preview.bake_folder import MapSet
 from fabricusd.reference.read import read_scene
+from fabricusd.reference.scene import Scene
 from fabricusd.schema import open_stage
 
 
@@ -63,7 +65,7 @@ def find_wearers(scene: Path, sets: tuple[MapSet, ...]) -> Dressed:
             str(scene), "is no USD layer; leave --scene out to write a look over the baked meshes"
         )
     stage, _ = open_stage(scene)
-    now = {path: one for one in _garments(scene, sets) for path in one.copies}
+    now = _garments(scene, sets)
     wearers: list[Wearer] = []
     uv: list[NewUV] = []
     notes: list[str] = []
@@ -83,10 +85,19 @@ def find_wearers(scene: Path, sets: tuple[MapSet, ...]) -> Dressed:
     return Dressed(stage=stage, wearers=tuple(wearers), uv=tuple(uv), notes=tuple(notes))
 
 
-def _garments(scene: Path, sets: tuple[MapSet, ...]) -> list[Garment]:
-    """The scene's garments in their own UVs, none where it has no fabric to lay on them."""
-    fabric = next((lay.fabric for one in sets for lay in one.lays if lay.fabric), None)
-    return garments(read_scene(scene, fabric=fabric))
+def _garments(scene: Path, sets: tuple[MapSet, ...]) -> dict[str, Garment]:
+    """The garments that were baked as they are in the scene now, by their prims' paths."""
+    found = {}
+    read: dict[str, Scene] = {}
+    for maps in sets:
+        lay = maps.lays[0]
+        if lay.name not in read:
+            read[lay.name] = read_scene(scene, fabric=lay.fabric)
+        for path in maps.prims:
+            # What is no garment any more is said about each prim.
+            with suppress(FabricError):
+                found[path] = garments(read[lay.name], path)[0]
+    return found
 
 
 def _compare(maps: MapSet, now: Garment | None, path: str, notes: list[str]) -> None:

@@ -10,6 +10,7 @@ from bake.meshes import quad_scene
 
 from fabricusd.appearance.compiled import true_repeat
 from fabricusd.appearance.coverage import coverage
+from fabricusd.appearance.shadow import shadowing
 from fabricusd.appearance.surface import evaluate
 from fabricusd.appearance.weave import lookup
 from fabricusd.bake.accuracy import (
@@ -140,9 +141,26 @@ def test_shadows_cross_the_repeats_border():
     shift = 128 * 2 // 8
     inside = np.abs(seen - np.roll(seen, shift, axis=1))
     assert inside.mean() < 0.005
-    assert seen.min() < 0.95
     # The twin: half a repeat on, other threads lie there.
     assert np.abs(seen - np.roll(seen, shift // 2, axis=1)).mean() > 0.01
+
+
+def test_a_place_at_the_repeats_border_is_shadowed_by_the_next_repeat():
+    """Light from -U, low: what stands in its way lies in the repeat before. Against marching."""
+    fabric = load("linen_plain")
+    maps, sheet = baked(fabric, threads=16.0, resolution=256)
+    towards_minus_u = maps["horizon_08"][0][..., 0].astype(np.float64)
+    places = np.random.default_rng(0).random((4000, 2)) * 256
+    uv = texel_start(sheet, 0, 0, 0) + places @ texel_step(sheet, 0).T
+    elevation = np.radians(10.0)
+    wi = np.array([-np.cos(elevation), 0.0, np.sin(elevation)])
+    for low, high in ((0.0, 0.25), (1.0, 1.25)):
+        inside = ~lookup(fabric, uv).gap & (uv[:, 0] % 2.0 >= low) & (uv[:, 0] % 2.0 < high)
+        true = shadowing(fabric, np.repeat(wi[None], inside.sum(), axis=0), uv[inside], "traced")
+        x, y = places[inside].T.astype(int)
+        lit = wi[2] >= towards_minus_u[y, x]
+        assert true.mean() < 0.8
+        assert lit.mean() == pytest.approx(true.mean(), abs=0.05)
 
 
 def test_a_low_light_casts_longer_shadows():
@@ -179,7 +197,14 @@ def test_the_bound_bites_when_the_maps_are_of_another_fabric():
 
 @pytest.mark.parametrize(
     ("name", "bound"),
-    [("linen_plain", 0.5), ("velvet", 0.5), ("silk_shot", 1.0), ("silk_crepe_de_chine", 1.5)],
+    [
+        ("linen_plain", 0.5),
+        ("velvet", 0.5),
+        ("silk_shot", 0.5),
+        ("silk_crepe_de_chine", 0.5),
+        ("polyester_satin_charmeuse", 0.5),
+        ("polyester_satin_charmeuse_back", 0.5),
+    ],
 )
 def test_the_coarsest_level_relit_is_level_far(name, bound):
     fabric = load(name)

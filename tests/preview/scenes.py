@@ -42,6 +42,12 @@ def write_shirt(path: Path, *, width: float = 0.99) -> Path:
         write_fabric(stage, where, load(preset))
         binding = Binding(fabric=load(preset), threads_per_uv=(24.0, 24.0))
         write_binding(subset.GetPrim(), where, binding)
+    # Neither UVs nor a material: nothing that a look has to do with.
+    hanger = UsdGeom.Mesh.Define(stage, "/Shirt/Hanger")
+    hanger.CreatePointsAttr([(0, 2, 0), (1, 2, 0), (0, 3, 0)])
+    hanger.CreateFaceVertexCountsAttr([3])
+    hanger.CreateFaceVertexIndicesAttr([0, 1, 2])
+    hanger.CreateExtentAttr([(0, 2, 0), (1, 3, 0)])
     old = _material(stage, "/Shirt/Looks/Old")
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(old)
     button = _subset(mesh, "Button", 2).GetPrim()

@@ -14,6 +14,9 @@ from fabricusd.errors import FabricError
 
 Floats = NDArray[np.float64]
 
+Decomposed = list[tuple[Floats, Floats, Floats]]
+"""Left vectors (d*d, channels, r), singular values (r,), right vectors (r, texels), by group."""
+
 SAMPLES = 4096
 """Entries of the table that an error is measured on."""
 
@@ -37,12 +40,20 @@ class Factors:
         return max(int(c.shape[1]) for c in self.columns)
 
 
-def factors(btf: Btf, *, joint: bool, max_error: float | None = None, rank: int = 0) -> Factors:
+def factors(
+    btf: Btf,
+    *,
+    joint: bool,
+    max_error: float | None = None,
+    rank: int = 0,
+    full: Decomposed | None = None,
+) -> Factors:
     """Factors of `rank`, or of the least rank whose mean delta E 2000 is at most `max_error`.
 
     joint : one set of components for all channels; otherwise each channel has its own
+    full : what `decomposed` gave, where several ranks are asked for
     """
-    full = _decompose(btf, joint)
+    full = full or decomposed(btf, joint)
     most = max(len(s) for _, s, _ in full)
     rows, texels = _sampled(btf)
     true = _display(btf, rows, table(btf, rows, texels))
@@ -93,7 +104,7 @@ def entries(made: Factors, rows: NDArray[np.int64], texels: NDArray[np.int64]) -
     )
 
 
-def _decompose(btf: Btf, joint: bool) -> list[tuple[Floats, Floats, Floats]]:
+def decomposed(btf: Btf, joint: bool) -> Decomposed:
     """Singular value decompositions, by those of two small triangles instead of the table."""
     d2, channels, k = btf.nodes.shape
     if k == 0:
