@@ -49,7 +49,7 @@ def _settings(quick: bool) -> dict[str, dict[str, Any]]:
 
 
 def _rows(name: str, quick: bool) -> list[Row]:
-    size, repeats, most = (24, 3, 1024) if quick else (48, 3, 8192)
+    size, repeats, most = (24, 2, 512) if quick else (48, 3, 8192)
     scene = one_cylinder(load(name))
 
     def picture(seed: int, side: int = size, **settings: Any) -> tuple[Picture, float]:

@@ -137,7 +137,7 @@ def draw(figure: Any, rows: Sequence[Row]) -> None:
                 )
             axes.set_xscale("log")
             axes.set_yscale("symlog", linthresh=0.01)
-            axes.set_ylim(0, 3)
+            axes.set_ylim(0, 9)
             axes.set_ylabel(f"{figure_name} over mean")
             axes.grid(alpha=0.3)
         grid[0, column].set_title(name, fontsize=9)
