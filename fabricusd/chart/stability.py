@@ -227,8 +227,9 @@ def below_the_cloth() -> Case:
     wo = _up(np.radians(90.0 - elevation))
     wi = np.tile(_up(np.radians([50.0]), 2.0), (len(wo), 1))
     value = sum(
-        area * plain.segment(fabric, share, psi0, wi, wo)
-        for share, psi0, area in plain._nodes(fabric, 32)
+        weight * share.area * plain.segment(fabric, share, float(psi0), wi, wo)
+        for share in plain.shares(fabric)
+        for psi0, weight in zip(*plain.curve_points(share.thread.curve, 32), strict=True)
     )
     q = plain.normalization(fabric, wi, wo, 32)
     with np.errstate(invalid="ignore", divide="ignore"):
