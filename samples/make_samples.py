@@ -28,11 +28,15 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """A grid of points as quads with UVs in metres; `around` closes its first axis."""
+    """A grid of points as quads with UVs in metres; `around` closes its first axis.
+
+    cuts : columns of UVs with a seam behind them, where the next column has the same points again
+    """
 
     points: Points
     uv: NDArray[np.float64]
     around: bool = False
+    cuts: tuple[int, ...] = ()
 
 
 def define_grid(stage: Usd.Stage, path: str, grid: Grid) -> UsdGeom.Mesh:
@@ -44,7 +48,8 @@ def define_grid(stage: Usd.Stage, path: str, grid: Grid) -> UsdGeom.Mesh:
     j = np.arange(columns * n).reshape(columns, n)
     ring = np.concatenate([i, i[:1]]) if grid.around else i
     faces = _quads(ring)
-    corners = _quads(j)
+    strips = _quads(j).reshape(columns - 1, n - 1, 4)
+    corners = np.delete(strips, grid.cuts, axis=0).reshape(-1, 4)
     mesh = UsdGeom.Mesh.Define(stage, path)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(grid.points.reshape(-1, 3).astype(np.float32)))
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 4, np.int32)))
@@ -274,29 +279,33 @@ def make_skirt(folder: Path, *, around: int = 120, down: int = 44, steps: int = 
     hung = simulate(start, flat, body, pinned=pinned, around=True, steps=steps, bending=0.06)
     fine = finer(hung, 3, around=True)
     # From the hem upwards, so that the outside is the front.
-    uv = _skirt_uv(fine.shape, inner, length, sweep)
-    mesh = define_grid(stage, "/World/Skirt", Grid(fine[:, ::-1], uv[:, ::-1], True))
+    uv, cuts = _skirt_uv(fine.shape, inner, length, sweep)
+    mesh = define_grid(stage, "/World/Skirt", Grid(fine[:, ::-1], uv[:, ::-1], True, cuts))
     dress(stage, mesh, "polyester_satin_charmeuse")
     _figure(stage)
-    camera(stage, (0.75, 1.15, 3.3), (0.0, 0.80, 0.0), 70.0)
+    camera(stage, (0.75, 1.15, 3.3), (0.0, 0.78, 0.0), 115.0)
     stage.GetRootLayer().Save()
     return path
 
 
 def _skirt_uv(
     shape: tuple[int, ...], inner: float, length: float, sweep: float
-) -> NDArray[np.float64]:
-    """(m + 1, n, 2) [m] the place of each point on its flat panel, v up, u to the wearer's left.
+) -> tuple[NDArray[np.float64], tuple[int, int]]:
+    """(m + 3, n, 2) [m] the place of each point on its flat panel, and the columns before a seam.
 
-    Panels meet at the sides; each lies symmetric about its own centre line, which is the grain.
+    v up, u to the wearer's left. The panels meet at the sides, a quarter and three quarters round;
+    each lies symmetric about its own centre line, which is the grain, the back beside the front.
     """
     m, n = shape[:2]
-    s = np.linspace(0, length, n)
-    t = np.arange(m + 1) / m * 2 * math.pi
-    panel = np.floor((t + math.pi / 2) / math.pi)
-    angle = (t - panel * math.pi) / math.pi * sweep
-    aa, ss = np.meshgrid(angle, s, indexing="ij")
-    return np.stack([(inner + ss) * np.sin(aa), -(inner + ss) * np.cos(aa)], axis=-1)
+    column = np.sort(np.concatenate([np.arange(m + 1), [m // 4, 3 * m // 4]]))
+    cuts = (m // 4, 3 * m // 4 + 1)
+    # 0 in front as far as the first seam, 1 behind, 2 in front again.
+    panel = np.searchsorted(cuts, np.arange(m + 3))
+    angle = (column / m * 2 - panel) * sweep
+    outer = inner + length
+    aa, ss = np.meshgrid(angle, np.linspace(0, length, n), indexing="ij")
+    u = outer * np.where(panel == 1, 3.02, 1.0)[:, None] + (inner + ss) * np.sin(aa)
+    return np.stack([u, outer - (inner + ss) * np.cos(aa)], axis=-1), cuts
 
 
 def _figure(stage: Usd.Stage) -> None:

@@ -269,7 +269,7 @@ def tiles_of(garment: Garment, udim: bool) -> dict[int, tuple[int, int]]:
         raise FabricError(
             garment.copies[0],
             f"has UVs in tile column {outside[0][0]}, row {outside[0][1]}; they must lie in tiles "
-            f"{FIRST_TILE} to {LAST_TILE}",
+            f"{FIRST_TILE} to {LAST_TILE}; ask for the unit square with --fit",
         )
     if not udim and found != {(0, 0)}:
         u, v = (float(garment.uv[..., k].max()) for k in range(2))
