@@ -21,16 +21,10 @@ from fabricusd.appearance import plain
 from fabricusd.appearance.compiled import compile_fabric
 from fabricusd.appearance.shadow import compile_shadow, shadowing
 from fabricusd.appearance.weave import lookup
+from fabricusd.chart.shadows import WOVEN
 from fabricusd.fabric import Fabric
 from fabricusd.schema import load
 
-WOVEN = (
-    "linen_plain",
-    "silk_crepe_de_chine",
-    "polyester_satin_charmeuse",
-    "polyester_satin_charmeuse_back",
-    "silk_shot",
-)
 VARIANTS = ("neither", "M", "g", "M g", "M g / <g>", "g, flat threads", "M g, flat threads")
 
 Array = np.ndarray

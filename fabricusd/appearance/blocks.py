@@ -25,6 +25,9 @@ NORMALIZATION, RED, GREEN, BLUE = 9 * BLOCK, 10 * BLOCK, 11 * BLOCK, 12 * BLOCK
 
 ROWS = 13
 
+NOTHING = 1e-12
+"""`Q` at or below which the value is 0, a stated loss: a tenth of random pairs on velvet."""
+
 
 @njit(**INLINE)
 def node_range(tables, thread_set):
@@ -70,3 +73,15 @@ def add_masking(R, tables, k, size, block, at=0):
     )
     for x in range(size):
         block[NORMALIZATION + x] += weight * masking_at(R, c, s, block, at + x)
+
+
+@njit(**INLINE)
+def divide(R, wi, wo, out, start, size, block):
+    """A block's sums over `Q` into out (3, n), 0 where either direction is not above the cloth."""
+    for x in range(size):
+        q = block[NORMALIZATION + x]
+        dark = wi[2, start + x] <= R(0) or wo[2, start + x] <= R(0) or q <= R(NOTHING)
+        inverse = R(0) if dark else R(1) / q
+        out[0, start + x] = R(0) if dark else block[RED + x] * inverse
+        out[1, start + x] = R(0) if dark else block[GREEN + x] * inverse
+        out[2, start + x] = R(0) if dark else block[BLUE + x] * inverse

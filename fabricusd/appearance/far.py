@@ -20,11 +20,13 @@ from fabricusd.appearance.blocks import (
     BLUE,
     GREEN,
     NORMALIZATION,
+    NOTHING,
     RED,
     ROWS,
     UP_I,
     UP_O,
     add_masking,
+    divide,
     masking_at,
     node_range,
     prepare,
@@ -40,9 +42,6 @@ from fabricusd.appearance.thread_terms import (
     MODEL,
     THESIS,
 )
-
-NOTHING = 1e-12
-"""`Q` at or below which the value is 0, a stated loss: a tenth of random pairs on velvet."""
 
 
 @njit(**INLINE)
@@ -138,13 +137,7 @@ def far_values(R, tables, wi, wo, out, begin, end):
             prepare(R, thread_set, tables.overlap_precision, wi, wo, start, size, block)
             for k in range(first, last):
                 _add_node(R, tables, k, size, block)
-        for x in range(size):
-            q = block[NORMALIZATION + x]
-            dark = wi[2, start + x] <= R(0) or wo[2, start + x] <= R(0) or q <= R(NOTHING)
-            inverse = R(0) if dark else R(1) / q
-            out[0, start + x] = R(0) if dark else block[RED + x] * inverse
-            out[1, start + x] = R(0) if dark else block[GREEN + x] * inverse
-            out[2, start + x] = R(0) if dark else block[BLUE + x] * inverse
+        divide(R, wi, wo, out, start, size, block)
 
 
 @njit(**LEAN)

@@ -21,6 +21,7 @@ from fabricusd.appearance.blocks import (
     BLUE,
     GREEN,
     NORMALIZATION,
+    NOTHING,
     OVERLAP,
     RED,
     SCALE_I,
@@ -28,9 +29,10 @@ from fabricusd.appearance.blocks import (
     UP_I,
     UP_O,
     add_masking,
+    divide,
     prepare,
 )
-from fabricusd.appearance.far import NOTHING, normalization
+from fabricusd.appearance.far import normalization
 from fabricusd.appearance.frame import WARP, WEFT, cos_inclination, unit_azimuth
 from fabricusd.appearance.real import INLINE, KERNEL, LEAN, cos, sin
 from fabricusd.appearance.segment import across, along_set, seen_along, segment
@@ -146,13 +148,7 @@ def point_block(
         _of_model(R, True, across_too, tables.overlap_precision, size, block)
     if _has_model(R, tables, MICROCYLINDER):
         _of_model(R, False, across_too, tables.overlap_precision, size, block)
-    for x in range(size):
-        q = block[NORMALIZATION + x]
-        dark = wi[2, start + x] <= R(0) or wo[2, start + x] <= R(0) or q <= R(NOTHING)
-        inverse = R(0) if dark else R(1) / q
-        out[0, start + x] = R(0) if dark else block[RED + x] * inverse
-        out[1, start + x] = R(0) if dark else block[GREEN + x] * inverse
-        out[2, start + x] = R(0) if dark else block[BLUE + x] * inverse
+    divide(R, wi, wo, out, start, size, block)
 
 
 @njit(**INLINE)

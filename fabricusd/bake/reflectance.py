@@ -64,7 +64,8 @@ def refuse_conserving(fabric: Fabric) -> None:
         if fabric.model_of(thread) == "conserving":
             raise FabricError(
                 f"{fabric.name} {name} model",
-                "is 'conserving', which is not baked; it must be 'microcylinder' or 'thesis'",
+                "is 'conserving', whose light goes from thread to thread and is not baked; it must "
+                "be 'microcylinder' or 'thesis'",
             )
 
 

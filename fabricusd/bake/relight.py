@@ -18,8 +18,9 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
+from fabricusd.appearance.blocks import NOTHING
 from fabricusd.appearance.coverage import coverage
-from fabricusd.appearance.far import NOTHING, normalization
+from fabricusd.appearance.far import normalization
 from fabricusd.appearance.real import KERNEL
 from fabricusd.appearance.segment import along_set, seen_along, segment
 from fabricusd.appearance.surface_tables import surface_tables
