@@ -1,7 +1,9 @@
 """A block of direction pairs on its way through the vectorised loops.
 
 All rows lie one behind the other in one array: pointers of their own would have to be checked for
-overlap before a loop is vectorised, and there would be too many.
+overlap before a loop is vectorised, and there would be too many. What lies elsewhere is indexed as
+`array[row][start:][x]`: as `array[row, start + x]` a loop would stay scalar, since for all the
+compiler knows the sum may be negative, which counts from the end.
 """
 
 from __future__ import annotations
@@ -40,12 +42,14 @@ def node_range(tables, thread_set):
 @njit(**INLINE)
 def prepare(R, thread_set, precision, wi, wo, start, size, block, at=0):
     """What the set's threads share, for a block: its rows lie from `at` on."""
+    i_x, i_y, i_z = wi[0][start:], wi[1][start:], wi[2][start:]
+    o_x, o_y, o_z = wo[0][start:], wo[1][start:], wo[2][start:]
     for y in range(size):
         x = at + y
-        iz, oz = wi[2, start + y], wo[2, start + y]
+        iz, oz = i_z[y], o_z[y]
         a_i, b_i, scale_i, a_o, b_o, scale_o, u = along_set(
             R, thread_set, precision,
-            wi[0, start + y], wi[1, start + y], iz, wo[0, start + y], wo[1, start + y], oz,
+            i_x[y], i_y[y], iz, o_x[y], o_y[y], oz,
         )  # fmt: skip
         block[AXIS_I + x], block[ACROSS_I + x] = a_i, b_i
         block[UP_I + x], block[SCALE_I + x] = iz, scale_i
@@ -78,10 +82,12 @@ def add_masking(R, tables, k, size, block, at=0):
 @njit(**INLINE)
 def divide(R, wi, wo, out, start, size, block):
     """A block's sums over `Q` into out (3, n), 0 where either direction is not above the cloth."""
+    i_z, o_z = wi[2][start:], wo[2][start:]
+    red, green, blue = out[0][start:], out[1][start:], out[2][start:]
     for x in range(size):
         q = block[NORMALIZATION + x]
-        dark = wi[2, start + x] <= R(0) or wo[2, start + x] <= R(0) or q <= R(NOTHING)
+        dark = i_z[x] <= R(0) or o_z[x] <= R(0) or q <= R(NOTHING)
         inverse = R(0) if dark else R(1) / q
-        out[0, start + x] = R(0) if dark else block[RED + x] * inverse
-        out[1, start + x] = R(0) if dark else block[GREEN + x] * inverse
-        out[2, start + x] = R(0) if dark else block[BLUE + x] * inverse
+        red[x] = R(0) if dark else block[RED + x] * inverse
+        green[x] = R(0) if dark else block[GREEN + x] * inverse
+        blue[x] = R(0) if dark else block[BLUE + x] * inverse

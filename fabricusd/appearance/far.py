@@ -127,8 +127,9 @@ def far_values(R, tables, wi, wo, out, begin, end):
     block = np.empty(ROWS * BLOCK, wi.dtype)
     for start in range(begin, end, BLOCK):
         size = min(BLOCK, end - start)
+        o_z = wo[2][start:]
         for x in range(size):
-            block[NORMALIZATION + x] = tables.gap * wo[2, start + x]
+            block[NORMALIZATION + x] = tables.gap * o_z[x]
             block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
         for thread_set in (WEFT, WARP):
             first, last = node_range(tables, thread_set)

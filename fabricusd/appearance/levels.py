@@ -134,8 +134,9 @@ def point_block(
     own, so that LLVM vectorises the one that computes. A set that is neither weft nor warp is a
     gap.
     """
+    o_z = wo[2][start:]
     for x in range(size):
-        block[NORMALIZATION + x] = tables.gap * wo[2, start + x]
+        block[NORMALIZATION + x] = tables.gap * o_z[x]
         block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
     prepare(R, WEFT, tables.overlap_precision, wi, wo, start, size, block)
     prepare(R, WARP, tables.overlap_precision, wi, wo, start, size, block, _WARP)
@@ -170,8 +171,9 @@ def _copy_threads(R, tables, sets, threads, psi0, w, first, size, block):
             block[_THREAD + column * BLOCK + x] = tables.threads[thread, column]
         if which != WEFT and which != WARP:
             block[_THREAD + MODEL * BLOCK + x] = R(_NO_MODEL)
+    angles = psi0[first:]
     for x in range(size):
-        block[_COS + x], block[_SIN + x] = cos(R, psi0[first + x]), sin(R, psi0[first + x])
+        block[_COS + x], block[_SIN + x] = cos(R, angles[x]), sin(R, angles[x])
 
 
 @njit(**INLINE)

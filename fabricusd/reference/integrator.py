@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from fabricusd.appearance.compiled import true_repeat
 from fabricusd.errors import FabricError
 from fabricusd.reference import arrivals
-from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, add_emission, arrive, prepare
+from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, arrive, sort_lanes
 from fabricusd.reference.camera import Lens, camera_rays
-from fabricusd.reference.departures import depart, record_first, settle, thin_out
+from fabricusd.reference.departures import depart, record_first
 from fabricusd.reference.embree import Accelerator
 from fabricusd.reference.fabric_surface import FabricShader
+from fabricusd.reference.hits import add_emission, prepare
 from fabricusd.reference.lights import build_lights
 from fabricusd.reference.preview_surface import (
     EMISSIVE,
@@ -29,6 +30,7 @@ from fabricusd.reference.preview_surface import (
     shade_preview,
 )
 from fabricusd.reference.scene import FabricSurface, Scene
+from fabricusd.reference.shadow_rays import settle, thin_out
 from fabricusd.reference.sobol import new_numbers
 from fabricusd.reference.triangles import build_tables
 from fabricusd.reference.wave import (
@@ -144,9 +146,10 @@ class Tracer:
             hits = int(ends[-1])
             if hits == 0:
                 break
+            sort_lanes(count, wave.keys, ends - counts, wave.order)
             prepare(
-                step, self.estimator, count, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
-                ends - counts, self.tables.records, self.lights, self.dome, self.epsilon,
+                step, self.estimator, hits, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
+                wave.order, self.tables.records, self.lights, self.dome, self.epsilon,
                 wave.path_pixel, wave.path_sample, self.numbers, wave.hits, wave.tags,
             )  # fmt: skip
             if self.shines:
@@ -158,7 +161,6 @@ class Tracer:
                 record_first(
                     hits, lens.eye, lens.axis, wave.hits, wave.tags, self.tables.uv, wave.film
                 )
-            result[:] = 0
             depart(
                 self.estimator, hits, self.max_bounces, wave.hits, wave.tags, wave.film,
                 wave.shadow_rays, wave.shadow, wave.shadow_path, wave.next_rays, wave.next_lanes,

@@ -28,7 +28,7 @@ from fabricusd.reference.view_transform import view
 from fabricusd.reference.wave import Wave
 from fabricusd.reference.workers import Batches, pixels_along_z_curve, worker_count
 
-BATCH = 1 << 12
+BATCH = 1 << 13
 """Paths in a batch: enough that starting a stage costs little, few enough to stay in cache."""
 
 PASS = 16
