@@ -9,7 +9,7 @@ from __future__ import annotations
 from numba import njit
 
 from fabricusd.appearance.frame import WARP
-from fabricusd.appearance.real import INLINE
+from fabricusd.appearance.real import INLINE, index
 from fabricusd.appearance.segment import along_set, seen_along
 from fabricusd.appearance.surface_tables import NODE_COS, NODE_SIN, NODE_WEIGHT
 
@@ -41,11 +41,11 @@ def node_range(tables, thread_set):
 def prepare(R, thread_set, precision, wi, wo, start, size, block, at=0):
     """What the set's threads share, for a block: its rows lie from `at` on."""
     for y in range(size):
-        x = at + y
-        iz, oz = wi[2, start + y], wo[2, start + y]
+        x, k = at + y, index(start, y)
+        iz, oz = wi[2, k], wo[2, k]
         a_i, b_i, scale_i, a_o, b_o, scale_o, u = along_set(
             R, thread_set, precision,
-            wi[0, start + y], wi[1, start + y], iz, wo[0, start + y], wo[1, start + y], oz,
+            wi[0, k], wi[1, k], iz, wo[0, k], wo[1, k], oz,
         )  # fmt: skip
         block[AXIS_I + x], block[ACROSS_I + x] = a_i, b_i
         block[UP_I + x], block[SCALE_I + x] = iz, scale_i
@@ -76,12 +76,16 @@ def add_masking(R, tables, k, size, block, at=0):
 
 
 @njit(**INLINE)
-def divide(R, wi, wo, out, start, size, block):
+def divide(R, out, start, size, block):
     """A block's sums over `Q` into out (3, n), 0 where either direction is not above the cloth."""
     for x in range(size):
         q = block[NORMALIZATION + x]
-        dark = wi[2, start + x] <= R(0) or wo[2, start + x] <= R(0) or q <= R(NOTHING)
+        dark = min(block[UP_I + x], block[UP_O + x]) <= R(0) or q <= R(NOTHING)
         inverse = R(0) if dark else R(1) / q
-        out[0, start + x] = R(0) if dark else block[RED + x] * inverse
-        out[1, start + x] = R(0) if dark else block[GREEN + x] * inverse
-        out[2, start + x] = R(0) if dark else block[BLUE + x] * inverse
+        # Where it is dark the sums may be what is not a number.
+        block[RED + x] = R(0) if dark else block[RED + x] * inverse
+        block[GREEN + x] = R(0) if dark else block[GREEN + x] * inverse
+        block[BLUE + x] = R(0) if dark else block[BLUE + x] * inverse
+    for c in range(3):
+        for x in range(size):
+            out[c, index(start, x)] = block[RED + c * BLOCK + x]
