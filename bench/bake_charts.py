@@ -103,7 +103,7 @@ def btf_curve(path: Path) -> None:
                         f"delta E {made.delta_e:5.2f}",
                         flush=True,
                     )
-        apart = between(fabric, one)
+        apart = float(between(fabric, [one]).mean())
         print(f"{name:26} between directions {apart:.2f}")
         for form, points in curves.items():
             side.loglog(*np.array(points).T, "o-", label=form)

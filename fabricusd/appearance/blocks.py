@@ -1,9 +1,7 @@
 """A block of direction pairs on its way through the vectorised loops.
 
 All rows lie one behind the other in one array: pointers of their own would have to be checked for
-overlap before a loop is vectorised, and there would be too many. What lies elsewhere is indexed as
-`array[row][start:][x]`: as `array[row, start + x]` a loop would stay scalar, since for all the
-compiler knows the sum may be negative, which counts from the end.
+overlap before a loop is vectorised, and there would be too many.
 """
 
 from __future__ import annotations
@@ -11,7 +9,7 @@ from __future__ import annotations
 from numba import njit
 
 from fabricusd.appearance.frame import WARP
-from fabricusd.appearance.real import INLINE
+from fabricusd.appearance.real import INLINE, index
 from fabricusd.appearance.segment import along_set, seen_along
 from fabricusd.appearance.surface_tables import NODE_COS, NODE_SIN, NODE_WEIGHT
 
@@ -42,14 +40,12 @@ def node_range(tables, thread_set):
 @njit(**INLINE)
 def prepare(R, thread_set, precision, wi, wo, start, size, block, at=0):
     """What the set's threads share, for a block: its rows lie from `at` on."""
-    i_x, i_y, i_z = wi[0][start:], wi[1][start:], wi[2][start:]
-    o_x, o_y, o_z = wo[0][start:], wo[1][start:], wo[2][start:]
     for y in range(size):
-        x = at + y
-        iz, oz = i_z[y], o_z[y]
+        x, k = at + y, index(start, y)
+        iz, oz = wi[2, k], wo[2, k]
         a_i, b_i, scale_i, a_o, b_o, scale_o, u = along_set(
             R, thread_set, precision,
-            i_x[y], i_y[y], iz, o_x[y], o_y[y], oz,
+            wi[0, k], wi[1, k], iz, wo[0, k], wo[1, k], oz,
         )  # fmt: skip
         block[AXIS_I + x], block[ACROSS_I + x] = a_i, b_i
         block[UP_I + x], block[SCALE_I + x] = iz, scale_i
@@ -80,14 +76,16 @@ def add_masking(R, tables, k, size, block, at=0):
 
 
 @njit(**INLINE)
-def divide(R, wi, wo, out, start, size, block):
+def divide(R, out, start, size, block):
     """A block's sums over `Q` into out (3, n), 0 where either direction is not above the cloth."""
-    i_z, o_z = wi[2][start:], wo[2][start:]
-    red, green, blue = out[0][start:], out[1][start:], out[2][start:]
     for x in range(size):
         q = block[NORMALIZATION + x]
-        dark = i_z[x] <= R(0) or o_z[x] <= R(0) or q <= R(NOTHING)
+        dark = min(block[UP_I + x], block[UP_O + x]) <= R(0) or q <= R(NOTHING)
         inverse = R(0) if dark else R(1) / q
-        red[x] = R(0) if dark else block[RED + x] * inverse
-        green[x] = R(0) if dark else block[GREEN + x] * inverse
-        blue[x] = R(0) if dark else block[BLUE + x] * inverse
+        # Where it is dark the sums may be what is not a number.
+        block[RED + x] = R(0) if dark else block[RED + x] * inverse
+        block[GREEN + x] = R(0) if dark else block[GREEN + x] * inverse
+        block[BLUE + x] = R(0) if dark else block[BLUE + x] * inverse
+    for c in range(3):
+        for x in range(size):
+            out[c, index(start, x)] = block[RED + c * BLOCK + x]

@@ -32,7 +32,7 @@ from fabricusd.appearance.blocks import (
     prepare,
 )
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, index
 from fabricusd.appearance.segment import along_set, cell_lobes, seen_along, segment
 from fabricusd.appearance.surface_tables import NODE_COS, NODE_HALF, NODE_SIN, NODE_WEIGHT
 from fabricusd.appearance.thread_terms import (
@@ -127,9 +127,8 @@ def far_values(R, tables, wi, wo, out, begin, end):
     block = np.empty(ROWS * BLOCK, wi.dtype)
     for start in range(begin, end, BLOCK):
         size = min(BLOCK, end - start)
-        o_z = wo[2][start:]
         for x in range(size):
-            block[NORMALIZATION + x] = tables.gap * o_z[x]
+            block[NORMALIZATION + x] = tables.gap * wo[2, index(start, x)]
             block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
         for thread_set in (WEFT, WARP):
             first, last = node_range(tables, thread_set)
@@ -138,7 +137,7 @@ def far_values(R, tables, wi, wo, out, begin, end):
             prepare(R, thread_set, tables.overlap_precision, wi, wo, start, size, block)
             for k in range(first, last):
                 _add_node(R, tables, k, size, block)
-        divide(R, wi, wo, out, start, size, block)
+        divide(R, out, start, size, block)
 
 
 @njit(**LEAN)

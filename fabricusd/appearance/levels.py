@@ -34,7 +34,7 @@ from fabricusd.appearance.blocks import (
 )
 from fabricusd.appearance.far import normalization
 from fabricusd.appearance.frame import WARP, WEFT, cos_inclination, unit_azimuth
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, cos, sin
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, cos, index, sin
 from fabricusd.appearance.segment import across, along_set, seen_along, segment
 from fabricusd.appearance.thread_terms import (
     ALBEDO_B,
@@ -134,9 +134,8 @@ def point_block(
     own, so that LLVM vectorises the one that computes. A set that is neither weft nor warp is a
     gap.
     """
-    o_z = wo[2][start:]
     for x in range(size):
-        block[NORMALIZATION + x] = tables.gap * o_z[x]
+        block[NORMALIZATION + x] = tables.gap * wo[2, index(start, x)]
         block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
     prepare(R, WEFT, tables.overlap_precision, wi, wo, start, size, block)
     prepare(R, WARP, tables.overlap_precision, wi, wo, start, size, block, _WARP)
@@ -149,7 +148,7 @@ def point_block(
         _of_model(R, True, across_too, tables.overlap_precision, size, block)
     if _has_model(R, tables, MICROCYLINDER):
         _of_model(R, False, across_too, tables.overlap_precision, size, block)
-    divide(R, wi, wo, out, start, size, block)
+    divide(R, out, start, size, block)
 
 
 @njit(**INLINE)
@@ -164,16 +163,17 @@ def _has_model(R, tables, model):
 def _copy_threads(R, tables, sets, threads, psi0, w, first, size, block):
     """Set, tangent angle, place across and the thread's numbers of a block of points."""
     for x in range(size):
-        which, thread = sets[first + x], threads[first + x]
+        k = index(first, x)
+        which, thread = sets[k], np.uintp(threads[k])
         block[_IS_WARP + x] = R(1) if which == WARP else R(0)
-        block[_ACROSS + x] = w[first + x]
+        block[_ACROSS + x] = w[k]
         for column in range(_COLUMNS):
             block[_THREAD + column * BLOCK + x] = tables.threads[thread, column]
         if which != WEFT and which != WARP:
             block[_THREAD + MODEL * BLOCK + x] = R(_NO_MODEL)
-    angles = psi0[first:]
     for x in range(size):
-        block[_COS + x], block[_SIN + x] = cos(R, angles[x]), sin(R, angles[x])
+        k = index(first, x)
+        block[_COS + x], block[_SIN + x] = cos(R, psi0[k]), sin(R, psi0[k])
 
 
 @njit(**INLINE)

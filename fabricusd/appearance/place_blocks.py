@@ -14,8 +14,8 @@ from fabricusd.appearance.blocks import BLOCK
 from fabricusd.appearance.coverage import GAP
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.horizon_lookup import split_table
-from fabricusd.appearance.real import INLINE, LEAN
-from fabricusd.appearance.weave import angle_on, place_on, split
+from fabricusd.appearance.real import INLINE, LEAN, index
+from fabricusd.appearance.weave import angle_on, cell_of, place_on, whole_threads, wrap
 
 CELL_I, CELL_J, END, PICK = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
 """Rows of int32: the cell of the grid and the places in the sequences of threads."""
@@ -44,18 +44,44 @@ def look_up_block(R, cloth, table, uv, begin, size, ints, reals):
     ints : (INT_ROWS*BLOCK,) int32; reals : (REAL_ROWS*BLOCK,) - FIRST, SECOND, SHARES and LIT are
     left for `shadow.horizon_block`
     """
-    for k in range(size):
-        ints[CELL_I + k], ints[CELL_J + k], ints[END + k], ints[PICK + k], x, y = split(
-            R, cloth, uv[begin + k, 0], uv[begin + k, 1]
-        )
-        reals[X + k], reals[Y + k] = x, y
+    _cells(R, cloth, uv, begin, size, ints, reals)
     _cells_of_table(cloth, table, uv, begin, size, ints)
     _gather(cloth, size, ints, reals)
     _place(R, cloth, size, ints, reals)
     for k in range(size):
-        thread = ints[THREAD + k]
+        thread = np.uintp(ints[THREAD + k])
         reals[ANGLE + k] = angle_on(R, cloth, thread, reals[S + k])
         ints[FREE + k] = ints[SET + k] == GAP or cloth.pile[thread] != 0
+
+
+@njit(**INLINE)
+def _cells(R, cloth, uv, begin, size, ints, reals):
+    """`weave.split` of a block; the places in the sequences only where they repeat otherwise."""
+    for k in range(size):
+        p = index(begin, k)
+        i, j, x, y = cell_of(R, cloth, uv[p, 0], uv[p, 1])
+        ints[CELL_I + k], ints[CELL_J + k] = i, j
+        reals[X + k], reals[Y + k] = x, y
+    _places_in_sequence(cloth, WARP, uv, begin, size, ints, END, CELL_I)
+    _places_in_sequence(cloth, WEFT, uv, begin, size, ints, PICK, CELL_J)
+
+
+@njit(**INLINE)
+def _places_in_sequence(cloth, which, uv, begin, size, ints, row, cell_row):
+    """The places in a set's sequence, which are those in the grid unless it repeats otherwise."""
+    # Read once: for all that LLVM knows the loop writes over it.
+    period, cells = cloth.sequence_length[which], cloth.grid.shape[0 if which == WARP else 1]
+    if period == 1:
+        for k in range(size):
+            ints[row + k] = 0
+    elif period == cells:
+        for k in range(size):
+            ints[row + k] = ints[cell_row + k]
+    else:
+        for k in range(size):
+            p = index(begin, k)
+            end, pick, _ = whole_threads(uv[p, 0], uv[p, 1])
+            ints[row + k] = wrap(end if which == WARP else pick, period)
 
 
 @njit(**INLINE)
@@ -66,9 +92,8 @@ def _cells_of_table(cloth, table, uv, begin, size, ints):
             ints[TABLE_I + k], ints[TABLE_J + k] = ints[CELL_I + k], ints[CELL_J + k]
     else:
         for k in range(size):
-            ints[TABLE_I + k], ints[TABLE_J + k] = split_table(
-                table, uv[begin + k, 0], uv[begin + k, 1]
-            )
+            p = index(begin, k)
+            ints[TABLE_I + k], ints[TABLE_J + k] = split_table(table, uv[p, 0], uv[p, 1])
 
 
 @njit(**INLINE)
@@ -76,12 +101,14 @@ def _gather(cloth, size, ints, reals):
     """What the tables hold about each cell, its end and its pick."""
     lower = cloth.runs.shape[2] - 1
     for k in range(size):
-        i, j = ints[CELL_I + k], ints[CELL_J + k]
+        i, j = np.uintp(ints[CELL_I + k]), np.uintp(ints[CELL_J + k])
         ints[TOP + k] = cloth.grid[i, j]
-        ints[_WARP_THREAD + k] = cloth.sequence[WARP, ints[END + k]]
-        ints[_WEFT_THREAD + k] = cloth.sequence[WEFT, ints[PICK + k]]
-        reals[_UPPER_PLACE + k], reals[_UPPER_CELLS + k] = cloth.runs[i, j, 0]
-        reals[_LOWER_PLACE + k], reals[_LOWER_CELLS + k] = cloth.runs[i, j, lower]
+        ints[_WARP_THREAD + k] = cloth.sequence[WARP, np.uintp(ints[END + k])]
+        ints[_WEFT_THREAD + k] = cloth.sequence[WEFT, np.uintp(ints[PICK + k])]
+        reals[_UPPER_PLACE + k] = cloth.runs[i, j, 0, 0]
+        reals[_UPPER_CELLS + k] = cloth.runs[i, j, 0, 1]
+        reals[_LOWER_PLACE + k] = cloth.runs[i, j, lower, 0]
+        reals[_LOWER_CELLS + k] = cloth.runs[i, j, lower, 1]
 
 
 @njit(**INLINE)

@@ -13,7 +13,7 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import types
+from numba import njit, types
 from numba.extending import overload, register_jitable
 
 # NaN and infinity must stay what they are, since callers count them; the rest may be reordered.
@@ -31,6 +31,17 @@ INLINE: dict[str, Any] = {**LEAN, "forceinline": True}
 # Only fused multiply-add here: reordering would undo the two-part reductions below.
 _EXACT: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "forceinline": True}
 _inner = register_jitable(**_EXACT)
+
+
+@njit(**INLINE)
+def index(begin, k):
+    """`begin + k` for an array's index, both at least 0.
+
+    Of a signed sum numba asks whether it counts from the array's end, at every step, and LLVM then
+    does not vectorise the loop.
+    """
+    return np.uintp(begin) + np.uintp(k)
+
 
 _LOG2_HIGH, _LOG2_LOW = 0.693359375, -2.12194440e-4
 _HALF_PI_HIGH, _HALF_PI_MIDDLE, _HALF_PI_LOW = 1.5703125, 4.83751297e-4, 7.54978942e-8

@@ -44,14 +44,17 @@ from fabricusd.appearance.horizon_lookup import (
     soft_edge,
 )
 from fabricusd.appearance.place_blocks import (
+    FIRST,
     FREE,
     INT_ROWS,
     LIT,
     REAL_ROWS,
+    SECOND,
+    SHARES,
     X,
     look_up_block,
 )
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, index
 from fabricusd.appearance.texel_blocks import choose_texels, mix_texels
 from fabricusd.appearance.weave import find, height_on, wrap
 from fabricusd.errors import FabricError
@@ -163,16 +166,28 @@ def compile_shadow(
 @njit(**INLINE)
 def mean_lit(R, shadow, x, y, z):
     """Mean of `g` over the cloth for light from (x, y, z) above it."""
+    row, column, a, b = _cell_of_mean(R, shadow, x, y, z)
+    return _between_means(shadow, np.uintp(row), np.uintp(column), a, b)
+
+
+@njit(**INLINE)
+def _cell_of_mean(R, shadow, x, y, z):
+    """(row, column) of the mean's table for light from (x, y, z), and the shares of the next."""
     rows, columns = shadow.mean.shape[0], shadow.mean.shape[1]
     e = math.sqrt(min(max(z, R(0)), R(1))) * R(rows - 1)
-    row = min(int(e), rows - 2)
-    turn = diamond(R, x, y) * R(0.25) * R(columns - 1)
-    column = min(int(turn), columns - 2)
-    a, b = e - R(row), turn - R(column)
+    turn = diamond(R, x, y) * R(0.25 * (columns - 1))
+    row, column = min(np.int32(e), np.int32(rows - 2)), min(np.int32(turn), np.int32(columns - 2))
+    return row, column, e - R(row), turn - R(column)
+
+
+@njit(**INLINE)
+def _between_means(shadow, row, column, a, b):
+    """The mean between four entries of its table."""
+    ahead, beside = row + np.uintp(1), column + np.uintp(1)
     low = shadow.mean[row, column]
-    low += (shadow.mean[row, column + 1] - low) * b
-    high = shadow.mean[row + 1, column]
-    high += (shadow.mean[row + 1, column + 1] - high) * b
+    low += (shadow.mean[row, beside] - low) * b
+    high = shadow.mean[ahead, column]
+    high += (shadow.mean[ahead, beside] - high) * b
     return low + (high - low) * a
 
 
@@ -299,7 +314,8 @@ def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
     choose_texels(R, cloth, table, wi, begin, size, ints, reals)
     mix_texels(R, shadow.texels, table.shape[4], table.shape[5], size, ints, reals)
     for k in range(size):
-        x, y, z = wi[0, begin + k], wi[1, begin + k], wi[2, begin + k]
+        m = index(begin, k)
+        x, y, z = wi[0, m], wi[1, m], wi[2, m]
         flat = math.sqrt(x * x + y * y)
         g = soft_edge(R, above_horizon(R, reals[LIT + k], flat, z), shadow.softness)
         g = R(1) if ints[FREE + k] != 0 else g
@@ -309,13 +325,22 @@ def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
 
 
 @njit(**LEAN)
-def mean_block(R, shadow, wi, begin, size, reals):
-    """Divide the row LIT by the mean of `g`."""
+def mean_block(R, shadow, wi, begin, size, ints, reals):
+    """Divide the row LIT by the mean of `g`, in loops as those of `texel_blocks`."""
     for k in range(size):
-        z = wi[2, begin + k]
+        m = index(begin, k)
         # What is not a number has its answer, and must not index the table.
-        if reals[LIT + k] > R(0):
-            reals[LIT + k] /= mean_lit(R, shadow, wi[0, begin + k], wi[1, begin + k], z)
+        sound = reals[LIT + k] >= R(0)
+        x, y, z = wi[0, m] if sound else R(0), wi[1, m] if sound else R(0), wi[2, m]
+        ints[FIRST + k], ints[SECOND + k], a, b = _cell_of_mean(
+            R, shadow, x, y, z if sound else R(0)
+        )
+        reals[SHARES + k], reals[SHARES + BLOCK + k] = a, b
+    for k in range(size):
+        row, column = np.uintp(ints[FIRST + k]), np.uintp(ints[SECOND + k])
+        reals[LIT + k] /= _between_means(
+            shadow, row, column, reals[SHARES + k], reals[SHARES + BLOCK + k]
+        )
 
 
 @njit(**LEAN)
@@ -345,7 +370,7 @@ def lit_all(R, cloth, shadow, shaded, uv, wi, out):
             look_up_block(R, cloth, shadow.table, uv, begin, size, ints, reals)
             horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
             if shaded:
-                mean_block(R, shadow, wi, begin, size, reals)
+                mean_block(R, shadow, wi, begin, size, ints, reals)
             found[:] = reals[LIT : LIT + size]
 
 

@@ -51,7 +51,7 @@ from fabricusd.appearance.place_blocks import (
 from fabricusd.appearance.place_blocks import (
     THREAD as THREAD_ROW,
 )
-from fabricusd.appearance.real import KERNEL
+from fabricusd.appearance.real import KERNEL, index
 from fabricusd.appearance.shadow import (
     METHODS,
     Shadow,
@@ -329,14 +329,14 @@ def _weave_chunk(R, cloth, shadow, tables, uv, wi, wo, out, first, last):
         size = min(BLOCK, last - begin)
         look_up_block(R, cloth, shadow.table, uv, begin, size, ints, reals)
         horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
-        mean_block(R, shadow, wi, begin, size, reals)
+        mean_block(R, shadow, wi, begin, size, ints, reals)
         point_block(
             R, tables, False, ints[SET:], ints[THREAD_ROW:], reals[ANGLE:], reals[S:], 0,
             wi, wo, out, begin, size, block,
         )  # fmt: skip
         for c in range(3):
             for k in range(size):
-                out[c, begin + k] *= reals[LIT + k]
+                out[c, index(begin, k)] *= reals[LIT + k]
 
 
 @njit(**KERNEL, parallel=True)

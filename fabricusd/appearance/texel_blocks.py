@@ -24,7 +24,7 @@ from fabricusd.appearance.place_blocks import (
     X,
     Y,
 )
-from fabricusd.appearance.real import LEAN
+from fabricusd.appearance.real import LEAN, index
 
 
 @njit(**LEAN)
@@ -50,7 +50,8 @@ def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
         across = across / max(width if on_top else cloth.under_width, cloth.tiny) + R(0.5)
         row, a = cell_of_texels(R, (along if on_top else seen) if sound else R(0.5), rows)
         column, b = cell_of_texels(R, across if sound else R(0.5), columns)
-        x, y = wi[0, begin + k], wi[1, begin + k]
+        m = index(begin, k)
+        x, y = wi[0, m], wi[1, m]
         turn = diamond(R, x, y) * R(0.25 * azimuths)
         turn = turn if abs(x) + abs(y) < R(2) else R(0)
         first = min(np.int32(turn), np.int32(azimuths - 1))

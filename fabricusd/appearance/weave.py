@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.coverage import GAP, coverage
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, index
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave
 
@@ -66,22 +66,36 @@ def wrap(x, period):
 
 
 @njit(**INLINE)
+def whole_threads(u, v):
+    """(end, pick, sound): whole parts of weave coordinates, float64; 0 where they are not sound."""
+    sound = (abs(u) <= FARTHEST) & (abs(v) <= FARTHEST)
+    return np.floor(u if sound else 0.0), np.floor(v if sound else 0.0), sound
+
+
+@njit(**INLINE)
+def cell_of(R, cloth, u, v):
+    """(i, j, x, y): the cell of the grid and the place in it, as `split` gives them."""
+    end, pick, sound = whole_threads(u, v)
+    return (
+        wrap(end, cloth.grid.shape[0]),
+        wrap(pick, cloth.grid.shape[1]),
+        R(u - end) if sound else R(np.nan),
+        R(v - pick),
+    )
+
+
+@njit(**INLINE)
 def split(R, cloth, u, v):
     """Weave coordinates, float64, as what `thread_at` asks for: (i, j, end, pick, x, y).
 
     i, j : cell of the grid; end, pick : places in the sequences of threads; x, y : in the cell, of
     precision R, NaN where the coordinates are not finite or have no fraction.
     """
-    sound = abs(u) <= FARTHEST and abs(v) <= FARTHEST
-    end, pick = np.floor(u) if sound else 0.0, np.floor(v) if sound else 0.0
+    i, j, x, y = cell_of(R, cloth, u, v)
+    end, pick, _ = whole_threads(u, v)
     return (
-        wrap(end, cloth.grid.shape[0]),
-        wrap(pick, cloth.grid.shape[1]),
-        wrap(end, cloth.sequence_length[WARP]),
-        wrap(pick, cloth.sequence_length[WEFT]),
-        R(u - end) if sound else R(np.nan),
-        R(v - pick),
-    )
+        i, j, wrap(end, cloth.sequence_length[WARP]), wrap(pick, cloth.sequence_length[WEFT]), x, y
+    )  # fmt: skip
 
 
 @njit(**INLINE)
@@ -211,8 +225,9 @@ def split_block(R, cloth, uv, begin, cells, x, y):
     A loop of its own, which LLVM vectorises; the lookup behind it is all gathers.
     """
     for k in range(x.size):
+        p = index(begin, k)
         cells[0, k], cells[1, k], cells[2, k], cells[3, k], x[k], y[k] = split(
-            R, cloth, uv[begin + k, 0], uv[begin + k, 1]
+            R, cloth, uv[p, 0], uv[p, 1]
         )
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from fabricusd.bake.maps import REGISTRY
 from fabricusd.bake.raster import NOBODY, owners
 from fabricusd.bake.relight import NEEDED, relight
 from fabricusd.bake.sheet import Sheet, texel_start, texel_step
+from fabricusd.color_difference import delta_e_2000
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -53,10 +54,6 @@ class SwatchError:
     worst_pair: float
     bound: float
 
-    def as_dict(self) -> dict[str, float]:
-        """For JSON."""
-        return asdict(self)
-
 
 def pairs_between(count: int, skip: int = 0) -> tuple[Floats, Floats]:
     """(count, 3) lights and viewers, 10 degrees or more above the cloth; leaves out `skip`."""
@@ -69,15 +66,6 @@ def pairs_between(count: int, skip: int = 0) -> tuple[Floats, Floats]:
 def display(radiance: Floats, wi: Floats) -> Floats:
     """Colours of (n, 3) values, cosine included, under light wi (3,)."""
     return np.asarray(np.clip(radiance * (math.pi / wi[2]), 0.0, 1.0))
-
-
-def delta_e(a: Floats, reference: Floats) -> Floats:
-    """(n,) CIE 2000 colour difference of (n, 3) linear Rec. 709 display colours."""
-    import colour
-
-    space = colour.RGB_COLOURSPACES["ITU-R BT.709"]
-    lab = [colour.XYZ_to_Lab(colour.RGB_to_XYZ(x, space), space.whitepoint) for x in (a, reference)]
-    return np.asarray(colour.difference.delta_E_CIE2000(lab[0], lab[1]), np.float64)
 
 
 def fullest_block(sheet: Sheet) -> tuple[int, int, int]:
@@ -148,6 +136,11 @@ def swatch_error(
     return swatch_errors(sheet, (NEEDED,), level=level, pairs=pairs, seed=seed)[0]
 
 
+def bound_of(worst: float) -> float:
+    """The stated bound where `worst` is the largest mean delta E 2000 of the pairs measured."""
+    return MARGIN * worst
+
+
 def swatch_errors(
     sheet: Sheet,
     choices: Sequence[Sequence[str]],
@@ -181,7 +174,7 @@ def swatch_errors(
             point=float(point.mean()),
             texel=float(texel.mean()),
             worst_pair=float(texel.max()),
-            bound=MARGIN * float(texel.max()),
+            bound=bound_of(float(texel.max())),
         )
         for point, texel in zip(at_points, of_texels, strict=True)
     ]
@@ -203,5 +196,5 @@ def compared(
         mean = display(true.mean(axis=1), wi)
         for choice, texels in enumerate(choices):
             got = relight({name: a[:n] for name, a in texels.items()}, fabric, wi, wo)
-            errors[choice, k] = delta_e(display(got, wi), mean).mean()
+            errors[choice, k] = delta_e_2000(display(got, wi), mean).mean()
     return errors

@@ -8,6 +8,7 @@ even angles would be wrong; the loader has the fabric, and takes the shape that 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +25,11 @@ COUNTS = (1, 4, 16, 64)
 """Angles that stand for a distribution, by how wide it is against the lobe."""
 
 
+@lru_cache(maxsize=16)
 def angle_shapes(fabric: Fabric) -> Floats:
-    """(2, PARTS + 1, len(COUNTS), COUNTS[-1]) angles by set, part and count, and of the whole set
-    in the last part's place; of mean 0 and deviation 1, each standing for the same share."""
+    """(2, PARTS + 1, len(COUNTS), COUNTS[-1]) angles by set, part and count, and of the
+    whole set in the last part's place; of mean 0 and deviation 1, each standing for the same
+    share. Kept and read-only."""
     nodes, split = curve_nodes(fabric, FINE), steepness(fabric)
     found = np.zeros((2, PARTS + 1, len(COUNTS), COUNTS[-1]))
     for which in range(2):
@@ -38,6 +41,7 @@ def angle_shapes(fabric: Fabric) -> Floats:
             for row, count in enumerate(COUNTS):
                 shape = _standing_for(angle[inside], weight[inside], count)
                 found[which, k, row, :count] = shape
+    found.setflags(write=False)
     return found
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -43,69 +43,67 @@ class Files:
         return self.folder / name
 
 
-def compute(
-    scratch: Scratch,
-    sheets: Sequence[Sheet],
-    maps: Sequence[TextureMap],
-    files: Files,
-    workers: int,
-    progress: Progress | None,
-) -> bool:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Work:
+    """The sheets and maps of one bake, where they are kept and go, and who works on them."""
+
+    scratch: Scratch
+    sheets: Sequence[Sheet]
+    maps: Sequence[TextureMap]
+    files: Files
+    workers: int
+    progress: Progress | None
+
+    def missing(self, sheet: Sheet) -> list[int]:
+        """Maps whose texture of this sheet is not there yet."""
+        paths = (self.files.path(sheet, one) for one in self.maps)
+        return [k for k, path in enumerate(paths) if not self.scratch.is_done(path)]
+
+    def run(self, task: Callable[[int, int], None], count: int, noun: str) -> bool:
+        """`count` jobs of `task`, reported as `noun`; False where interrupted."""
+        report = partial(self.progress, noun, count) if self.progress else None
+        return Batches(self.workers, task).run(count, report)
+
+
+def compute(work: Work) -> bool:
     """Every block that is not there yet; False where interrupted."""
     jobs = []
-    for sheet in sheets:
-        if all(scratch.is_done(files.path(sheet, one)) for one in maps):
-            continue
-        jobs += [(sheet, x, y) for y in range(sheet.across) for x in range(sheet.across)]
-    ways = {id(sheet): kept(sheet, maps) for sheet in sheets}
+    for sheet in work.sheets:
+        if work.missing(sheet):
+            jobs += [(sheet, x, y) for y in range(sheet.across) for x in range(sheet.across)]
+    ways = {id(sheet): kept(sheet, work.maps) for sheet in work.sheets}
 
     def one_block(_: int, k: int) -> None:
         sheet, x, y = jobs[k]
-        path = scratch.block(sheet, x, y)
+        path = work.scratch.block(sheet, x, y)
         if not block_is_sound(path):
             ways[id(sheet)].write(path, x, y)
 
-    report = partial(progress, "blocks", len(jobs)) if progress else None
-    return Batches(workers, one_block).run(len(jobs), report)
+    return work.run(one_block, len(jobs), "blocks")
 
 
-def assemble(
-    scratch: Scratch,
-    sheets: Sequence[Sheet],
-    maps: Sequence[TextureMap],
-    files: Files,
-    workers: int,
-    progress: Progress | None,
-) -> bool:
+def assemble(work: Work) -> bool:
     """Every texture that is not there yet; False where interrupted."""
-    for sheet in sheets:
-        todo = [k for k, one in enumerate(maps) if not scratch.is_done(files.path(sheet, one))]
+    for sheet in work.sheets:
+        todo = work.missing(sheet)
         if not todo:
             continue
-        task = partial(_write_texture, scratch, sheet, maps, files, todo, uppermost(scratch, sheet))
-        report = partial(progress, "textures", len(todo)) if progress else None
-        if not Batches(workers, task).run(len(todo), report):
+        task = partial(_write_texture, work, sheet, todo, uppermost(work.scratch, sheet))
+        if not work.run(task, len(todo), "textures"):
             return False
-        scratch.drop(sheet)
+        work.scratch.drop(sheet)
     return True
 
 
 def _write_texture(
-    scratch: Scratch,
-    sheet: Sheet,
-    maps: Sequence[TextureMap],
-    files: Files,
-    todo: Sequence[int],
-    upper: Layers,
-    _worker: int,
-    job: int,
+    work: Work, sheet: Sheet, todo: Sequence[int], upper: Layers, _worker: int, job: int
 ) -> None:
     """One texture, from the blocks and the levels above them."""
     k = todo[job]
-    one, way = maps[k], kept(sheet, maps)
+    files, one, way = work.files, work.maps[k], kept(sheet, work.maps)
     path, note = files.path(sheet, one), ""
     levels: list[Any] = [
-        partial(bands, scratch, sheet, way, k, level) for level in range(sheet.levels)
+        partial(bands, work.scratch, sheet, way, k, level) for level in range(sheet.levels)
     ]
     metadata = {
         "fabricusd:map": one.name,
@@ -118,12 +116,12 @@ def _write_texture(
         write_mip_exr(path, levels, sheet.resolution, one.channels, one.kind, metadata)
     else:
         encoding = encoding_of(one, levels[0]())
-        note = json.dumps(encoding.as_dict())
+        note = json.dumps(asdict(encoding))
         metadata["oiio:ColorSpace"] = "sRGB" if one.color else "Raw"
         metadata["fabricusd:encoding"] = note
         rows = (encoding.encoded(band) for band in levels[0]())
         write_16_bit(path, rows, sheet.resolution, len(one.channels), metadata)
-    scratch.mark_done(path, note)
+    work.scratch.mark_done(path, note)
 
 
 def _whole(level: np.ndarray[Any, Any]) -> Any:

@@ -15,7 +15,7 @@ from typing import Any
 
 from fabricusd import __version__
 from fabricusd.bake.accuracy import SwatchError, swatch_errors
-from fabricusd.bake.assemble import Files, Progress, assemble, compute
+from fabricusd.bake.assemble import Files, Progress, Work, assemble, compute
 from fabricusd.bake.btf.write import MAX_ERROR, write_btf
 from fabricusd.bake.choose import Tried, cheapest, maps_with
 from fabricusd.bake.encoding import FORMATS, Encoding, stored_by
@@ -189,9 +189,10 @@ def bake(
     _check_space(folder, sum(kept(sheet, maps).bytes_needed for sheet in sheets))
     count = worker_count(workers)
     files = Files(folder=folder, udim=settings.udim, file_format=settings.file_format)
-    result.finished = all(
-        step(scratch, sheets, maps, files, count, progress) for step in (compute, assemble)
+    work = Work(
+        scratch=scratch, sheets=sheets, maps=maps, files=files, workers=count, progress=progress
     )
+    result.finished = compute(work) and assemble(work)
     if not result.finished:
         return result
     for sheet in sheets:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from fabricusd.bake.accuracy import swatch_errors
 from fabricusd.bake.maps import REGISTRY, TextureMap, chosen_maps
@@ -27,10 +26,6 @@ class Tried:
     maps: tuple[str, ...]
     megabytes: float
     point: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)
 
 
 def cheapest(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -46,10 +46,6 @@ class Encoding:
         values = np.asarray(linear, np.float64) * self.scale + self.offset
         # Ids are whole numbers, which dividing and multiplying does not always give back.
         return np.asarray(np.rint(values) if self.scale == GREATEST else values, np.float32)
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)
 
 
 _FIXED = {

@@ -60,9 +60,9 @@ def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any
                 "fingerprint": one.fingerprint,
                 "triangles": len(one.triangles),
                 "mirrored_triangles": int(one.mirrored.sum()),
-                "error": result.errors[one.name].as_dict(),
+                "error": asdict(result.errors[one.name]),
                 "map_error": {
-                    name: error.as_dict() for name, error in result.map_errors[one.name].items()
+                    name: asdict(error) for name, error in result.map_errors[one.name].items()
                 },
                 "lays": [
                     {
@@ -88,7 +88,7 @@ def _file(result: Baked, file: str) -> dict[str, Any]:
     """A texture's entry; with its `encoding.Encoding` where its numbers are not the values."""
     said: dict[str, Any] = {"file": file, "sha256": sha256(result.folder / file)}
     if file in result.encodings:
-        said["encoding"] = result.encodings[file].as_dict()
+        said["encoding"] = asdict(result.encodings[file])
     return said
 
 

@@ -8,7 +8,7 @@ share that is wrong for ids - weighted as the map says, so that a colour in a ga
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -43,10 +43,6 @@ class MapError:
     texel: float
     point: float
     spread: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)
 
 
 def exact(

@@ -130,7 +130,7 @@ def relight(
     shapes = angle_shapes(fabric)
     if "weft_share" not in maps:
         # The one part is the whole set.
-        shapes[:, 0] = shapes[:, PARTS]
+        shapes = np.repeat(shapes[:, PARTS:], PARTS + 1, axis=1)
     kinds = np.where(ids == GAP_ID, -1, ids).astype(np.int64)
     out = np.zeros((len(ids), 3))
     i, o = (np.asarray(w, np.float64) for w in (wi, wo))

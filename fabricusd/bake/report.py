@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +34,7 @@ def report_of(result: Baked, settings: Settings) -> dict[str, Any]:
     }
     return {
         "asked": {"max_error": settings.max_error or None, "resolution": settings.resolution},
-        "reached": {name: error.as_dict() for name, error in result.errors.items()},
+        "reached": {name: asdict(error) for name, error in result.errors.items()},
         "within": result.reached(settings.max_error) if settings.max_error else None,
         "cost": {
             "resolution": result.resolution,
@@ -41,9 +42,9 @@ def report_of(result: Baked, settings: Settings) -> dict[str, Any]:
             "bytes": sum(sizes.values()),
             "bytes_per_map": sizes,
         },
-        "tried": [one.as_dict() for one in result.tried],
+        "tried": [asdict(one) for one in result.tried],
         "map_error": {
-            garment: {name: error.as_dict() for name, error in maps.items()}
+            garment: {name: asdict(error) for name, error in maps.items()}
             for garment, maps in result.map_errors.items()
         },
         "btf": result.btf,
@@ -80,7 +81,8 @@ def _page(said: dict[str, Any], figures: list[str]) -> str:
     )
     forms = "".join(
         f"<tr><td>{escape(fabric)}</td><td>{r['form']}</td><td>{r['megabytes']:.2f}</td>"
-        f"<td>{max(r['rank'])}</td><td>{r['delta_e']:.2f}</td><td>{r['delta_e_between']:.2f}</td></tr>"
+        f"<td>{max(r['rank'])}</td><td>{r['delta_e']:.2f}</td><td>{r['delta_e_between']:.2f}</td>"
+        f"<td>{r['bound']:.2f}</td></tr>"
         for fabric, records in said["btf"].items()
         for r in records
     )
@@ -107,7 +109,7 @@ def _page(said: dict[str, Any], figures: list[str]) -> str:
         f"{rows}</table>"
         + (
             "<h2>BTF</h2><table><tr><th>fabric<th>form<th>MB<th>rank<th>delta E<th>between"
-            f" directions</tr>{forms}</table>"
+            f" directions<th>stated bound</tr>{forms}</table>"
             if forms
             else ""
         )

@@ -6,6 +6,7 @@ import argparse
 import json
 import math
 import sys
+from dataclasses import asdict
 
 EPILOG = """A is measured against the reference B; EXR is radiance, the rest display colours
 
@@ -44,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     a, b = read_image(options.a), read_image(options.b)
     found = difference(a, b, high_range=high_range)
     if options.json:
-        print(json.dumps(found.as_dict(), indent=2))
+        print(json.dumps(asdict(found), indent=2))
     else:
         print(f"RMSE          {found.rmse:.6g}")
         print(f"relative MSE  {found.relative_mse:.6g}")

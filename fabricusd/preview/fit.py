@@ -8,7 +8,7 @@ not outweigh everything else. [Branch1999] by `scipy.optimize.least_squares`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from fabricusd.appearance import surface
+from fabricusd.color_difference import delta_e_2000
 from fabricusd.fabric import Fabric
 from fabricusd.preview.look import Look
 from fabricusd.preview.models import Surface, evaluate
-from fabricusd.quality.pictures import delta_e_2000
 
 Floats = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ class Fitted:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {
-            "parameters": self.look.as_dict(), "delta_e": self.delta_e,
+            "parameters": asdict(self.look), "delta_e": self.delta_e,
             "delta_e_95": self.delta_e_95, "albedo": self.albedo,
             "start_delta_e": self.start_delta_e, "pairs": self.pairs,
         }  # fmt: skip

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +26,3 @@ class Look:
     fuzz_weight: float = 0.0
     fuzz_color: tuple[float, float, float] = (1.0, 1.0, 1.0)
     fuzz_roughness: float = 0.5
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)

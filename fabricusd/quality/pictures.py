@@ -8,11 +8,12 @@ delta E 2000  [Sharma2005], of the display colours, mean and 95th percentile
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.color_difference import delta_e_2000
 from fabricusd.errors import FabricError
 
 Picture = NDArray[np.float32]
@@ -34,28 +35,6 @@ class Difference:
     delta_e_mean: float
     delta_e_95: float
     not_finite: int
-
-    def as_dict(self) -> dict[str, float]:
-        """For JSON."""
-        return asdict(self)
-
-
-def delta_e_2000(picture: Picture, reference: Picture) -> NDArray[np.float64]:
-    """(h, w) CIE 2000 colour difference of two (h, w, 3) linear Rec. 709 pictures.
-
-    Colours are clipped to what a display shows, 0 to 1.
-    """
-    import colour
-
-    space = colour.RGB_COLOURSPACES["ITU-R BT.709"]
-    lab = [
-        colour.XYZ_to_Lab(
-            colour.RGB_to_XYZ(np.clip(np.asarray(image, np.float64), 0.0, 1.0), space),
-            space.whitepoint,
-        )
-        for image in (picture, reference)
-    ]
-    return np.asarray(colour.difference.delta_E_CIE2000(lab[0], lab[1]), np.float64)
 
 
 def flip_map(picture: Picture, reference: Picture, *, high_range: bool) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from fabricusd.appearance.surface import evaluate
+from fabricusd.bake.accuracy import PAIRS, pairs_between
 from fabricusd.bake.btf.factored import (
     factored,
     read_atlas,
@@ -20,9 +21,9 @@ from fabricusd.bake.btf.factored import (
 from fabricusd.bake.btf.factors import entries, factors
 from fabricusd.bake.btf.matrix import btf_of, ring_directions, table
 from fabricusd.bake.btf.ubo import read_ubo, write_ubo
-from fabricusd.bake.btf.write import write_btf
+from fabricusd.bake.btf.write import FORMS, between, read_form, write_btf
 from fabricusd.errors import FabricError
-from fabricusd.schema import load
+from fabricusd.schema import load, preset_names
 
 RINGS = ((0.0, 1), (30.0, 6), (60.0, 10))
 
@@ -159,3 +160,22 @@ def test_every_form_is_written_with_its_record(tmp_path):
         assert all((tmp_path / f).is_file() for f in record["files"])
     with pytest.raises(FabricError, match="must be ubo"):
         write_btf(load("linen_plain"), tmp_path, ("dds",))
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_each_form_is_within_its_stated_bound_on_pairs_held_back(name, tmp_path):
+    """Read by its own loader, against level `weave` under twenty pairs of directions."""
+    fabric, held_back = load(name), pairs_between(20, skip=PAIRS)
+    records = write_btf(
+        fabric, tmp_path, FORMS, per_thread=4, directions=ring_directions(RINGS), max_error=0.5
+    )
+    read = [read_form(r["form"], tmp_path / fabric.name, per_thread=4) for r in records]
+    for record, errors in zip(records, between(fabric, read, held_back), strict=True):
+        assert errors.max() <= record["bound"], record["form"]
+
+
+def test_the_bound_bites_when_the_btf_is_of_another_fabric(tmp_path):
+    linen, silk = load("linen_plain"), load("silk_crepe_de_chine")
+    (record,) = write_btf(linen, tmp_path, ("factored",), per_thread=4)
+    other = read_form("factored", tmp_path / linen.name)
+    assert between(silk, [other]).max() > record["bound"]

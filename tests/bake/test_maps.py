@@ -15,7 +15,6 @@ from fabricusd.appearance.surface import evaluate
 from fabricusd.appearance.weave import lookup
 from fabricusd.bake.accuracy import (
     PAIRS,
-    delta_e,
     display,
     pairs_between,
     swatch_error,
@@ -30,10 +29,11 @@ from fabricusd.bake.recipe import recipe
 from fabricusd.bake.reflectance import reflectance_table
 from fabricusd.bake.relight import NEEDED, relight
 from fabricusd.bake.sheet import sheets_of, texel_start, texel_step
+from fabricusd.color_difference import delta_e_2000
 from fabricusd.errors import FabricError
-from fabricusd.schema import load
+from fabricusd.schema import load, preset_names
 
-PRESETS = (
+PUBLISHED = (
     "linen_plain",
     "silk_crepe_de_chine",
     "polyester_satin_charmeuse",
@@ -43,12 +43,12 @@ PRESETS = (
 )
 
 
-def baked(fabric, threads=8.0, resolution=128, **options):
-    """Every map of a square: name -> list of levels."""
+def baked(fabric, threads=8.0, resolution=128, names=None, **options):
+    """Maps of a square, every one where not named: name -> list of levels."""
     settings = {k: options.pop(k) for k in ("level", "light") if k in options}
     one = garments(quad_scene(fabric, threads, **options))[0]
     sheet = sheets_of(one, (recipe(fabric, **settings),), {1001: (0, 0)}, resolution, 4)[0]
-    maps = chosen_maps(None, light="light" in settings)
+    maps = chosen_maps(names, light="light" in settings)
     found, _, _ = bake_block(sheet, maps, 0, 0)
     return {t.name: levels for t, levels in zip(maps, found, strict=True)}, sheet
 
@@ -62,7 +62,7 @@ def test_every_map_is_finite_and_has_a_meaning():
             assert all(np.isfinite(a).all() for a in levels), key
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", PUBLISHED)
 def test_the_coarsest_level_holds_the_fabrics_own_shares(name):
     fabric = load(name)
     maps, _ = baked(fabric, threads=float(np.lcm.reduce(true_repeat(fabric)) * 2))
@@ -171,11 +171,11 @@ def test_a_low_light_casts_longer_shadows():
 
 
 @pytest.mark.parametrize("texels_per_thread", [1.5, 16.0])
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", preset_names())
 def test_a_relit_set_is_within_its_stated_bound_on_pairs_held_back(name, texels_per_thread):
     fabric = load(name)
-    one = garments(quad_scene(fabric, 256 / texels_per_thread))[0]
-    sheet = sheets_of(one, (recipe(fabric),), {1001: (0, 0)}, 256, 4)[0]
+    one = garments(quad_scene(fabric, 64 / texels_per_thread))[0]
+    sheet = sheets_of(one, (recipe(fabric),), {1001: (0, 0)}, 64, 4)[0]
     stated = swatch_error(sheet)
     held_back = swatch_error(sheet, pairs=pairs_between(20, skip=PAIRS))
     assert held_back.worst_pair <= stated.bound
@@ -195,30 +195,20 @@ def test_the_bound_bites_when_the_maps_are_of_another_fabric():
     assert swatch_error(wrong).worst_pair > 5 * swatch_error(right).bound
 
 
-@pytest.mark.parametrize(
-    ("name", "bound"),
-    [
-        ("linen_plain", 0.5),
-        ("velvet", 0.5),
-        ("silk_shot", 0.5),
-        ("silk_crepe_de_chine", 0.5),
-        ("polyester_satin_charmeuse", 0.5),
-        ("polyester_satin_charmeuse_back", 0.5),
-    ],
-)
-def test_the_coarsest_level_relit_is_level_far(name, bound):
+@pytest.mark.parametrize("name", preset_names())
+def test_the_coarsest_level_relit_is_level_far(name):
     fabric = load(name)
-    maps, _ = baked(fabric)
+    maps, _ = baked(fabric, names=NEEDED, resolution=64, threads=float(2 * true_repeat(fabric)[0]))
     top = {k: maps[k][-1].reshape(1, -1) for k in NEEDED}
     top["thread_id"] = np.full_like(top["thread_id"], 255)
     found = [
-        delta_e(
+        delta_e_2000(
             display(relight(top, fabric, wi, wo), wi),
             display(evaluate(fabric, wi, wo), wi),
         )[0]
         for wi, wo in zip(*pairs_between(40), strict=True)
     ]
-    assert np.mean(found) < bound
+    assert np.mean(found) < 0.5
 
 
 def test_ids_and_coordinates_are_those_of_the_texels_centre_at_every_level():

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fabricusd import FabricError
-from fabricusd.quality.pictures import delta_e_2000, difference, flip_map, heat
+from fabricusd.color_difference import delta_e_2000
+from fabricusd.quality.pictures import difference, flip_map, heat
 
 
 @pytest.fixture

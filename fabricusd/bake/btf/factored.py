@@ -24,7 +24,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FactoredBtf:
-    """Joint factors of one repeat: directions (d, 3), size (h, w), texels per thread."""
+    """Factors of one repeat, joint but where `.btf` files have one set a channel.
+
+    directions (d, 3), size (h, w), texels per thread
+    """
 
     directions: Floats
     factors: Factors

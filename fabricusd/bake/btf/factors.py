@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.bake.accuracy import delta_e
 from fabricusd.bake.btf.matrix import Btf, table
+from fabricusd.color_difference import delta_e_2000
 from fabricusd.errors import FabricError
 
 Floats = NDArray[np.float64]
@@ -67,7 +67,7 @@ def factors(
         )
         got = _display(btf, rows, entries(made, rows, texels))
         return Factors(
-            rows=made.rows, columns=made.columns, delta_e=float(delta_e(got, true).mean())
+            rows=made.rows, columns=made.columns, delta_e=float(delta_e_2000(got, true).mean())
         )
 
     if rank:

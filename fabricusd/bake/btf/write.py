@@ -7,17 +7,31 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fabricusd.appearance.surface import evaluate
-from fabricusd.bake.accuracy import delta_e, display, pairs_between
-from fabricusd.bake.btf.factored import FactoredBtf, factored, write_atlas, write_factored
-from fabricusd.bake.btf.factors import factors
-from fabricusd.bake.btf.matrix import btf_of
-from fabricusd.bake.btf.ubo import write_ubo
+from fabricusd.bake.accuracy import PAIRS, bound_of, display, pairs_between
+from fabricusd.bake.btf.factored import (
+    FactoredBtf,
+    factored,
+    read_atlas,
+    read_factored,
+    write_atlas,
+    write_factored,
+)
+from fabricusd.bake.btf.factors import Factors, factors
+from fabricusd.bake.btf.matrix import Btf, btf_of
+from fabricusd.bake.btf.ubo import read_ubo, write_ubo
+from fabricusd.color_difference import delta_e_2000
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
+Floats = NDArray[np.float64]
+
 FORMS = ("ubo", "ubo-joint", "factored", "atlas")
+
+PER_THREAD = 16
+"""Texels along a thread's pitch."""
 
 MAX_ERROR = 1.0
 """Mean delta E 2000 that the rank is chosen for where nothing is asked: just noticeable."""
@@ -29,32 +43,28 @@ def write_btf(
     forms: Sequence[str],
     *,
     max_error: float = MAX_ERROR,
-    per_thread: int = 16,
+    per_thread: int = PER_THREAD,
+    directions: Floats | None = None,
 ) -> list[dict[str, Any]]:
     """Write `forms` of the BTF of one repeat; a record of each, for JSON.
 
+    directions : (d, 3) of light and of view, 151 where None
+
     delta_e is that of the factors on the table's own directions; between them, where a reader has
-    to interpolate, it is `delta_e_between`, which no rank makes smaller.
+    to interpolate, it is `delta_e_between`, which no rank makes smaller, measured on the files as
+    they are read back; `bound` is 1.5 times that of the worst pair of directions.
     """
     unknown = [f for f in forms if f not in FORMS]
     if unknown:
         raise FabricError(f"--btf '{unknown[0]}'", f"is unknown; it must be {', '.join(FORMS)}")
-    btf = btf_of(fabric, per_thread=per_thread)
-    records = []
+    btf = btf_of(fabric, per_thread=per_thread, directions=directions)
+    stem = folder / fabric.name
+    records: list[dict[str, Any]] = []
     for form in FORMS:
         if form not in forms:
             continue
         made = factors(btf, joint=form != "ubo", max_error=max_error)
-        one = factored(btf, made)
-        stem = folder / fabric.name
-        if form in ("ubo", "ubo-joint"):
-            files = [Path(f"{stem}{'.joint' if form == 'ubo-joint' else ''}.btf")]
-            write_ubo(files[0], btf, made)
-        elif form == "factored":
-            files = [Path(f"{stem}.factored.npz")]
-            write_factored(files[0], one)
-        else:
-            files = list(write_atlas(stem, one))
+        files = _written(form, stem, btf, made)
         records.append(
             {
                 "form": form,
@@ -62,19 +72,59 @@ def write_btf(
                 "megabytes": sum(f.stat().st_size for f in files) / 1e6,
                 "rank": [c.shape[1] for c in made.columns],
                 "delta_e": made.delta_e,
-                "delta_e_between": between(fabric, one),
             }
         )
+    apart = between(fabric, [read_form(r["form"], stem, per_thread) for r in records])
+    for record, errors in zip(records, apart, strict=True):
+        record |= {"delta_e_between": float(errors.mean()), "bound": bound_of(float(errors.max()))}
     return records
 
 
-def between(fabric: Fabric, one: FactoredBtf, count: int = 8) -> float:
-    """Mean delta E 2000 against level `weave` at places and directions of no table."""
-    rng = np.random.default_rng(1)
-    weave = rng.random((512, 2)) * 64.0
+def _written(form: str, stem: Path, btf: Btf, made: Factors) -> list[Path]:
+    """The files of one form, written."""
+    if form == "atlas":
+        return list(write_atlas(stem, factored(btf, made)))
+    path = _path(form, stem)
+    if form == "factored":
+        write_factored(path, factored(btf, made))
+    else:
+        write_ubo(path, btf, made)
+    return [path]
+
+
+def _path(form: str, stem: Path) -> Path:
+    ends = {"ubo": ".btf", "ubo-joint": ".joint.btf", "factored": ".factored.npz"}
+    return Path(f"{stem}{ends[form]}")
+
+
+def read_form(form: str, stem: Path, per_thread: int = PER_THREAD) -> FactoredBtf:
+    """What `write_btf` wrote as `form` of the fabric whose name ends `stem`.
+
+    per_thread : texels a thread, which `.btf` files do not hold
+    """
+    if form == "atlas":
+        return read_atlas(stem)
+    path = _path(form, stem)
+    if form == "factored":
+        return read_factored(path)
+    one = read_ubo(path)
+    return FactoredBtf(
+        directions=one.directions, factors=one.factors, size=one.size, per_thread=per_thread
+    )
+
+
+def between(
+    fabric: Fabric, forms: Sequence[FactoredBtf], pairs: tuple[Floats, Floats] | None = None
+) -> Floats:
+    """(forms, pairs) mean delta E 2000 against level `weave` at places and directions of no table.
+
+    pairs : (n, 3) wi and wo, `accuracy.PAIRS` of them where None
+    """
+    weave = np.random.default_rng(1).random((512, 2)) * 64.0
     found = []
-    for wi, wo in zip(*pairs_between(count), strict=True):
+    for wi, wo in zip(*(pairs or pairs_between(PAIRS)), strict=True):
         true = evaluate(fabric, np.repeat(wi[None], len(weave), axis=0), wo, weave, "weave")
-        got = one.evaluate(weave, wi, wo)
-        found.append(float(delta_e(display(got, wi), display(true, wi)).mean()))
-    return float(np.mean(found))
+        got = np.stack([one.evaluate(weave, wi, wo) for one in forms])
+        shown = np.broadcast_to(display(true, wi), got.shape)
+        found.append(delta_e_2000(display(got, wi), shown).mean(axis=1))
+    return np.stack(found, axis=1)
