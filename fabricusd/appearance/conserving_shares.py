@@ -47,7 +47,7 @@ from fabricusd.appearance.stretches import (
 from fabricusd.appearance.thread_terms import GAMMA_SURFACE, GAMMA_VOLUME
 from fabricusd.fabric import Fabric
 
-LEAST_SHARE = 0.05
+LEAST_SHARE = 0.02
 """See `share_fit.best_shares`."""
 
 

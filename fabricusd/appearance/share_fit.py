@@ -27,7 +27,7 @@ STRATA = (5, 3)
 
 DRAWS = STRATA[0] * STRATA[1]
 
-ADAPTATIONS = 24
+ADAPTATIONS = 32
 """Rounds of the fixed point."""
 
 VALUE, EVEN, LOBES = 0, 1, 2
