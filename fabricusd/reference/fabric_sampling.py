@@ -23,16 +23,18 @@ from fabricusd.appearance.sampling_lobes import (
     lobe_densities,
     sample_lobe,
 )
-from fabricusd.appearance.surface_sampling import (
+from fabricusd.appearance.stretches import (
     COS,
     PSI0,
     SET,
     SIN,
     SURFACE_WIDTH,
     TAN,
-    UNIFORM,
     VOLUME_WIDTH,
     nearest_stretch,
+)
+from fabricusd.appearance.surface_sampling import (
+    UNIFORM,
     share_at,
     view_corner,
 )
@@ -224,11 +226,9 @@ def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, 
             if on_thread:
                 k = 3 * nearest_stretch(R, sampling.stretches, thread_set, thread, psi0[start + x])
                 corner = view_corner(R, block[_OX + x], block[_OY + x], block[_OZ + x])
-                a = share_at(R, sampling.shares, corner, k + SURFACE)
-                b = share_at(R, sampling.shares, corner, k + VOLUME)
-                d = share_at(R, sampling.shares, corner, k + ISOTROPIC)
-                scale = R(1.0 - UNIFORM) / (a + b + d)
-                a, b, d = a * scale, b * scale, d * scale
+                a = share_at(R, sampling.point_shares, corner, k + SURFACE)
+                b = share_at(R, sampling.point_shares, corner, k + VOLUME)
+                d = share_at(R, sampling.point_shares, corner, k + ISOTROPIC)
             block[_A + x], block[_B + x], block[_D + x] = a, b, d
             k = _choose(R, _A, 3 if on_thread else 0, u0[h], block, x)
             block[_LOBE + x] = R(_EVEN) if k < 0 else R(k)

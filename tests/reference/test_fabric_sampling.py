@@ -10,8 +10,8 @@ from fabricusd.appearance.surface_sampling import (
     far_direction,
     point_density,
     point_direction,
-    sampling_tables,
 )
+from fabricusd.appearance.surface_shares import sampling_tables
 from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.weave import lookup
 from fabricusd.reference.fabric_sampling import sample_far, sample_points
