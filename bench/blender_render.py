@@ -68,7 +68,7 @@ def shade_by_osl(job):
     towards = TO_Z_UP.to_3x3() @ Vector(job["towards_light"])
     script.inputs["TowardsLight"].default_value = towards
     script.inputs["Irradiance"].default_value = (*(3 * [job["irradiance"]]), 1.0)
-    script.inputs["Shadows"].default_value = 1
+    script.inputs["Shadows"].default_value = 8
     tangent = tree.nodes.new("ShaderNodeTangent")
     tangent.direction_type, tangent.uv_map = "UV_MAP", "st"
     tree.links.new(tangent.outputs[0], script.inputs["Tangent"])

@@ -6,6 +6,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
+def lab(color: ArrayLike) -> NDArray[np.float64]:
+    """(..., 3) CIE L*a*b* of linear Rec. 709, clipped to what a display shows, 0 to 1."""
+    import colour
+
+    space = colour.RGB_COLOURSPACES["ITU-R BT.709"]
+    shown = np.clip(np.asarray(color, np.float64), 0.0, 1.0)
+    found = colour.XYZ_to_Lab(colour.RGB_to_XYZ(shown, space), space.whitepoint)
+    return np.asarray(found, np.float64)
+
+
 def delta_e_2000(color: ArrayLike, reference: ArrayLike) -> NDArray[np.float64]:
     """(...) CIE 2000 colour difference of two (..., 3) arrays of linear Rec. 709 display colours.
 
@@ -13,12 +23,4 @@ def delta_e_2000(color: ArrayLike, reference: ArrayLike) -> NDArray[np.float64]:
     """
     import colour
 
-    space = colour.RGB_COLOURSPACES["ITU-R BT.709"]
-    lab = [
-        colour.XYZ_to_Lab(
-            colour.RGB_to_XYZ(np.clip(np.asarray(values, np.float64), 0.0, 1.0), space),
-            space.whitepoint,
-        )
-        for values in (color, reference)
-    ]
-    return np.asarray(colour.difference.delta_E_CIE2000(lab[0], lab[1]), np.float64)
+    return np.asarray(colour.difference.delta_E_CIE2000(lab(color), lab(reference)), np.float64)

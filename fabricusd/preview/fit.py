@@ -2,13 +2,15 @@
 
 The forward model is what a renderer shows from afar: the mean over texels of the surface model with
 each texel's own colour, roughness, normal and tangent, as the bake has them. The target is level
-`far`. Residuals are differences of cube roots, which go with lightness, so that a highlight does
-not outweigh everything else. [Branch1999] by `scipy.optimize.least_squares`.
+`far`. What is least is a smooth form of what is judged, see `judge`; of several starts, the
+textures alone among them, that is taken which is judged best. [Branch1999] by
+`scipy.optimize.least_squares`.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,21 +18,19 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from fabricusd.appearance import surface
-from fabricusd.color_difference import delta_e_2000
 from fabricusd.fabric import Fabric
+from fabricusd.preview.judge import Judge, albedo, direction_pairs
 from fabricusd.preview.look import Look
 from fabricusd.preview.models import Surface, evaluate
 
 Floats = NDArray[np.float64]
 
-DARK = 1e-3
-"""Added before the cube root: differences below it are not seen."""
+REGULAR = 0.2
+"""Pull of each parameter to its start, so that what the data cannot tell stays put: a parameter
+that is off by all of its range costs as much as this delta E."""
 
-VIEWS, LIGHTS = 16, 96
-"""Directions of the hemisphere, even in solid angle; the views reach down to 80 degrees."""
-
-REGULAR = 0.01
-"""Pull of each parameter to its start, so that what the data cannot tell stays put."""
+FIRST, MORE = 8, 40
+"""Steps from each start, and from the one of them that is best then."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,86 +58,87 @@ class Fitted:
     delta_e, delta_e_95 : mean and 95th percentile of delta E 2000 over the pairs of directions, in
         a light under which a white diffuser is white
     albedo : mean relative difference of the directional albedo, all channels and views
-    start_delta_e : `delta_e` of the textures as they are, without a fit
+    score : what was least, `Judge.score`
+    start_delta_e, start_score : the same of the textures as they are, without a fit
     """
 
     look: Look
     delta_e: float
     delta_e_95: float
     albedo: float
+    score: float
     start_delta_e: float
+    start_score: float
     pairs: int
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return {
-            "parameters": asdict(self.look), "delta_e": self.delta_e,
-            "delta_e_95": self.delta_e_95, "albedo": self.albedo,
-            "start_delta_e": self.start_delta_e, "pairs": self.pairs,
-        }  # fmt: skip
-
-
-def hemisphere(count: int, lowest: float = 0.0) -> Floats:
-    """(count, 3) unit vectors above z = `lowest`, even in solid angle: a Fibonacci spiral."""
-    k = np.arange(count) + 0.5
-    z = 1.0 - (1.0 - lowest) * k / count
-    phi = k * np.pi * (3.0 - np.sqrt(5.0))
-    r = np.sqrt(1.0 - z * z)
-    return np.stack((r * np.cos(phi), r * np.sin(phi), z), axis=1)
-
-
-def direction_pairs() -> tuple[Floats, Floats]:
-    """(n, 3) wi and wo: each of VIEWS with each of LIGHTS."""
-    views, lights = hemisphere(VIEWS, np.cos(np.radians(80.0))), hemisphere(LIGHTS)
-    return np.tile(lights, (VIEWS, 1)), np.repeat(views, LIGHTS, axis=0)
+        said = asdict(self)
+        return {"parameters": said.pop("look"), **said}
 
 
 def fit(kind: str, texels: TexelSample, fabric: Fabric) -> Fitted:
-    """The `Look` with which `kind` (one of `models.KINDS`) over `texels` is nearest to `fabric`."""
+    """The `Look` with which `kind` (one of `models.KINDS`) over `texels` is nearest to `fabric`.
+
+    Never worse than the textures alone, by `Judge.score` and by the mean delta E of the pairs.
+    """
     wi, wo = direction_pairs()
-    target = surface.evaluate(fabric, wi, wo, level="far")
+    target = surface.evaluate(fabric, wi, wo, level="far")[None]
+    judge = Judge(target, np.ones(1))
     frames = _frames(texels)
     locals_ = (np.einsum("kab,nb->kna", frames, wi), np.einsum("kab,nb->kna", frames, wo))
-    free = _free(kind)
-    start = _start(target)
-    low, high = (np.concatenate([np.atleast_1d(f.bound(end)) for f in free]) for end in (0, 1))
 
-    def far(x: Floats) -> Floats:
-        return forward(kind, _unpack(x, free, start), texels, *locals_)
+    def far(look: Look) -> Floats:
+        return forward(kind, look, texels, *locals_)[None]
 
-    root = np.cbrt(np.pi * target + DARK)
-    albedo_root = np.cbrt(_albedo(target) + DARK)
-
-    def residual(x: Floats, x0: Floats) -> Floats:
-        got = far(x)
-        return np.concatenate(
-            (
-                (np.cbrt(np.pi * got + DARK) - root).ravel() / np.sqrt(root.size),
-                (np.cbrt(_albedo(got) + DARK) - albedo_root).ravel() / np.sqrt(albedo_root.size),
-                REGULAR * (x - x0) / np.sqrt(len(x0)),
-            )
-        )
-
-    tries = []
-    for first in (start, replace(start, specular_ior=3.0, fuzz_weight=0.02)):
-        x0 = np.clip(_pack(first, free), low + 1e-6, high - 1e-6)
-        tries.append(
-            least_squares(
-                residual, x0, bounds=(low, high), x_scale=0.1, max_nfev=40, kwargs={"x0": x0}
-            )
-        )
-    found = min(tries, key=lambda one: float(one.cost))
-    look = _unpack(found.x, free, start)
-    got, plain = far(found.x), forward(kind, Look(), texels, *locals_)
-    error = _delta_e(got, target)
+    plain = far(Look())
+    start = judge.delta_e(plain)
+    found, got = Look(), plain
+    for look in _sought(kind, far, judge, target[0]):
+        values = far(look)
+        nearer = judge.score(values) < judge.score(got)
+        if nearer and judge.delta_e(values).mean() <= start.mean():
+            found, got = look, values
+    error = judge.delta_e(got)
+    true = albedo(target)
     return Fitted(
-        look=look,
+        look=found,
         delta_e=float(error.mean()),
         delta_e_95=float(np.quantile(error, 0.95)),
-        albedo=float(np.mean(np.abs(_albedo(got) / np.maximum(_albedo(target), DARK) - 1.0))),
-        start_delta_e=float(_delta_e(plain, target).mean()),
+        albedo=float(np.mean(np.abs(albedo(got) / np.maximum(true, 1e-3) - 1.0))),
+        score=judge.score(got),
+        start_delta_e=float(start.mean()),
+        start_score=judge.score(plain),
         pairs=len(wi),
     )
+
+
+_BARE = {f.name: getattr(Look(), f.name) for f in fields(Look) if f.name != "fuzz_color"}
+"""The textures alone, but for a colour that does not show without fuzz."""
+
+
+def _sought(kind: str, far: Callable[[Look], Floats], judge: Judge, target: Floats) -> list[Look]:
+    """Looks of least squares: what each start leads to in a few steps, and the best one's end."""
+    free = _free(kind)
+    low, high = (np.concatenate([np.atleast_1d(f.bound(end)) for f in free]) for end in (0, 1))
+
+    def improved(first: Look, steps: int) -> Look:
+        x0 = np.clip(_pack(first, free), low + 1e-6, high - 1e-6)
+        pull = REGULAR / ((high - low) * np.sqrt(len(x0)))
+
+        def residuals(x: Floats) -> Floats:
+            off = judge.residuals(far(_unpack(x, free, first)))
+            return np.concatenate((off, pull * (x - x0)))
+
+        best = least_squares(residuals, x0, bounds=(low, high), x_scale=0.1, max_nfev=steps)
+        return _unpack(best.x, free, first)
+
+    begun = [improved(first, FIRST) for first in _starts(target)]
+    best = improved(min(begun, key=lambda look: judge.score(far(look))), MORE)
+    # On the way from the textures alone, for a surface that gains one figure at another's cost.
+    plain, end = _pack(replace(best, **_BARE), free), _pack(best, free)
+    between = [_unpack(plain + t * (end - plain), free, best) for t in (0.25, 0.5, 0.75)]
+    return [*begun, best, *between]
 
 
 def forward(kind: str, look: Look, texels: TexelSample, wi: Floats, wo: Floats) -> Floats:
@@ -169,20 +170,9 @@ def _frames(texels: TexelSample) -> Floats:
     return np.stack((x, np.cross(z, x), z), axis=1)
 
 
-def _albedo(values: Floats) -> Floats:
-    """(VIEWS, 3) integral over the lights of (VIEWS * LIGHTS, 3) values."""
-    return np.asarray(values.reshape(VIEWS, LIGHTS, 3).mean(axis=1) * 2.0 * np.pi)
-
-
-def _delta_e(got: Floats, target: Floats) -> Floats:
-    """(n,) difference of the display colours under a light of irradiance pi."""
-    pictures = [(np.pi * values)[None].astype(np.float32) for values in (got, target)]
-    return np.asarray(delta_e_2000(*pictures)[0])
-
-
 @dataclass(frozen=True)
 class _Free:
-    """A parameter that is sought. The pull of `REGULAR` counts in the units of `bounds`."""
+    """A parameter that is sought, and between which values."""
 
     name: str
     bounds: tuple[float, float]
@@ -209,12 +199,14 @@ def _free(kind: str) -> tuple[_Free, ...]:
     )
 
 
-def _start(target: Floats) -> Look:
-    """Where the search begins, with little reflection and much fuzz; a second one begins the other
-    way round. The fuzz keeps the hue that the cloth has over all directions."""
+def _starts(target: Floats) -> tuple[Look, ...]:
+    """Where the search begins: little reflection and much fuzz, the other way round, the textures
+    alone. The fuzz keeps the hue that the cloth has over all directions."""
     color = target.mean(axis=0)
-    color = tuple(float(c) for c in color / max(float(color.max()), 1e-9))
-    return Look(specular_ior=1.4, fuzz_weight=0.3, fuzz_color=color, fuzz_roughness=0.4)
+    red, green, blue = (float(c) for c in color / max(float(color.max()), 1e-9))
+    hue = (red, green, blue)
+    soft = Look(specular_ior=1.4, fuzz_weight=0.3, fuzz_color=hue, fuzz_roughness=0.4)
+    return soft, replace(soft, specular_ior=3.0, fuzz_weight=0.02), Look(fuzz_color=hue)
 
 
 def _pack(look: Look, free: tuple[_Free, ...]) -> Floats:

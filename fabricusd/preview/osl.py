@@ -35,6 +35,7 @@ def osl_source(fabric: Fabric) -> str:
     nodes = curve_nodes(fabric, DEFAULT)
     threads = fabric.thread_list
     sets = [int(k >= nodes.warp_start) for k in range(len(nodes.psi0))]
+    gap = coverage(fabric).gap
     tables = [
         _array("float", "thread_albedo", [a for t in threads for a in t.albedo]),
         _array("float", "thread_ior", [t.ior for t in threads]),
@@ -47,7 +48,8 @@ def osl_source(fabric: Fabric) -> str:
         _array("int", "node_set", sets),
         f"    int node_count = {len(nodes.psi0)},\n",
         f"    float masking_width = {fabric.masking_width:.9g},\n",
-        f"    float gap = {coverage(fabric).gap:.9g},\n",
+        f"    float gap = {gap:.9g},\n",
+        f"    float open = {0.0 if fabric.opaque else gap:.9g},\n",
     ]
     text = SOURCE.read_text("utf-8")
     return text.replace("    /* tables */\n", "".join(tables))

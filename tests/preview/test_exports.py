@@ -78,6 +78,8 @@ def test_the_shader_carries_the_fabric_as_its_defaults(packed):
     assert np.allclose(numbers["thread_gamma_surface"], linen.gamma_surface)
     gap = float(re.search(r"gap = ([\d.e-]+)", text).group(1))
     assert numbers["node_weight"].sum() + gap == pytest.approx(1.0)
+    assert f"open = {gap:.9g}," in text
+    assert "open = 0," in osl_source(replace(load("linen_plain"), opaque=True))
     assert len(numbers["node_angle"]) == int(re.search(r"node_count = (\d+)", text).group(1))
 
 

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from bake.meshes import quad_scene
 
-from fabricusd.preview.fit import (
-    TexelSample,
-    direction_pairs,
-    fit,
-    forward,
-    hemisphere,
-)
+from fabricusd.bake.garment import garments
+from fabricusd.bake.maps import REGISTRY, Texels
+from fabricusd.bake.recipe import recipe
+from fabricusd.preview.fit import TexelSample, fit, forward
+from fabricusd.preview.judge import LIGHTS, VIEWS, Judge, direction_pairs, hemisphere
 from fabricusd.preview.look import Look
 from fabricusd.preview.models import KINDS, Surface, evaluate
 from fabricusd.preview.texels import KINDS as KINDS_OF_TEXELS
-from fabricusd.preview.texels import _kinds
-from fabricusd.schema import load
+from fabricusd.preview.texels import NEEDED, _kinds
+from fabricusd.schema import load, preset_names
 
 
 def white(alpha=(0.3, 0.6), ior=1.5, fuzz=0.0):
@@ -113,6 +113,52 @@ def test_a_fit_to_cloth_is_nearer_than_the_textures_alone():
     found = fit("openpbr", texels(base=np.array([[0.05, 0.2, 0.25]])), load("linen_plain"))
     assert found.delta_e < 0.8 * found.start_delta_e
     assert found.albedo < 0.2
+
+
+@cache
+def far_texel(fabric):
+    """The texel that spans many repeats of a fabric."""
+    made = recipe(fabric)
+    lay = garments(quad_scene(fabric, 6400.0))[0].lays[0]
+    mean = Texels.of_planes(made.mean[:, None], made, lay)
+    value = {name: REGISTRY[name].function(mean).astype(np.float64) for name in NEEDED}
+    x, y, _ = value["tangent"].T
+    return TexelSample(
+        base=value["base_color"], smooth=value["roughness_along"][:, 0],
+        rough=value["roughness_across"][:, 0], opacity=value["opacity"][:, 0],
+        normal=value["normal"], tangent=np.stack((-y, x, 0 * x), axis=1), weight=np.ones(1),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", preset_names())
+def test_a_fit_is_never_worse_than_the_textures_alone(name, kind, monkeypatch):
+    # Few steps and directions: it must hold wherever the search ends.
+    for constant, few in (
+        ("fit.FIRST", 2),
+        ("fit.MORE", 2),
+        ("judge.VIEWS", 6),
+        ("judge.LIGHTS", 32),
+    ):
+        monkeypatch.setattr(f"fabricusd.preview.{constant}", few)
+    fabric = load(name)
+    found = fit(kind, far_texel(fabric), fabric)
+    assert found.delta_e <= found.start_delta_e
+    assert found.score <= found.start_score
+
+
+def test_residuals_are_a_mean_squared_delta_e():
+    """Near the target, where delta E 2000 is what they were made from; greys and colours."""
+    rng = np.random.default_rng(0)
+    base = rng.uniform(0.1, 0.3, (2, VIEWS * LIGHTS, 3))
+    base[0] = base[0, :, :1]
+    judge = Judge(base, np.array([1.0, 3.0]))
+    near = base * 1.01
+    squares = judge.delta_e(near) ** 2
+    sky = judge.delta_e_of_sky(near) ** 2
+    expected = 0.5 * np.array([0.25, 0.75]) @ (squares.mean(axis=1) + sky.mean(axis=1))
+    assert np.sum(judge.residuals(near) ** 2) == pytest.approx(expected, rel=0.1)
+    assert judge.score(base) == 0.0
 
 
 def test_kinds_of_texels_keep_the_mean_and_share_out_the_whole():
