@@ -65,21 +65,21 @@ QUEUES = 6
 """Queues of a material: three levels, two sides."""
 
 # Rows of a block after those of `light_hits`: the geometric normal, its cosine with the ray; for
-# level `auto` the steepness of both coordinates, the direction of growing u, the repeat, the cone's
+# level `auto` the steepness of both coordinates, the direction of growing u, the limits, the cone's
 # width and a uniform number, and the level they lead to.
-_NORMAL, _COSINE, _STEEP, _GRAIN, _REPEAT, _WIDTH, _NUMBER, _LEVEL = (
-    (LIGHT_ROWS + row) * BLOCK for row in (0, 3, 4, 6, 9, 11, 12, 13)
+_NORMAL, _COSINE, _STEEP, _GRAIN, _LIMITS, _WIDTH, _NUMBER, _LEVEL = (
+    (LIGHT_ROWS + row) * BLOCK for row in (0, 3, 4, 6, 9, 13, 14, 15)
 )
-_ROWS = LIGHT_ROWS + 14
+_ROWS = LIGHT_ROWS + 16
 
 
 @njit(**KERNEL)
 def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, dome, film, keys,
-           triangle_material, repeats, records, level, path_pixel, path_sample,
+           triangle_material, limits, records, level, path_pixel, path_sample,
            numbers, counts):  # fmt: skip
     """Add the light that rays met, and give each lane that goes on the key of its queue, else -1.
 
-    repeats : (materials, 2) float32 - ends and picks of a fabric's repeat, 0 where the surface has
+    limits : (materials, 4) float32 - `footprint.Limits.row` of a fabric, 0 where the surface has
     no levels. counts : (QUEUES materials,) int64, filled with the length of each queue, which is
     keyed by `(3 material + level) 2 + back`.
     """
@@ -93,11 +93,11 @@ def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, do
         _add_seen(start, size, estimator, lane_tags, lanes, film, block)
         _turn(size, block)
         if level == AUTO_LEVEL:
-            _load_levels(start, size, rays, lanes, lane_tags, triangle_material, repeats, records,
+            _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
                          path_pixel, path_sample, counters, block)  # fmt: skip
             place = np.uint32(2 + NUMBERS_PER_STEP * step + 2)
             _choose_levels(numbers, place, size, counters, block)
-        _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, repeats,
+        _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, limits,
                    keys, counts, block)  # fmt: skip
 
 
@@ -151,25 +151,28 @@ def _turn(size, block):
 
 
 @njit(**LEAN)
-def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, repeats, records,
+def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
                  path_pixel, path_sample, counters, block):  # fmt: skip
-    """What `auto` needs of each ray that met a fabric; a repeat of 0 for the others."""
+    """What `auto` needs of each ray that met a fabric; zeros for the others."""
     whole = rays.view(np.uint32)
     for x in range(size):
         k = start + x
         path = lane_tags[0, k]
         counters[x], counters[BLOCK + x] = path_pixel[path], path_sample[path]
+        for row in range(4):
+            block[_LIMITS + row * BLOCK + x] = R(0)
         for row in range(2):
-            block[_REPEAT + row * BLOCK + x] = block[_STEEP + row * BLOCK + x] = R(0)
+            block[_STEEP + row * BLOCK + x] = R(0)
         for row in range(3):
             block[_GRAIN + row * BLOCK + x] = R(0)
         block[_WIDTH + x] = R(0)
         if block[REACH + x] >= ENDLESS:
             continue
         triangle = whole[k >> 4, PRIMITIVE, k & 15]
-        record, repeat = records[triangle], repeats[triangle_material[triangle]]
+        record, material = records[triangle], triangle_material[triangle]
+        for row in range(4):
+            block[_LIMITS + row * BLOCK + x] = limits[material, row]
         for row in range(2):
-            block[_REPEAT + row * BLOCK + x] = repeat[row]
             block[_STEEP + row * BLOCK + x] = record[RATE + row]
         for row in range(3):
             block[_GRAIN + row * BLOCK + x] = record[TANGENTS + row]
@@ -198,15 +201,15 @@ def _choose_levels(numbers, place, size, counters, block):
         extent_u = width * block[_STEEP + x] * np.sqrt(R(1) + along)
         extent_v = width * block[_STEEP + BLOCK + x] * np.sqrt(R(1) + max(flat - along, R(0)))
         far, weave, _ = level_weights(
-            R, max(block[_REPEAT + x], R(1)), max(block[_REPEAT + BLOCK + x], R(1)),
-            extent_u, extent_v,
+            R, max(block[_LIMITS + x], R(1e-6)), max(block[_LIMITS + BLOCK + x], R(1e-6)),
+            block[_LIMITS + 2 * BLOCK + x], block[_LIMITS + 3 * BLOCK + x], extent_u, extent_v,
         )  # fmt: skip
         level, _ = pick_level(R, far, weave, block[_NUMBER + x])
         block[_LEVEL + x] = R(level)
 
 
 @njit(**LEAN)
-def _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, repeats, keys,
+def _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, limits, keys,
                counts, block):  # fmt: skip
     whole = rays.view(np.uint32)
     for x in range(size):
@@ -217,7 +220,7 @@ def _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material
             continue
         material = triangle_material[whole[k >> 4, PRIMITIVE, k & 15]]
         queue = FAR_LEVEL
-        if repeats[material, 0] > R(0):
+        if limits[material, 0] > R(0):
             queue = int(block[_LEVEL + x]) if level == AUTO_LEVEL else level
         key = (3 * material + queue) * 2 + (1 if block[_COSINE + x] > R(0) else 0)
         keys[k] = key

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.compiled import true_repeat
+from fabricusd.appearance.footprint import DEFAULT, Limits
 from fabricusd.errors import FabricError
 from fabricusd.reference import arrivals
 from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, arrive, sort_lanes
@@ -73,6 +73,7 @@ MOST_LAYERS = 32
 class Tracer:
     """A scene made ready for rays.
 
+    limits : where level "auto" goes from one level to the next
     estimator : "mis", or for tests one of "light", "surface", "uniform"; all have the same mean.
     sampler : "sobol", or for tests "random".
     """
@@ -84,6 +85,7 @@ class Tracer:
         max_bounces: int = 4,
         level: str = "auto",
         shadow: str = "horizon",
+        limits: Limits = DEFAULT,
         seed: int = 0,
         estimator: str = "mis",
         sampler: str = "sobol",
@@ -105,14 +107,14 @@ class Tracer:
         self.epsilon = np.float32(1e-7 * self.tables.radius + 1e-12)
         count = max(len(scene.materials), 1)
         self.shaders: list[Any] = [None] * count
-        self._repeats = np.zeros((count, 2), np.float32)
+        self._limits = np.zeros((count, 4), np.float32)
         self.opacity = np.where(
             self.surfaces.table[:, OPACITY_MAP] >= 0, -1.0, self.surfaces.table[:, OPACITY]
         ).astype(np.float32)
         for k, surface in enumerate(scene.materials):
             if isinstance(surface, FabricSurface):
                 fabric = surface.binding.fabric
-                self._repeats[k] = true_repeat(fabric)
+                self._limits[k] = limits.row(fabric)
                 self.shaders[k] = FabricShader(fabric, shadow)
                 self.opacity[k] = 1.0 - self.shaders[k].gap
         self.see_through = bool((self.opacity < 1).any())
@@ -168,7 +170,7 @@ class Tracer:
             arrive(
                 step, self.max_bounces, self.estimator, count, wave.rays, wave.lanes,
                 wave.lane_tags, self.lights, self.dome, wave.film, wave.keys,
-                self.tables.material, self._repeats, self.tables.records, self.level,
+                self.tables.material, self._limits, self.tables.records, self.level,
                 wave.path_pixel, wave.path_sample, self.numbers, counts,
             )  # fmt: skip
             ends = np.cumsum(counts)
