@@ -112,15 +112,14 @@ def _load(start, size, hits, block):
             block[row * BLOCK + x] = source[x]
 
 
+# A place and not a row and a column: numba compiles a function anew for each constant it is given.
 @njit(**INLINE)
-def _three(block, row, x):
-    at = row * BLOCK + x
+def _three(block, at):
     return block[at], block[at + BLOCK], block[at + 2 * BLOCK]
 
 
 @njit(**INLINE)
-def _put(block, row, x, a, b, c):
-    at = row * BLOCK + x
+def _put(block, at, a, b, c):
     block[at], block[at + BLOCK], block[at + 2 * BLOCK] = a, b, c
 
 
@@ -131,18 +130,24 @@ def _towards_lights(mis, size, block):
         pdf = block[LIGHT_PDF * BLOCK + x]
         ratio = block[F_PDF * BLOCK + x] / max(pdf, R(1e-30))
         weight = R(1) / (R(1) + ratio * ratio) if mis and pdf > R(0) else R(1)
-        br, bg, bb = _three(block, BETA, x)
-        fr, fg, fb = _three(block, F, x)
-        lr, lg, lb = _three(block, LIGHT, x)
+        br, bg, bb = _three(block, BETA * BLOCK + x)
+        fr, fg, fb = _three(block, F * BLOCK + x)
+        lr, lg, lb = _three(block, LIGHT * BLOCK + x)
         red, green, blue = weight * br * fr * lr, weight * bg * fg * lg, weight * bb * fb * lb
         total = red + green + blue
         total = total if abs(total) < MOST else _BROKEN
         block[_SUM * BLOCK + x] = R(0) if pdf == R(0) else total
-        _put(block, _BRINGS, x, red, green, blue)
+        _put(block, _BRINGS * BLOCK + x, red, green, blue)
         front = block[(WI + 2) * BLOCK + x] >= R(0)
-        ax, ay, az = _three(block, FRONT, x)
-        bx, by, bz = _three(block, BACK, x)
-        _put(block, _SHADOW, x, ax if front else bx, ay if front else by, az if front else bz)
+        ax, ay, az = _three(block, FRONT * BLOCK + x)
+        bx, by, bz = _three(block, BACK * BLOCK + x)
+        _put(
+            block,
+            _SHADOW * BLOCK + x,
+            ax if front else bx,
+            ay if front else by,
+            az if front else bz,
+        )
         # Lights may lie on a surface: what is in the last ten-thousandth is the lamp, not an
         # obstacle.
         reach = block[DISTANCE * BLOCK + x]
@@ -170,30 +175,33 @@ def _onwards(mis, size, block):
     for x in range(size):
         pdf = block[GO_PDF * BLOCK + x]
         straight = pdf < R(0)
-        gx, gy, gz = _three(block, GO, x)
-        ox, oy, oz = _three(block, WO, x)
+        gx, gy, gz = _three(block, GO * BLOCK + x)
+        ox, oy, oz = _three(block, WO * BLOCK + x)
         gx, gy, gz = (-ox if straight else gx), (-oy if straight else gy), (-oz if straight else gz)
-        ux, uy, uz = _three(block, U, x)
-        vx, vy, vz = _three(block, V, x)
-        nx, ny, nz = _three(block, N, x)
+        ux, uy, uz = _three(block, U * BLOCK + x)
+        vx, vy, vz = _three(block, V * BLOCK + x)
+        nx, ny, nz = _three(block, N * BLOCK + x)
         _put(
-            block, _ALONG, x, gx * ux + gy * vx + gz * nx, gx * uy + gy * vy + gz * ny,
+            block, _ALONG * BLOCK + x, gx * ux + gy * vx + gz * nx, gx * uy + gy * vy + gz * ny,
             gx * uz + gy * vz + gz * nz,
         )  # fmt: skip
         front = gz >= R(0) and not straight
-        ax, ay, az = _three(block, FRONT, x)
-        bx, by, bz = _three(block, BACK, x)
-        _put(block, _START, x, ax if front else bx, ay if front else by, az if front else bz)
-        br, bg, bb = _three(block, BETA, x)
-        wr, wg, wb = _three(block, WEIGHT, x)
+        ax, ay, az = _three(block, FRONT * BLOCK + x)
+        bx, by, bz = _three(block, BACK * BLOCK + x)
+        _put(
+            block, _START * BLOCK + x, ax if front else bx, ay if front else by, az if front else bz
+        )
+        br, bg, bb = _three(block, BETA * BLOCK + x)
+        wr, wg, wb = _three(block, WEIGHT * BLOCK + x)
         red, green, blue = wr * br, wg * bg, wb * bb
         most = max(red, max(green, blue))
         # Russian roulette on what the path can still carry; paths that carry half or more go on.
         chance = min(R(1), R(2) * most)
         inverse = R(1) / max(chance, R(1e-30))
+        red, green, blue = red * inverse, green * inverse, blue * inverse
         _put(
-            block, _BETA, x, br if straight else red * inverse, bg if straight else green * inverse,
-            bb if straight else blue * inverse,
+            block, _BETA * BLOCK + x,
+            br if straight else red, bg if straight else green, bb if straight else blue,
         )  # fmt: skip
         alive = R(1) if block[(CHANCE + 3) * BLOCK + x] < chance else _NONE
         alive = alive if most < MOST and pdf < MOST else _BROKEN
@@ -208,12 +216,12 @@ def _onwards(mis, size, block):
 
 
 @njit(**INLINE)
-def _write_ray(k, start, along, reach, x, rays, block):
-    """Ray `k` of the packets: origin and direction from three rows of the block each."""
+def _write_ray(k, start, along, reach, rays, block):
+    """Ray `k` of the packets: origin and direction from where they lie in the block."""
     p, lane = k >> 4, k & 15
     for row in range(3):
-        rays[p, OX + row, lane] = block[(start + row) * BLOCK + x]
-        rays[p, DX + row, lane] = block[(along + row) * BLOCK + x]
+        rays[p, OX + row, lane] = block[start + row * BLOCK]
+        rays[p, DX + row, lane] = block[along + row * BLOCK]
     rays[p, TNEAR, lane], rays[p, TFAR, lane] = R(0), reach
     rays.view(np.uint32)[p, GEOMETRY, lane] = MISS
 
@@ -229,7 +237,7 @@ def _write_shadows(start, size, tags, film, rays, shadow, shadow_path, result, b
         total = block[_SUM * BLOCK + x]
         if total > R(0):
             reach = block[_REACH * BLOCK + x]
-            _write_ray(k, _SHADOW, TO_LIGHT, reach, x, rays, block)
+            _write_ray(k, _SHADOW * BLOCK + x, TO_LIGHT * BLOCK + x, reach, rays, block)
             for row in range(3):
                 shadow[row, k] = block[(_BRINGS + row) * BLOCK + x]
             shadow[3, k] = reach
@@ -253,7 +261,7 @@ def _write_next(start, size, deepest, tags, rays, lanes, lane_tags, result, bloc
             result[2] += 1
         if alive < R(0) or (depth >= deepest and not straight):
             continue
-        _write_ray(k, _START, _ALONG, FAR, x, rays, block)
+        _write_ray(k, _START * BLOCK + x, _ALONG * BLOCK + x, FAR, rays, block)
         for row in range(3):
             lanes[LANE_BETA + row, k] = block[(_BETA + row) * BLOCK + x]
         lanes[LANE_PDF, k] = block[_PDF * BLOCK + x]

@@ -102,17 +102,17 @@ def _take(k, h, x, rays, lanes, lane_tags, keys, records, path_pixel, path_sampl
 @njit(**LEAN)
 def _bring(start, size, block, hits):
     """Bring the block's frames, numbers and lights to the hits."""
-    _bring_rows(MADE, SIDE + 1, 0, start, size, block, hits)
-    _bring_rows(NUMBERS, 4, CHANCE, start, size, block, hits)
-    _bring_rows(CHOSEN, LIGHT_PDF + 1 - WI, WI, start, size, block, hits)
+    _bring_rows(MADE, 0, SIDE + 1, start, size, block, hits)
+    _bring_rows(NUMBERS, CHANCE, CHANCE + 4, start, size, block, hits)
+    _bring_rows(CHOSEN, WI, LIGHT_PDF + 1, start, size, block, hits)
 
 
 @njit(**INLINE)
-def _bring_rows(source, count, target, start, size, block, hits):
-    for row in range(count):
-        into = hits[target + row][start:]
+def _bring_rows(source, first, end, start, size, block, hits):
+    for row in range(first, end):
+        into, at = hits[row][start:], source + (row - first) * BLOCK
         for x in range(size):
-            into[x] = block[source + row * BLOCK + x]
+            into[x] = block[at + x]
 
 
 @njit(**LEAN)

@@ -17,10 +17,20 @@ from fabricusd.reference import arrivals
 from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, arrive, sort_lanes
 from fabricusd.reference.camera import Lens, camera_rays
 from fabricusd.reference.departures import depart, record_first
-from fabricusd.reference.embree import Accelerator
+from fabricusd.reference.embree import (
+    DX,
+    DZ,
+    GEOMETRY,
+    MISS,
+    OX,
+    OZ,
+    ROWS,
+    TFAR,
+    Accelerator,
+)
 from fabricusd.reference.fabric_surface import FabricShader
 from fabricusd.reference.hits import add_emission, prepare
-from fabricusd.reference.lights import build_lights
+from fabricusd.reference.lights import build_lights, share_out
 from fabricusd.reference.preview_surface import (
     EMISSIVE,
     EMISSIVE_MAP,
@@ -54,6 +64,8 @@ ESTIMATORS = {
     "surface": arrivals.SURFACE_ONLY,
     "uniform": arrivals.UNIFORM,
 }
+AIMED = 16
+"""Rays along each side of the picture that find what is to be lit."""
 MOST_LAYERS = 32
 """See-through surfaces that one ray may pass before it is taken as blocked."""
 
@@ -84,7 +96,7 @@ class Tracer:
             raise FabricError("max bounces", f"is {max_bounces}; it must be at least 0")
         self.tables = build_tables(scene)
         self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
-        self.lights, self.dome = build_lights(scene.lights, self.tables.centre, self.tables.radius)
+        self.lights, self.dome = build_lights(scene.lights, self.tables.centre)
         self.surfaces = build_surfaces(scene)
         shining = self.surfaces.table[:, [EMISSIVE, EMISSIVE + 1, EMISSIVE + 2]].any(axis=1)
         self.shines = bool((shining | (self.surfaces.table[:, EMISSIVE_MAP] >= 0)).any())
@@ -106,6 +118,23 @@ class Tracer:
                 self.shaders[k] = FabricShader(fabric, shadow)
                 self.opacity[k] = 1.0 - self.shaders[k].gap
         self.see_through = bool((self.opacity < 1).any())
+
+    def aim(self, lens: Lens, width: int, height: int) -> None:
+        """Choose among lights by what they do to the places that the camera sees."""
+        if len(self.lights) < 2:
+            return
+        x, y = (np.arange(AIMED) * size // AIMED for size in (width, height))
+        pixels = (y[:, None] * width + x).ravel().astype(np.int32)
+        wave = Wave(len(pixels), aovs=False)
+        camera_rays(
+            lens, width, pixels, 0, 1, self.numbers, wave.rays.reshape(len(wave.rays), -1),
+            wave.lanes[LANE_WIDTH : LANE_SPREAD + 1], wave.path_pixel, wave.path_sample,
+        )  # fmt: skip
+        self.accelerator.intersect(wave.rays, len(wave.rays))
+        rows = wave.rays.transpose(1, 0, 2).reshape(ROWS, -1)
+        ends = rows[OX : OZ + 1] + rows[DX : DZ + 1] * rows[TFAR]
+        met = rows.view(np.uint32)[GEOMETRY] != MISS
+        share_out(self.lights, self.dome, ends[:, met].T)
 
     def trace(
         self,

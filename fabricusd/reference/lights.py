@@ -28,9 +28,12 @@ COLUMNS = 20
 
 
 def build_lights(
-    lights: list[Light], centre: NDArray[np.float64], radius: float
+    lights: list[Light], centre: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], Dome]:
-    """The table (n, COLUMNS) float32 and the dome's picture, all domes added into one."""
+    """The table (n, COLUMNS) float32 and the dome's picture, all domes added into one.
+
+    `share_out` gives the lights other chances than equal ones.
+    """
     table = np.zeros((0, COLUMNS), np.float32)
     rows = [_row(light, centre) for light in lights if light.kind != DOME]
     domes = [light for light in lights if light.kind == DOME]
@@ -42,13 +45,21 @@ def build_lights(
         rows.append(row)
     if rows:
         table = np.ascontiguousarray(rows, np.float32)
-        power = np.array([_irradiance(row, dome, radius) for row in rows])
-        total = power.sum()
-        # No light is forgotten altogether: the estimate of its power is rough.
-        share = power / total if total > 0 else np.full(len(rows), 1 / len(rows))
-        share = 0.9 * share + 0.1 / len(rows)
-        table[:, CHANCE] = share / share.sum()
+        table[:, CHANCE] = 1 / len(rows)
     return table, dome
+
+
+def share_out(table: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]) -> None:
+    """Make the chance of choosing a light proportional to how brightly it lights `places`.
+
+    places : (n, 3) [m] around the scene's centre - what the camera sees, say
+    """
+    if not len(places):
+        return
+    power = np.array([_irradiance(row, dome, places) for row in table])
+    if power.sum() > 0:
+        # No light is forgotten altogether: shadows and surfaces' directions are not known.
+        table[:, CHANCE] = 0.8 * power / power.sum() + 0.2 / len(table)
 
 
 def _row(light: Light, centre: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -82,19 +93,24 @@ def _row(light: Light, centre: NDArray[np.float64]) -> NDArray[np.float64]:
     return row
 
 
-def _irradiance(row: NDArray[np.float64], dome: Dome, radius: float) -> float:
-    """Rough irradiance at the scene's centre, for choosing among lights."""
+def _irradiance(row: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]) -> float:
+    """Mean irradiance of surfaces at `places` that face any way that the light reaches."""
     if row[KIND] == DOME:
         h, w = (int(n) for n in dome.size)
         edges = np.cos(np.pi * np.arange(h + 1) / h)
         solid = np.repeat((edges[:-1] - edges[1:]) * 2 * np.pi / w, w)
-        return float((dome.cells[:, :3] @ LUMINANCE) @ solid / 2)
-    brightness = float(row[RED : RED + 3] @ LUMINANCE)
+        return float((dome.cells[:, :3] @ LUMINANCE) @ solid / 4)
+    brightness = float(row[RED : RED + 3] @ LUMINANCE) / 2
     if row[KIND] == DISTANT:
         return brightness * (2 * math.pi * row[AREA] if row[AREA] > 0 else 1.0)
-    distance2 = float(row[P : P + 3] @ row[P : P + 3])
-    share = 0.25 if row[KIND] in (SPHERE, CYLINDER) else 0.5
-    return brightness * share * row[AREA] / max(distance2, 0.25 * radius**2, 1e-12)
+    away = np.asarray(places, np.float64) - row[P : P + 3]
+    # Nearer than its size a light is no brighter.
+    distance2 = np.maximum(np.einsum("ij,ij->i", away, away), max(float(row[AREA]), 1e-12))
+    # The share of its surface that is seen, foreshortened.
+    seen = np.full(len(away), 0.25)
+    if row[KIND] not in (SPHERE, CYLINDER):
+        seen = np.maximum(away @ row[Z : Z + 3], 0.0) / np.sqrt(distance2)
+    return brightness * float(row[AREA]) * float((seen / distance2).mean())
 
 
 def _merge_domes(domes: list[Light]) -> Dome:

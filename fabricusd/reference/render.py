@@ -206,6 +206,7 @@ def render_scene(
     if not len(tracer.tables.triangles):
         scene.note("the scene", "has no triangles to render; only its lights are seen")
     lens = build_lens(camera, width, height, tracer.tables.centre, pixel_filter)
+    tracer.aim(lens, width, height)
     film = Film(width, height, aovs)
     count = worker_count(workers)
     counters = np.zeros((count, 3), np.int64)
