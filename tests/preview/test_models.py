@@ -14,10 +14,11 @@ from bake.meshes import quad_scene
 from fabricusd.bake.garment import garments
 from fabricusd.bake.maps import REGISTRY, Texels
 from fabricusd.bake.recipe import recipe
-from fabricusd.preview.fit import TexelSample, fit, forward
-from fabricusd.preview.judge import LIGHTS, VIEWS, Judge, direction_pairs, hemisphere
+from fabricusd.preview.fit import fit, forward
+from fabricusd.preview.judge import LIGHTS, SKY, VIEWS, Judge, direction_pairs, hemisphere
 from fabricusd.preview.look import Look
 from fabricusd.preview.models import KINDS, Surface, evaluate
+from fabricusd.preview.target import TexelSample
 from fabricusd.preview.texels import KINDS as KINDS_OF_TEXELS
 from fabricusd.preview.texels import NEEDED, _kinds
 from fabricusd.schema import load, preset_names
@@ -100,8 +101,8 @@ def test_a_fit_returns_the_surface_that_made_the_data(kind, monkeypatch):
         base_color_scale=(0.5, 0.8, 1.2), specular_ior=2.0, smooth_scale=0.8, rough_scale=1.0
     )
     wi, wo = direction_pairs()
-    made = forward(kind, truth, texels(), wi[None], wo[None])
-    monkeypatch.setattr("fabricusd.preview.fit.surface.evaluate", lambda *_, **__: made)
+    made = forward(kind, truth, texels(), wi[None], wo[None])[0]
+    monkeypatch.setattr("fabricusd.preview.target.surface.evaluate", lambda *_, **__: made)
     found = fit(kind, texels(), load("linen_plain"))
     assert found.delta_e < 0.3
     assert found.albedo < 0.01
@@ -156,7 +157,8 @@ def test_residuals_are_a_mean_squared_delta_e():
     near = base * 1.01
     squares = judge.delta_e(near) ** 2
     sky = judge.delta_e_of_sky(near) ** 2
-    expected = 0.5 * np.array([0.25, 0.75]) @ (squares.mean(axis=1) + sky.mean(axis=1))
+    each = (1.0 - SKY) * squares.mean(axis=1) + SKY * sky.mean(axis=1)
+    expected = np.array([0.25, 0.75]) @ each
     assert np.sum(judge.residuals(near) ** 2) == pytest.approx(expected, rel=0.1)
     assert judge.score(base) == 0.0
 

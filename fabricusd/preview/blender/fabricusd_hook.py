@@ -180,7 +180,12 @@ def _reflection(nodes: Nodes, network: Network, give: Any) -> None:
     give("Roughness", nodes.math("POWER", nodes.math("MULTIPLY", smooth, rough), 0.25))
     give("Anisotropic", nodes.math("DIVIDE", less, 1.0 - NARROWEST))
     give("IOR", network.constant("specular_ior"))
-    give("Specular Tint", (*network.constant("specular_tint"), 1.0))
+    tint, tints = tuple(network.constant("specular_tint")), network.file("specular_tint")
+    if tints is not None:
+        give("Specular Tint", nodes.vector("MULTIPLY", nodes.image(tints, data=False), tint))
+    else:
+        own = network.fixed("tint_scaled", "in1") or (1.0, 1.0, 1.0)
+        give("Specular Tint", (*(a * b for a, b in zip(tint, own, strict=True)), 1.0))
     # The rougher axis, a quarter turn from the map's direction: (-y, x), coded for a normal map.
     fixed = network.fixed("tangent_x", "in")
     directions = network.file("tangent")
