@@ -13,11 +13,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from fabricusd.bake.bake import Settings, bake
-from fabricusd.fabric import Binding
-from fabricusd.preview.bake_folder import read_bake_folder
+from fabricusd.chart.materials import baked_texels
 from fabricusd.preview.fit import fit
-from fabricusd.preview.texels import NEEDED, draw_texels
 from fabricusd.schema import load
 
 PRESETS = (
@@ -25,19 +22,6 @@ PRESETS = (
     "wool_flannel",
 )  # fmt: skip
 KINDS = ("preview", "openpbr", "principled")
-SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n" + (
-    "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
-)
-
-
-def texels_of(preset, threads, folder):
-    scene = folder / "square.obj"
-    scene.write_text(SQUARE)
-    binding = Binding(fabric=load(preset), threads_per_uv=(threads, threads))
-    out = folder / f"{preset}_{threads:g}"
-    bake(scene, out, Settings(resolution=64, maps=NEEDED), fabric=binding)
-    maps = read_bake_folder(out).garments[0]
-    return draw_texels(maps, 0, maps.lays[0])
 
 
 def main() -> None:
@@ -46,7 +30,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         for preset in sys.argv[1:] or PRESETS:
             for words, threads in (("of whole repeats", 6400.0), ("8 a thread", 8.0)):
-                texels = texels_of(preset, threads, Path(name))
+                texels = baked_texels(load(preset), Path(name), threads)
                 for kind in KINDS:
                     f = fit(kind, texels, load(preset))
                     print(

@@ -7,7 +7,8 @@ place on a thread counts by the area that it shows, `max(n.wo, 0)/n.N` times whe
 it visible; it sends `f_s cos theta_i` where the march finds it lit (a thread's own dark side is in
 `f_s`). The model sends `f_s P cos theta_i / Q` times M, times g, or times both, at the same places;
 g is marched over round threads (level `thread`) or flat ones (level `weave`). `<g>` is its mean
-over the threads, each place counted by the light that its slope would catch.
+over the threads, or over those of its own set, each place counted by the light that its slope would
+catch.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from fabricusd.chart.shadows import WOVEN
 from fabricusd.fabric import Fabric
 from fabricusd.schema import load
 
-VARIANTS = ("neither", "M", "g", "M g", "M g / <g>", "g, flat threads", "M g, flat threads")
+VARIANTS = (
+    "neither", "M", "g", "M g", "M g / <g>", "M g / <g> of its set", "g, flat", "M g, flat",
+)  # fmt: skip
 
 Array = np.ndarray
 
@@ -84,12 +87,17 @@ def compare(fabric: Fabric, pairs: int, count: int) -> Array:
         q = float(plain.normalization(fabric, wi[None], wo[None])[0])
         base = f * p / q
         even = lit * caught.sum() / max(float((lit * caught).sum()), 1e-3)
+        own = np.zeros(count)
+        for which in (0, 1):
+            mine = on & (hit.set == which)
+            let = max(float((lit * caught)[mine].sum()), 1e-3)
+            own[mine] = (lit * caught[mine].sum() / let)[mine]
         rows.append(
             [
                 geometry,
                 *(
                     float((base * x).mean())
-                    for x in (1.0, m, lit, m * lit, m * even, flat, m * flat)
+                    for x in (1.0, m, lit, m * lit, m * even, m * own, flat, m * flat)
                 ),
             ]
         )
@@ -102,9 +110,10 @@ def main() -> None:
     parser.add_argument("--places", type=int, default=3000)
     options = parser.parse_args()
     print("Mean absolute difference from the geometry, over the geometry's mean; in brackets the")
-    print("model's mean over the geometry's. Best in each row in bold.\n")
-    print("| preset | " + " | ".join(VARIANTS) + " |")
-    print("|---|" + "---|" * len(VARIANTS))
+    print("model's mean over the geometry's. Best in each row in bold. Last, for the fourth to the")
+    print("sixth: mean absolute difference of level `weave` from `far`, over far's mean.\n")
+    print("| preset | " + " | ".join(VARIANTS) + " | off far |")
+    print("|---|" + "---|" * (1 + len(VARIANTS)))
     for name in WOVEN:
         found = compare(load(name), options.pairs, options.places)
         true = found[:, 0]
@@ -113,6 +122,9 @@ def main() -> None:
         cells = [f"{e:.2f} ({x:.2f})" for e, x in zip(errors, means, strict=True)]
         best = int(errors.argmin())
         cells[best] = f"**{cells[best]}**"
+        far = found[:, 2]
+        off = np.abs(found[:, 4:7] - far[:, None]).mean(axis=0) / far.mean()
+        cells.append(", ".join(f"{x:.2f}" for x in off))
         print(f"| {name} | " + " | ".join(cells) + " |")
 
 

@@ -200,6 +200,21 @@ def make_cylinders(folder: Path) -> Path:
     return path
 
 
+def _drum(stage: Usd.Stage, radius: float, height: float, edge: float) -> None:
+    """What the draped cloth lies on, 4 mm inside it."""
+    gap = 0.004
+    phi = np.linspace(0, 2 * math.pi, 65)[:-1, None]
+    bend = np.linspace(0, math.pi / 2, 7)
+    r = np.concatenate([[radius], radius - edge + edge * np.cos(bend), [0.001]]) - gap
+    y = np.concatenate([[0.0], height - edge + edge * np.sin(bend), [height]]) - gap
+    r, y = np.maximum(r, 0.001), np.maximum(y, 0.0)
+    points = np.stack([r * np.sin(phi), np.broadcast_to(y, (64, len(y))), r * np.cos(phi)], axis=-1)
+    u, v = np.meshgrid(np.linspace(0, 1, 65), np.linspace(0, 1, len(y)), indexing="ij")
+    grey(stage, "/World/Looks/Drum", (0.32, 0.31, 0.30), 0.9)
+    drum = define_grid(stage, "/World/Drum", Grid(points, np.stack([u, v], axis=-1), around=True))
+    bind(stage, drum, "/World/Looks/Drum")
+
+
 def make_drape(folder: Path, *, cells: int = 74, factor: int = 3, steps: int = 420) -> Path:
     """A cloth that hangs over a drum; 98 568 triangles at the usual size."""
     path = folder / "drape.usda"
@@ -217,12 +232,15 @@ def make_drape(folder: Path, *, cells: int = 74, factor: int = 3, steps: int = 4
         axis=-1,
     )
     rest = np.stack([x, z], axis=-1)
-    hung = simulate(start, rest, drum_body(radius, height, 0.03), steps=steps)
+    hung = simulate(
+        start, rest, drum_body(radius, height, 0.03), steps=steps, passes=1, substeps=12
+    )
     hung[..., 1] += 0.003
     fine = finer(hung, factor)
     uv = finer(np.stack([x, -z], axis=-1), factor)
     mesh = define_grid(stage, "/World/Cloth", Grid(fine, uv))
     dress(stage, mesh, "silk_shot")
+    _drum(stage, radius, height, 0.03)
     camera(stage, (0.55, 0.95, 1.75), (0.0, 0.24, 0.0), 60.0)
     stage.GetRootLayer().Save()
     return path

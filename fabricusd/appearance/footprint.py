@@ -1,15 +1,17 @@
 """Level `auto`: how much of the cloth to model, from the size of a pixel on it.
 
 The pixel's extent is measured in threads, weave coordinates: `far` where it covers more than about
-a repeat, `weave` where threads resolve, `thread` where a thread is wider than about four pixels.
-Between them the levels are mixed by chance, with weights that are continuous in the extent; since
-the mean of each level over what the next one cannot see is that next one, the mean of a picture
-does not jump. `docs/model.md` section 8.
+a repeat, `weave` where threads resolve, `thread` where a thread is wider than a pixel, as `Limits`
+has it. Between them the levels are mixed by chance, with weights that are continuous in the extent;
+since the mean of each level over what the next one cannot see is that next one, the mean of a
+picture does not jump. Source: `docs/model.md` section 8, which has four pixels a thread: the
+satin's `weave` is off by 1.3 of the mean where a thread is two pixels wide, `chart.level_errors`.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -24,44 +26,57 @@ from fabricusd.fabric import Fabric
 LEVELS = ("far", "weave", "thread")
 FAR, WEAVE, THREAD = range(3)
 
-REPEATS = 1.0
-"""Repeats under a pixel where `far` and `weave` are equally likely."""
 
-PIXELS = 4.0
-"""Pixels on a thread where `weave` and `thread` are equally likely."""
+class Limits(NamedTuple):
+    """Where level `auto` goes from one level to the next.
 
-OCTAVES = 1.0
-"""Half the width of either transition: from half to twice the extent it is centred on."""
+    repeats : repeats under a pixel where `far` and `weave` are equally likely
+    pixels : pixels on a thread where `weave` and `thread` are equally likely
+    octaves : half the width of either transition: at 1 it reaches from half to twice the extent
+        that it is centred on, at 0 it is a step
+    """
+
+    repeats: float = 1.0
+    pixels: float = 1.0
+    octaves: float = 1.0
+
+    def row(self, fabric: Fabric) -> tuple[float, float, float, float]:
+        """What `level_weights` takes for a fabric."""
+        ends, picks = true_repeat(fabric)
+        thread = math.inf if self.pixels <= 0 else 1.0 / self.pixels
+        return self.repeats * ends, self.repeats * picks, thread, self.octaves
+
+
+DEFAULT = Limits()
+"""The means of `far` and `weave` over a pixel are within a few per cent of `thread`'s there, on the
+satin within half of the mean at the last."""
 
 
 @njit(**INLINE)
-def _ramp(R, x):
-    """Smooth step in log2 of `x`, 0.5 at 1 and flat OCTAVES away on both sides; NaN stays."""
-    if x <= R(2.0**-OCTAVES):
-        return R(0)
-    if x >= R(2.0**OCTAVES):
-        return R(1)
-    t = R(0.5) + real.log(R, x) * R(0.5 / OCTAVES / np.log(2.0))
+def _ramp(R, x, octaves):
+    """Smooth step in log2 of `x`, 0.5 at 1 and flat `octaves` away on both sides."""
+    x = min(max(x, R(1e-30)), R(1e30))
+    t = R(0.5) + real.log(R, x) * R(0.5 / np.log(2.0)) / max(octaves, R(1e-3))
+    t = min(max(t, R(0)), R(1))
     return t * t * (R(3) - R(2) * t)
 
 
 @njit(**INLINE)
-def level_weights(R, ends, picks, extent_u, extent_v):
+def level_weights(R, far_u, far_v, thread, octaves, extent_u, extent_v):
     """(far, weave, thread) probabilities, which sum to 1.
 
-    ends, picks : the true repeat, in threads; extent_u, extent_v : of the pixel, in threads, along
-    U and V. `far` asks for a whole repeat in *both* directions: at a grazing view a pixel is long
-    and thin, and the threads across its thin side are still seen. `thread` asks both likewise.
-    NaN makes all three NaN.
+    far_u, far_v, thread, octaves : `Limits.row`; extent_u, extent_v : of the pixel, in threads,
+    along U and V. `far` asks for enough in *both* directions: at a grazing view a pixel is long and
+    thin, and the threads across its thin side are still seen. `thread` asks both likewise. NaN
+    makes all three NaN.
     """
     if not extent_u + extent_v >= R(0):
         nan = R(np.nan)
         return nan, nan, nan
-    far = _ramp(R, min(extent_u / ends, extent_v / picks) / R(REPEATS))
-    # 1/0 is infinity here: a pixel without extent sees a thread infinitely wide.
-    thread = _ramp(R, R(1.0 / PIXELS) / max(extent_u, extent_v))
-    # The two never meet while a repeat is at least one thread; see the test.
-    return far, R(1) - far - thread, thread
+    far = _ramp(R, min(extent_u / far_u, extent_v / far_v), octaves)
+    # A pixel without extent sees a thread infinitely wide: 1/0 is infinity here.
+    close = (R(1) - far) * _ramp(R, thread / max(extent_u, extent_v), octaves)
+    return far, R(1) - far - close, close
 
 
 @njit(**INLINE)
@@ -75,10 +90,11 @@ def pick_level(R, far, weave, number):
 
 
 @njit(parallel=True, **KERNEL)
-def _weights_all(R, ends, picks, extents, out):
+def _weights_all(R, row, extents, out):
+    far_u, far_v, thread, octaves = row
     for k in prange(extents.shape[0]):
         out[k, 0], out[k, 1], out[k, 2] = level_weights(
-            R, ends, picks, extents[k, 0], extents[k, 1]
+            R, far_u, far_v, thread, octaves, extents[k, 0], extents[k, 1]
         )
 
 
@@ -88,7 +104,7 @@ def extent_of(across: ArrayLike, down: ArrayLike) -> NDArray[np.float64]:
     return np.hypot(np.asarray(across, np.float64), np.asarray(down, np.float64))
 
 
-def weights(fabric: Fabric, extents: ArrayLike) -> NDArray[np.float64]:
+def weights(fabric: Fabric, extents: ArrayLike, limits: Limits = DEFAULT) -> NDArray[np.float64]:
     """(n, 3) probabilities of `far`, `weave`, `thread` for pixels of `extents` (n, 2) in threads.
 
     Infinite extents, at the horizon, are `far`. Raises `FabricError` for negative ones and NaN.
@@ -104,7 +120,6 @@ def weights(fabric: Fabric, extents: ArrayLike) -> NDArray[np.float64]:
             f"has {int(bad.sum())} of {len(asked)} rows that are negative or not a number, the "
             f"first at {k}: {asked[k].tolist()}; they must be at least 0",
         )
-    ends, picks = true_repeat(fabric)
     out: NDArray[Any] = np.empty((len(asked), 3))
-    _weights_all(np.float64, float(ends), float(picks), asked, out)
+    _weights_all(np.float64, tuple(float(x) for x in limits.row(fabric)), asked, out)
     return out

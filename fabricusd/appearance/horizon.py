@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric
 from fabricusd.appearance.coverage import GAP
-from fabricusd.appearance.frame import WARP
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.height import crown_of, steepest
 from fabricusd.appearance.horizon_lookup import horizon_at
 from fabricusd.appearance.real import KERNEL, LEAN
@@ -141,7 +141,7 @@ def mean_light(
     softness: float,
     table: NDArray[np.uint8] | None,
 ) -> NDArray[np.float64]:
-    """(ELEVATIONS, azimuths + 1) share of the light on the threads that `g` lets arrive.
+    """(2, ELEVATIONS, azimuths + 1) share of the light on each set's threads that `g` lets arrive.
 
     Each place counts by the light that its slope would catch, max(n_t.wi, 0). Rows are even in the
     square root of the sine of the light's elevation, columns in the diamond angle, the last being
@@ -160,37 +160,38 @@ def mean_light(
     else:
         entries = np.ascontiguousarray(table[cells[:, 0], cells[:, 1]])
     azimuths = entries.shape[-1]
-    normal, area = _texel_normals(cloth, cells, entries.shape[1:4])
+    normal, area, sets = _texel_normals(cloth, cells, entries.shape[1:4])
     sine = entries.reshape(-1, azimuths) / 255.0
     # Not quite level: flat threads catch nothing of that.
     z = np.maximum(np.linspace(0.0, 1.0, ELEVATIONS) ** 2, 1e-3)
-    found = np.empty((ELEVATIONS, azimuths + 1))
+    found = np.empty((2, ELEVATIONS, azimuths + 1))
     for a, direction in enumerate(_diamond_directions(azimuths)):
         for row, up in enumerate(z):
             flat = math.sqrt(1.0 - up * up)
             caught = area * np.maximum(normal @ (*(flat * direction), up), 0.0)
             above = up * np.sqrt(1.0 - sine[:, a] ** 2) - flat * sine[:, a]
             t = np.clip(above / softness + 0.5, 0.0, 1.0)
-            total = caught.sum()
-            lit = float((caught * t * t * (3.0 - 2.0 * t)).sum())
-            found[row, a] = lit / total if total > 0 else 1.0
+            let = caught * t * t * (3.0 - 2.0 * t)
+            for which in (WEFT, WARP):
+                total = float(caught[sets == which].sum())
+                found[which, row, a] = let[sets == which].sum() / total if total > 0 else 1.0
     # Straight down nothing is in the way, whatever the edge's width makes of a steep place.
-    found[-1] = 1.0
-    found[:, azimuths] = found[:, 0]
+    found[:, -1] = 1.0
+    found[:, :, azimuths] = found[:, :, 0]
     return np.maximum(found, LEAST_LIGHT)
 
 
 def _texel_normals(
     cloth: CompiledFabric, cells: NDArray[np.int64], shape: tuple[int, ...]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(texels, 3) normals n_t of the threads at the table's texels, (texels,) their areas."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """(texels, 3) normals n_t of the threads at the table's texels, (texels,) areas and sets."""
     texels = len(cells) * math.prod(shape)
     psi0, sets, area = np.zeros(texels), np.zeros(texels, np.int64), np.zeros(texels)
     _describe_texels(cloth, cells, shape, psi0, sets, area)
     along, up = np.sin(psi0), np.cos(psi0)
     warp = sets == WARP
     normal = np.stack((np.where(warp, 0.0, along), np.where(warp, along, 0.0), up), axis=1)
-    return normal, area
+    return normal, area, sets
 
 
 @njit(**KERNEL)

@@ -19,8 +19,8 @@ from fabricusd.appearance.conserving_sampling import (
     conserving_direction,
     conserving_point_density,
     conserving_point_direction,
-    conserving_sampling_tables,
 )
+from fabricusd.appearance.conserving_shares import conserving_sampling_tables
 from fabricusd.appearance.far import far_value
 from fabricusd.appearance.frame import to_thread
 from fabricusd.appearance.levels import across_at, point_value
@@ -32,17 +32,16 @@ from fabricusd.appearance.multiple import (
 )
 from fabricusd.appearance.quadrature import Rule
 from fabricusd.appearance.real import LEAN, cos, sin
+from fabricusd.appearance.share_fit import AZIMUTHS, ELEVATIONS
+from fabricusd.appearance.stretches import STRETCH_COLUMNS
 from fabricusd.appearance.surface_sampling import (
-    AZIMUTHS,
-    ELEVATIONS,
-    STRETCH_COLUMNS,
     SamplingTables,
     far_density,
     far_direction,
     point_density,
     point_direction,
-    sampling_tables,
 )
+from fabricusd.appearance.surface_shares import sampling_tables
 from fabricusd.appearance.surface_tables import SurfaceTables, surface_tables
 from fabricusd.appearance.thread_terms import ALBEDO_B, ALBEDO_G, ALBEDO_R, CONSERVING, MODEL
 from fabricusd.fabric import PILE_ANGLE, Fabric
@@ -85,13 +84,14 @@ def surface_law(
     kind = MIXED if len(models) == 2 else CONSERVING_ONLY if models == {True} else PUBLISHED_ONLY
     published = surface_tables(fabric, precision=precision, rule=rule)
     nothing = np.zeros((0, STRETCH_COLUMNS), precision)
-    lobes = SamplingTables(nothing, np.zeros((ELEVATIONS, AZIMUTHS, 0), precision))
+    none = np.zeros((ELEVATIONS, AZIMUTHS, 0), precision)
+    lobes = SamplingTables(nothing, none, none)
     if kind != CONSERVING_ONLY:
         lobes = sampling_tables(fabric, published)
     if kind == PUBLISHED_ONLY:
         conserving = single_tables(fabric, precision=precision, rule=rule)
         shares = np.zeros((ELEVATIONS, AZIMUTHS, 2), precision)
-        both = ConservingSamplingTables(nothing, shares, 0)
+        both = ConservingSamplingTables(nothing, shares, none, 0)
     else:
         conserving = conserving_tables(fabric, precision=precision, multiple=multiple, rule=rule)
         both = conserving_sampling_tables(fabric, conserving)

@@ -23,11 +23,12 @@ KERNEL: dict[str, Any] = {
     "nogil": True,
     "error_model": "numpy",
     "fastmath": {"contract", "reassoc", "arcp", "nsz"},
+    "no_cfunc_wrapper": True,
 }
 # For kernels that allocate no array: numba then does not count references. In a function that hands
 # a compiled fabric on to another, counting its arrays cost five times the work itself.
 LEAN: dict[str, Any] = {**KERNEL, "_nrt": False}
-INLINE: dict[str, Any] = {**LEAN, "forceinline": True}
+INLINE: dict[str, Any] = {**LEAN, "forceinline": True, "cache": False}
 # Only fused multiply-add here: reordering would undo the two-part reductions below.
 _EXACT: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "forceinline": True}
 _inner = register_jitable(**_EXACT)

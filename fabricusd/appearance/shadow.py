@@ -10,8 +10,8 @@ horizon : a table of the horizon by place on the thread and azimuth, [Max1988]; 
 traced  : the height field is marched along the ray, the answer that the others are measured by
 
 What a cloth sends back is multiplied by `shade`. By `peak` that is `g`, as the thesis has it. By
-`horizon` and `traced` it is `g` over its mean over the cloth: the masking term already holds the
-mean of this shade, and `g` says where it falls. See docs/decisions/004.
+`horizon` and `traced` it is `g` over its mean over the threads of the same set: the masking term
+already holds the mean of this shade, and `g` says where it falls. See docs/decisions/004.
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ from fabricusd.appearance.place_blocks import (
     LIT,
     REAL_ROWS,
     SECOND,
+    SET,
     SHARES,
     X,
     look_up_block,
@@ -88,8 +89,8 @@ class Shadow(NamedTuple):
     table : (I, J, slots, along, across, azimuths) uint8 - sine of the horizon's elevation times
         255, see `horizon`; one zero for the other methods
     texels : the same memory in one row
-    mean : (elevations, azimuths + 1) real - what `shade` divides by, see `horizon.mean_light`; ones
-        for `none` and `peak`
+    mean : (2, elevations, azimuths + 1) real - what `shade` divides by on each set, see
+        `horizon.mean_light`; ones for `none` and `peak`
     """
 
     method: int
@@ -139,7 +140,7 @@ def compile_shadow(
         else:
             table = found_table
             softness = softness or horizon_error(cloth, rounded, highest, table)
-    mean = np.ones((ELEVATIONS, AZIMUTHS + 1))
+    mean = np.ones((2, ELEVATIONS, AZIMUTHS + 1))
     if method in ("horizon", "traced"):
         kept = table if method == "horizon" else None
         edge = softness if method == "horizon" and softness else TRACED_SOFTNESS
@@ -164,16 +165,16 @@ def compile_shadow(
 
 
 @njit(**INLINE)
-def mean_lit(R, shadow, x, y, z):
-    """Mean of `g` over the cloth for light from (x, y, z) above it."""
+def mean_lit(R, shadow, which, x, y, z):
+    """Mean of `g` over the threads of a set for light from (x, y, z) above the cloth."""
     row, column, a, b = _cell_of_mean(R, shadow, x, y, z)
-    return _between_means(shadow, np.uintp(row), np.uintp(column), a, b)
+    return _between_means(shadow, which, np.uintp(row), np.uintp(column), a, b)
 
 
 @njit(**INLINE)
 def _cell_of_mean(R, shadow, x, y, z):
     """(row, column) of the mean's table for light from (x, y, z), and the shares of the next."""
-    rows, columns = shadow.mean.shape[0], shadow.mean.shape[1]
+    rows, columns = shadow.mean.shape[1], shadow.mean.shape[2]
     e = math.sqrt(min(max(z, R(0)), R(1))) * R(rows - 1)
     turn = diamond(R, x, y) * R(0.25 * (columns - 1))
     row, column = min(np.int32(e), np.int32(rows - 2)), min(np.int32(turn), np.int32(columns - 2))
@@ -181,13 +182,14 @@ def _cell_of_mean(R, shadow, x, y, z):
 
 
 @njit(**INLINE)
-def _between_means(shadow, row, column, a, b):
-    """The mean between four entries of its table."""
+def _between_means(shadow, which, row, column, a, b):
+    """The mean between four entries of its set's table; in a gap it is nobody's."""
+    k = np.uintp(1 if which == WARP else 0)
     ahead, beside = row + np.uintp(1), column + np.uintp(1)
-    low = shadow.mean[row, column]
-    low += (shadow.mean[row, beside] - low) * b
-    high = shadow.mean[ahead, column]
-    high += (shadow.mean[ahead, beside] - high) * b
+    low = shadow.mean[k, row, column]
+    low += (shadow.mean[k, row, beside] - low) * b
+    high = shadow.mean[k, ahead, column]
+    high += (shadow.mean[k, ahead, beside] - high) * b
     return low + (high - low) * a
 
 
@@ -200,7 +202,7 @@ def shade(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
     g = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
     if shadow.method < HORIZON or not g > R(0):
         return g
-    return g / mean_lit(R, shadow, x, y, z)
+    return g / mean_lit(R, shadow, which, x, y, z)
 
 
 @njit(**INLINE)
@@ -339,7 +341,7 @@ def mean_block(R, shadow, wi, begin, size, ints, reals):
     for k in range(size):
         row, column = np.uintp(ints[FIRST + k]), np.uintp(ints[SECOND + k])
         reals[LIT + k] /= _between_means(
-            shadow, row, column, reals[SHARES + k], reals[SHARES + BLOCK + k]
+            shadow, ints[SET + k], row, column, reals[SHARES + k], reals[SHARES + BLOCK + k]
         )
 
 
@@ -352,7 +354,7 @@ def _one_by_one(R, cloth, shadow, shaded, uv, begin, wi, out):
         which, thread, s, w, _, length = find(R, cloth, u, v)
         g = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
         if shaded and shadow.method >= HORIZON and g > R(0):
-            g /= mean_lit(R, shadow, x, y, z)
+            g /= mean_lit(R, shadow, which, x, y, z)
         out[k] = g
 
 

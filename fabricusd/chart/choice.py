@@ -8,15 +8,20 @@ to be as hard as the hardest one.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from fabricusd.appearance.footprint import Limits
 from fabricusd.errors import FabricError
 from fabricusd.files import readable_file, whole_file
 from fabricusd.reference.scene import FabricSurface, Scene
+
+BOUNDS = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
+"""Errors that the levels' limits are measured for."""
 
 TABLE = Path(__file__).with_name("choice.json")
 
@@ -37,12 +42,27 @@ class Choice:
 @cache
 def read_table(path: Path = TABLE) -> dict[str, Front]:
     """Preset -> front of its shadowing methods; FabricError for a file that is no such table."""
+    return {
+        name: {method: (float(c), float(e)) for method, (c, e) in front.items()}
+        for name, front in _part(path, "shadows").items()
+    }
+
+
+@cache
+def read_limits(path: Path = TABLE) -> dict[str, dict[str, dict[float, float]]]:
+    """Preset -> level -> bound -> limit, as `level_errors.coarsest` has them."""
+    return {
+        name: {level: {float(b): float(x) for b, x in limits} for level, limits in found.items()}
+        for name, found in _part(path, "levels").items()
+    }
+
+
+def _part(path: Path, name: str) -> dict[str, Any]:
     try:
-        content: dict[str, Any] = json.loads(readable_file(path).read_text(encoding="utf-8"))
-        return {
-            name: {method: (float(c), float(e)) for method, (c, e) in front.items()}
-            for name, front in content["shadows"].items()
-        }
+        content = json.loads(readable_file(path).read_text(encoding="utf-8"))[name]
+        if all(isinstance(found, dict) for found in content.values()):
+            return dict(content)
+        raise ValueError(f"'{name}' holds no tables")
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise FabricError(str(path), f"is no table of choices: {error}") from None
 
@@ -86,6 +106,33 @@ def choose_shadow(names: Sequence[str], max_error: float, path: Path = TABLE) ->
     return max(choices, key=lambda c: c.cost)
 
 
+def choose_limits(names: Sequence[str], max_error: float, path: Path = TABLE) -> tuple[Limits, str]:
+    """Where level `auto` changes for cloths of these names, and why, for people.
+
+    Each level is taken as soon as its error is within the bound, without transition: rms over the
+    pixels, over the cloth's mean, against level `thread` filtered. All cloths take the limits of
+    the one that asks most.
+    """
+    table = read_limits(path)
+    chosen = [_within(table[n], max_error) for n in ([n for n in names if n in table] or table)]
+    if any(n not in table for n in names):
+        chosen = [_within(found, max_error) for found in table.values()]
+    repeats, pixels = max(c[0] for c in chosen), min(c[1] for c in chosen)
+    parts = [
+        f"far from {repeats:.3g} repeats a pixel" if repeats < math.inf else "far never",
+        f"thread from {pixels:.3g} pixels a thread" if pixels > 0 else "else thread",
+    ]
+    why = ", ".join(parts) + f": the levels' errors beyond are within {max_error:g}"
+    return Limits(repeats=repeats, pixels=pixels, octaves=0.0), why
+
+
+def _within(found: Mapping[str, Mapping[float, float]], max_error: float) -> tuple[float, float]:
+    """(repeats, pixels) by the largest bound of the table that is no larger than `max_error`."""
+    far = {b: x for b, x in found["far"].items() if b <= max_error}
+    weave = {b: x for b, x in found["weave"].items() if b <= max_error}
+    return far[max(far)] if far else math.inf, weave[max(weave)] if weave else 0.0
+
+
 def presets_in(scene: Scene) -> tuple[str, ...]:
     """A name for each fabric in a scene: its own where it is that preset unchanged, else ""."""
     from fabricusd.schema import load, preset_names
@@ -96,10 +143,12 @@ def presets_in(scene: Scene) -> tuple[str, ...]:
 
 
 def write_table(path: Path, quick: bool = True) -> None:
-    """Measure every woven preset's shadowing methods, and write the table."""
+    """Measure every woven preset's shadowing methods and every preset's levels; write the table."""
     from fabricusd.appearance.shadow import METHODS
     from fabricusd.chart import shadows
+    from fabricusd.chart.level_errors import coarsest
     from fabricusd.chart.panel import Row
+    from fabricusd.schema import load, preset_names
 
     found: dict[str, dict[str, tuple[float, float]]] = {}
     rows: list[Row] = shadows.run(quick, shadows.WOVEN)
@@ -109,5 +158,7 @@ def write_table(path: Path, quick: bool = True) -> None:
             found.setdefault(row.group, {})[row.method] = (cost, error)
     # On pile every method gives 1.
     found["velvet"] = {m: (found[shadows.WOVEN[0]][m][0], 0.0) for m in METHODS}
+    levels = {name: coarsest(load(name), BOUNDS) for name in preset_names()}
+    text = json.dumps({"shadows": found, "levels": levels}, indent=1)
     with whole_file(path) as temporary:
-        temporary.write_text(json.dumps({"shadows": found}, indent=1) + "\n", encoding="utf-8")
+        temporary.write_text(text + "\n", encoding="utf-8")

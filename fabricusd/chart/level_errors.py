@@ -7,17 +7,27 @@ exact for pixels that lie anywhere: root mean squares over all places, over the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.footprint import LEVELS, weights
+from fabricusd.appearance.compiled import true_repeat
+from fabricusd.appearance.footprint import DEFAULT, LEVELS, Limits, weights
 from fabricusd.chart.cloth_picture import FINE, TURN, View, cloth_spectrum
 from fabricusd.fabric import Fabric
 
 Floats = NDArray[np.float64]
 Direction = tuple[float, float, float]
+
+WIDTHS = np.geomspace(0.02, 20.0, 121)
+"""Of a pixel in threads: from 50 pixels on a thread to 20 threads under a pixel."""
+
+LIGHTS: tuple[Direction, ...] = ((0.48, 0.36, 0.8), (-0.6, 0.0, 0.8), (0.0, 0.8, 0.6))
+"""Directions to the light that a cloth is measured under."""
+
+TO_EYE: Direction = (0.0, -0.28, 0.96)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,7 +59,12 @@ class Zoom:
 
 
 def zoom(
-    fabric: Fabric, widths: Floats, wi: Direction, wo: Direction, shadow: str = "horizon"
+    fabric: Fabric,
+    widths: Floats,
+    wi: Direction,
+    wo: Direction,
+    shadow: str = "horizon",
+    limits: Limits = DEFAULT,
 ) -> Zoom:
     """Levels and `auto` at pixels of `widths` [threads], lit from wi and seen from wo."""
     view = View(fabric=fabric, wi=wi, wo=wo, a=1, b=0, shadow=shadow)
@@ -67,7 +82,30 @@ def zoom(
         products[n] = (weighted @ missing.conj().T).real
         inside[n] = np.sqrt(np.maximum((power * (1.0 - square)).sum(axis=(1, 2)), 0.0))
     extents = np.stack((widths, widths), axis=1)
-    return Zoom(widths=widths, products=products, inside=inside, weights=weights(fabric, extents))
+    shares = weights(fabric, extents, limits)
+    return Zoom(widths=widths, products=products, inside=inside, weights=shares)
+
+
+def coarsest(fabric: Fabric, bounds: Sequence[float]) -> dict[str, list[list[float]]]:
+    """How coarse each level may be taken: "far" and "weave" -> [bound, limit], the widest first.
+
+    The limit of `far` is in repeats under a pixel, of `weave` in pixels on a thread; there and at
+    every coarser width the error is within the bound under all LIGHTS. Without shadows. A bound
+    that is not met at any of WIDTHS is left out.
+    """
+    found = [zoom(fabric, WIDTHS, wi, TO_EYE, "none") for wi in LIGHTS]
+    worst = np.max([z.errors for z in found], axis=0)
+    repeat = max(true_repeat(fabric))
+    limits: dict[str, list[list[float]]] = {"far": [], "weave": []}
+    # A hair beyond the width itself, so that this one is on the coarser side.
+    in_units = {"far": 0.999 * WIDTHS / repeat, "weave": 1.001 / WIDTHS}
+    for bound in sorted(bounds, reverse=True):
+        for level, unit in in_units.items():
+            over = np.flatnonzero(worst[:, LEVELS.index(level)] > bound)
+            first = int(over[-1]) + 1 if len(over) else 0
+            if first < len(WIDTHS):
+                limits[level].append([bound, float(f"{unit[first]:.5g}")])
+    return limits
 
 
 def _spectrum(view: View, level: str) -> NDArray[np.complex128]:

@@ -9,7 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import fabricusd
-from fabricusd.chart.choice import cheapest, read_table
+from fabricusd.chart.choice import BOUNDS as LEVEL_BOUNDS
+from fabricusd.chart.choice import cheapest, choose_limits, read_limits, read_table
 from fabricusd.chart.panel import Panel, Row, relative_costs
 from fabricusd.files import whole_file
 
@@ -60,6 +61,9 @@ def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: st
         "quartiles over repeats. A method is dominated when another is no dearer and no worse, and "
         "better in either by more than both spreads. `charts.csv` and `charts.json` hold every "
         "figure, absolute costs included.\n",
+        "## What --max-error takes\n",
+        *_choices(),
+        *_limits(),
     ]
     for name, (panel, rows) in charts.items():
         parts += [
@@ -69,7 +73,6 @@ def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: st
             f"![{panel.title}]({images}{name}.png)\n",
             *_tables(rows),
         ]
-    parts += ["## What --max-error takes\n", *_choices()]
     if sheets:
         parts.append("## The thesis's pictures\n")
     for name, about in sheets.items():
@@ -80,7 +83,11 @@ def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: st
 def _tables(rows: Sequence[Row]) -> list[str]:
     """The front's rows as a table, the others in a line a group."""
     relative = relative_costs(rows)
-    lines = ["| measured on | method on the front | cost | error |", "|---|---|---|---|"]
+    lines = [
+        "<details><summary>The front</summary>\n",
+        "| measured on | method on the front | cost | error |",
+        "|---|---|---|---|",
+    ]
     beaten: dict[str, list[str]] = {}
     last = ""
     for row, cost in zip(rows, relative, strict=True):
@@ -94,7 +101,7 @@ def _tables(rows: Sequence[Row]) -> list[str]:
             )
         else:
             beaten.setdefault(row.group, []).append(f"{row.method} (by {row.dominated_by})")
-    lines.append("")
+    lines.append("\n</details>\n")
     if beaten:
         lines.append("<details><summary>Dominated</summary>\n")
         lines += [f"- {group}: {'; '.join(methods)}" for group, methods in beaten.items()]
@@ -123,6 +130,24 @@ def _choices() -> list[str]:
             c = cheapest(front, bound)
             star = "*" if c.error > bound else ""
             cells.append(f"{c.method}{star} ({number(c.cost / least)}×, {number(c.error)})")
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    return [*lines, ""]
+
+
+def _limits() -> list[str]:
+    """Where level `auto` changes for each preset at some bounds, from the table that is in use."""
+    lines = [
+        "Level `auto` with a bound: `far` from so many repeats under a pixel on / `thread` from so "
+        "many pixels on a thread on, `weave` between. There and at every wider pixel the level is "
+        "within the bound of `thread` filtered: rms over the pixels, over the cloth's mean, the "
+        "worst of three lights, without shadows. Without a bound the levels change at 1 / 1, "
+        "gradually.\n",
+        "| preset | " + " | ".join(f"{b:g}" for b in LEVEL_BOUNDS) + " |",
+        "|---|" + "---|" * len(LEVEL_BOUNDS),
+    ]
+    for name in read_limits():
+        found = [choose_limits([name], bound)[0] for bound in LEVEL_BOUNDS]
+        cells = [f"{number(x.repeats)} / {number(x.pixels)}" for x in found]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return [*lines, ""]
 

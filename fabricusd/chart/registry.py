@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fabricusd.chart import baked, pictures, reflectance, shadows, zoom
+from fabricusd.chart import baked, materials, pictures, reflectance, shadows, zoom
 from fabricusd.chart.panel import Panel
 
 PANELS: tuple[Panel, ...] = (
@@ -11,4 +11,5 @@ PANELS: tuple[Panel, ...] = (
     zoom.PANEL,
     shadows.PANEL,
     *baked.PANELS,
+    materials.PANEL,
 )

@@ -84,8 +84,8 @@ def run(options: argparse.Namespace) -> int:
             options.scene, options.output, fabric=fabric, camera=options.camera,
             width=options.width, height=options.height, spp=options.spp, noise=options.noise,
             max_bounces=options.max_bounces, level=options.level, shadow=options.shadow,
-            aovs=layers, frames=frames, seed=options.seed, workers=options.workers,
-            exposure=options.exposure, progress=progress,
+            limits=options.limits, aovs=layers, frames=frames, seed=options.seed,
+            workers=options.workers, exposure=options.exposure, progress=progress,
         )  # fmt: skip
     finally:
         bar()
@@ -105,10 +105,13 @@ def run(options: argparse.Namespace) -> int:
 
 def _choose(options: argparse.Namespace, fabric: Fabric | None) -> None:
     """Fill in what --max-error leaves open, and say why."""
+    from fabricusd.appearance.footprint import DEFAULT
+
+    options.limits = DEFAULT
     if options.max_error is None:
         options.shadow = options.shadow or "horizon"
         return
-    from fabricusd.chart.choice import choose_shadow, presets_in
+    from fabricusd.chart.choice import choose_limits, choose_shadow, presets_in
     from fabricusd.reference import read_scene
 
     scene = read_scene(options.scene, fabric=fabric, camera=options.camera)
@@ -116,6 +119,9 @@ def _choose(options: argparse.Namespace, fabric: Fabric | None) -> None:
         choice = choose_shadow(presets_in(scene), options.max_error)
         options.shadow = choice.method
         _tell([f"shadow {choice.method}: {choice.why}"], options)
+    if options.level == "auto":
+        options.limits, why = choose_limits(presets_in(scene), options.max_error)
+        _tell([f"level auto, {why}"], options)
     if options.noise is None and options.spp is None:
         options.noise = options.max_error
         _tell([f"noise {options.noise:g}: that of the bound"], options)

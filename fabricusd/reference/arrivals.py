@@ -1,13 +1,11 @@
-"""From traced rays to hits: light that arrived, and surfaces made ready for shading.
+"""Where traced rays arrived: at lights, and at surfaces, put in the order they are shaded in.
 
 Rays that met a light add it, weighted against light sampling by the power heuristic [Veach1997].
-Rays that met a surface become hits, sorted by material and level so that each is shaded in one
-loop.
+Rays that met a surface get the key of the queue in which that is shaded: one for each material,
+level and side.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numba import njit
@@ -16,63 +14,42 @@ from fabricusd.appearance.footprint import level_weights, pick_level
 from fabricusd.appearance.real import INLINE, KERNEL, LEAN
 from fabricusd.reference.embree import (
     DX,
-    DY,
-    DZ,
     GEOMETRY,
-    HIT_U,
-    HIT_V,
+    LANES,
     MISS,
     NGX,
-    NGY,
-    NGZ,
     OX,
-    OY,
-    OZ,
     PRIMITIVE,
     TFAR,
-)  # fmt: skip
-from fabricusd.reference.hit_frames import (
-    BLOCK,
-    BLOCK_ROWS,
-    CHOSEN,
-    MADE,
-    NUMBERS,
-    RAY,
-    TAKEN,
-    make_frames,
-    make_numbers,
 )
-from fabricusd.reference.light_sampling import no_lights, sample_evenly, sample_lights
-from fabricusd.reference.lights import VISIBLE, hit_light
-from fabricusd.reference.preview_surface import emission_at
+from fabricusd.reference.light_hits import (
+    BEFORE,
+    BLOCK,
+    D_X,
+    D_Y,
+    D_Z,
+    ENDLESS,
+    FIRST,
+    LIGHT_ROWS,
+    O_X,
+    REACH,
+    SEEN_B,
+    SEEN_G,
+    SEEN_R,
+    meet_lights,
+)
 from fabricusd.reference.sobol import four_numbers
-from fabricusd.reference.triangles import RATE, RECORD
+from fabricusd.reference.triangles import RATE
 from fabricusd.reference.triangles import T as TANGENTS
 from fabricusd.reference.wave import (
-    BEFORE,
-    BETA,
-    CHANCE,
-    CORNERS,
-    DEPTH,
     DIRECT,
     FAR_LEVEL,
-    FOOTPRINT,
     INDIRECT,
     LANE_BETA,
     LANE_PDF,
     LANE_SPREAD,
     LANE_WIDTH,
-    LEVEL,
-    LIGHT_PDF,
-    MATERIAL,
-    PATH,
-    PLACE,
-    SIDE,
-    SPREAD,
-    WI,
-    WIDTH,
-)  # fmt: skip
-from fabricusd.reference.wave import PRIMITIVE as TRIANGLE
+)
 
 R = np.float32
 FAR = R(1e30)
@@ -87,88 +64,74 @@ NUMBERS_PER_STEP = 4
 QUEUES = 6
 """Queues of a material: three levels, two sides."""
 
+# Rows of a block after those of `light_hits`: the geometric normal, its cosine with the ray; for
+# level `auto` the steepness of both coordinates, the direction of growing u, the limits, the cone's
+# width and a uniform number, and the level they lead to.
+_NORMAL, _COSINE, _STEEP, _GRAIN, _LIMITS, _WIDTH, _NUMBER, _LEVEL = (
+    (LIGHT_ROWS + row) * BLOCK for row in (0, 3, 4, 6, 9, 13, 14, 15)
+)
+_ROWS = LIGHT_ROWS + 16
 
-@njit(**LEAN)
+
+@njit(**KERNEL)
 def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, dome, film, keys,
-           triangle_material, repeats, records, level, path_pixel, path_sample,
+           triangle_material, limits, records, level, path_pixel, path_sample,
            numbers, counts):  # fmt: skip
     """Add the light that rays met, and give each lane that goes on the key of its queue, else -1.
 
-    repeats : (materials, 2) float32 - ends and picks of a fabric's repeat, 0 where the surface has
+    limits : (materials, 4) float32 - `footprint.Limits.row` of a fabric, 0 where the surface has
     no levels. counts : (QUEUES materials,) int64, filled with the length of each queue, which is
     keyed by `(3 material + level) 2 + back`.
     """
     counts[:] = 0
+    block = np.empty(_ROWS * BLOCK, np.float32)
+    counters = np.empty(2 * BLOCK, np.uint32)
+    for start in range(0, count, BLOCK):
+        size = min(BLOCK, count - start)
+        _load(start, size, rays, lanes, lane_tags, block)
+        meet_lights(lights, dome, step == 0, size, block)
+        _add_seen(start, size, estimator, lane_tags, lanes, film, block)
+        _turn(size, block)
+        if level == AUTO_LEVEL:
+            _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
+                         path_pixel, path_sample, counters, block)  # fmt: skip
+            place = np.uint32(2 + NUMBERS_PER_STEP * step + 2)
+            _choose_levels(numbers, place, size, counters, block)
+        _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, limits,
+                   keys, counts, block)  # fmt: skip
+
+
+@njit(**LEAN)
+def _load(start, size, rays, lanes, lane_tags, block):
     whole = rays.view(np.uint32)
-    for k in range(count):
-        p, lane = k >> 4, k & 15
-        missed = whole[p, GEOMETRY, lane] == MISS
+    for x in range(0, size, LANES):
+        packet, bits = rays[(start + x) >> 4], whole[(start + x) >> 4]
+        for row in range(3):
+            for lane in range(LANES):
+                block[O_X + row * BLOCK + x + lane] = packet[OX + row, lane]
+            for lane in range(LANES):
+                block[D_X + row * BLOCK + x + lane] = packet[DX + row, lane]
+            for lane in range(LANES):
+                block[_NORMAL + row * BLOCK + x + lane] = packet[NGX + row, lane]
+        for lane in range(LANES):
+            missed = bits[GEOMETRY, lane] == MISS
+            block[REACH + x + lane] = FAR if missed else packet[TFAR, lane]
+    before, depth = lanes[LANE_PDF][start:], lane_tags[1][start:]
+    for x in range(size):
+        block[BEFORE + x] = before[x]
+    for x in range(size):
+        block[FIRST + x] = R(1) if depth[x] == 0 else R(0)
+
+
+@njit(**LEAN)
+def _add_seen(start, size, estimator, lane_tags, lanes, film, block):
+    """Add what the rays saw of lights to their paths."""
+    for x in range(size):
+        red, green, blue = block[SEEN_R + x], block[SEEN_G + x], block[SEEN_B + x]
+        k = start + x
         depth = lane_tags[1, k]
-        dx, dy, dz = rays[p, DX, lane], rays[p, DY, lane], rays[p, DZ, lane]
-        reach = FAR if missed else rays[p, TFAR, lane]
-        if (depth == 0 or estimator != LIGHT_ONLY) and (missed or lights.shape[0] > 0):
-            _meet_lights(
-                k, depth, estimator, lights, dome, reach, lanes, lane_tags, film,
-                rays[p, OX, lane], rays[p, OY, lane], rays[p, OZ, lane], dx, dy, dz,
-            )  # fmt: skip
-        if missed or depth > max_depth:
-            # A path at its last depth still sees lights; emission of surfaces is left to `prepare`.
-            keys[k] = -1
+        if red + green + blue <= R(0) or (depth > 0 and estimator == LIGHT_ONLY):
             continue
-        triangle = whole[p, PRIMITIVE, lane]
-        material = triangle_material[triangle]
-        nx, ny, nz = rays[p, NGX, lane], rays[p, NGY, lane], rays[p, NGZ, lane]
-        cosine = dx * nx + dy * ny + dz * nz
-        back = 1 if cosine > R(0) else 0
-        queue = FAR_LEVEL
-        if repeats[material, 0] > R(0):
-            queue = level
-            if level == AUTO_LEVEL:
-                width = lanes[LANE_WIDTH, k] + reach * lanes[LANE_SPREAD, k]
-                path = lane_tags[0, k]
-                u, _, _, _ = four_numbers(
-                    numbers, path_pixel[path], path_sample[path],
-                    np.uint32(2 + NUMBERS_PER_STEP * step + 2),
-                )  # fmt: skip
-                inverse = (nx * nx + ny * ny + nz * nz) / max(cosine * cosine, R(1e-30))
-                record = records[triangle]
-                queue = _level_of(record, width, inverse, repeats[material], dx, dy, dz, u)
-        keys[k] = (3 * material + queue) * 2 + back
-        counts[keys[k]] += 1
-
-
-@njit(**INLINE)
-def _level_of(record, width, inverse, repeat, dx, dy, dz, u):
-    """Level for a ray's cone of `width` where `inverse` is one over the squared cosine."""
-    # A cone's cut with the surface is longer along the ray than across it.
-    a = dx * record[TANGENTS] + dy * record[TANGENTS + 1] + dz * record[TANGENTS + 2]
-    along, flat = a * a * inverse, inverse - R(1)
-    extent_u = width * record[RATE] * math.sqrt(R(1) + along)
-    extent_v = width * record[RATE + 1] * math.sqrt(R(1) + max(flat - along, R(0)))
-    far, weave, _ = level_weights(R, repeat[0], repeat[1], extent_u, extent_v)
-    level, _ = pick_level(R, far, weave, u)
-    return level
-
-
-@njit(**INLINE)
-def _meet_lights(k, depth, estimator, lights, dome, reach, lanes, lane_tags, film,
-                 ox, oy, oz, dx, dy, dz):  # fmt: skip
-    """Add what the ray of lane `k` sees of every light before `reach`."""
-    before = lanes[LANE_PDF, k]
-    red, green, blue = R(0), R(0), R(0)
-    for j in range(lights.shape[0]):
-        light = lights[j]
-        if depth == 0 and light[VISIBLE] == R(0):
-            continue
-        r, g, b, pdf = hit_light(light, dome, depth == 0, ox, oy, oz, dx, dy, dz, reach)
-        if pdf <= R(0):
-            continue
-        weight = R(1)
-        if estimator == 0 and before > R(0):
-            ratio = pdf / before
-            weight = R(1) / (R(1) + ratio * ratio)
-        red, green, blue = red + weight * r, green + weight * g, blue + weight * b
-    if red + green + blue > R(0):
         path = lane_tags[0, k]
         row = DIRECT if depth <= 1 else INDIRECT
         film[row, path] += red * lanes[LANE_BETA, k]
@@ -176,90 +139,108 @@ def _meet_lights(k, depth, estimator, lights, dome, reach, lanes, lane_tags, fil
         film[row + 2, path] += blue * lanes[LANE_BETA + 2, k]
 
 
-@njit(**KERNEL)
-def prepare(step, estimator, count, rays, lanes, lane_tags, keys, offsets, records, lights, dome,
-            epsilon, path_pixel, path_sample, numbers, hits, tags):  # fmt: skip
-    """Turn each lane with a key into a hit at the next place of its queue.
-
-    offsets : (queues,) int64 - where each queue starts; advanced to where it ends.
-    """
-    block = np.empty(BLOCK_ROWS * BLOCK, np.float32)
-    counters = np.empty(2 * BLOCK, np.uint32)
-    places = np.empty(BLOCK, np.int64)
-    choice, where = np.empty(BLOCK, np.int32), np.empty(BLOCK + 1, np.int32)
-    k = 0
-    while k < count:
-        fill = 0
-        while k < count and fill < BLOCK:
-            key = keys[k]
-            if key >= 0:
-                h = offsets[key]
-                offsets[key] = h + 1
-                places[fill] = h
-                _take(k, h, key, fill, rays, lanes, lane_tags, records, path_pixel, path_sample,
-                      block, counters, hits, tags)  # fmt: skip
-                fill += 1
-            k += 1
-        make_frames(fill, epsilon, block)
-        make_numbers(numbers, fill, np.uint32(2 + NUMBERS_PER_STEP * step), counters, block)
-        if estimator == UNIFORM:
-            sample_evenly(fill, block)
-        elif estimator == SURFACE_ONLY or lights.shape[0] == 0:
-            no_lights(fill, block)
-        else:
-            sample_lights(lights, dome, fill, choice, where, block)
-        _bring(fill, places, block, hits)
-
-
-@njit(**INLINE)
-def _take(k, h, key, x, rays, lanes, lane_tags, records, path_pixel, path_sample, block, counters,
-          hits, tags):  # fmt: skip
-    """Lane `k` as hit `h`: what goes on unchanged, and place `x` of the block for what does not."""
-    whole = rays.view(np.uint32)
-    p, lane = k >> 4, k & 15
-    triangle = whole[p, PRIMITIVE, lane]
-    path = lane_tags[0, k]
-    tags[PATH, h], tags[DEPTH, h] = path, lane_tags[1, k]
-    tags[TRIANGLE, h], tags[MATERIAL, h], tags[LEVEL, h] = triangle, key // 6, (key // 2) % 3
-    for row in range(3):
-        hits[BETA + row, h] = lanes[LANE_BETA + row, k]
-    hits[BEFORE, h] = lanes[LANE_PDF, k]
-    width = lanes[LANE_WIDTH, k] + rays[p, TFAR, lane] * lanes[LANE_SPREAD, k]
-    hits[WIDTH, h], hits[SPREAD, h] = width, lanes[LANE_SPREAD, k]
-    hits[CORNERS, h], hits[CORNERS + 1, h] = rays[p, HIT_U, lane], rays[p, HIT_V, lane]
-    for row in range(3):
-        block[RAY + row * BLOCK + x] = rays[p, DX + row, lane]
-    block[RAY + 3 * BLOCK + x] = rays[p, HIT_U, lane]
-    block[RAY + 4 * BLOCK + x] = rays[p, HIT_V, lane]
-    for column in range(RECORD):
-        block[TAKEN + column * BLOCK + x] = records[triangle, column]
-    block[MADE + FOOTPRINT * BLOCK + x] = width
-    counters[x], counters[BLOCK + x] = path_pixel[path], path_sample[path]
-
-
-@njit(**INLINE)
-def _bring(fill, places, block, hits):
-    """Bring the block's frames, numbers and lights to their hits."""
-    for x in range(fill):
-        h = places[x]
-        for row in range(SIDE + 1):
-            hits[row, h] = block[MADE + row * BLOCK + x]
-        for row in range(4):
-            hits[CHANCE + row, h] = block[NUMBERS + row * BLOCK + x]
-        for row in range(LIGHT_PDF + 1 - WI):
-            hits[WI + row, h] = block[CHOSEN + row * BLOCK + x]
+@njit(**LEAN)
+def _turn(size, block):
+    """Cosine of each ray with the normal of what it met, which is not a unit vector."""
+    for x in range(size):
+        block[_COSINE + x] = (
+            block[D_X + x] * block[_NORMAL + x]
+            + block[D_Y + x] * block[_NORMAL + BLOCK + x]
+            + block[D_Z + x] * block[_NORMAL + 2 * BLOCK + x]
+        )
 
 
 @njit(**LEAN)
-def add_emission(count, surfaces, hits, tags, film):
-    """Add what surfaces that shine by themselves send back along the ray, on their front."""
-    for h in range(count):
-        red, green, blue = emission_at(
-            surfaces, tags[MATERIAL, h], hits[PLACE, h], hits[PLACE + 1, h]
+def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
+                 path_pixel, path_sample, counters, block):  # fmt: skip
+    """What `auto` needs of each ray that met a fabric; zeros for the others."""
+    whole = rays.view(np.uint32)
+    for x in range(size):
+        k = start + x
+        path = lane_tags[0, k]
+        counters[x], counters[BLOCK + x] = path_pixel[path], path_sample[path]
+        for row in range(4):
+            block[_LIMITS + row * BLOCK + x] = R(0)
+        for row in range(2):
+            block[_STEEP + row * BLOCK + x] = R(0)
+        for row in range(3):
+            block[_GRAIN + row * BLOCK + x] = R(0)
+        block[_WIDTH + x] = R(0)
+        if block[REACH + x] >= ENDLESS:
+            continue
+        triangle = whole[k >> 4, PRIMITIVE, k & 15]
+        record, material = records[triangle], triangle_material[triangle]
+        for row in range(4):
+            block[_LIMITS + row * BLOCK + x] = limits[material, row]
+        for row in range(2):
+            block[_STEEP + row * BLOCK + x] = record[RATE + row]
+        for row in range(3):
+            block[_GRAIN + row * BLOCK + x] = record[TANGENTS + row]
+        block[_WIDTH + x] = lanes[LANE_WIDTH, k] + block[REACH + x] * lanes[LANE_SPREAD, k]
+
+
+@njit(**LEAN)
+def _choose_levels(numbers, place, size, counters, block):
+    """A level for each ray's cone, by a uniform number."""
+    for x in range(size):
+        block[_NUMBER + x], _, _, _ = four_numbers(numbers, counters[x], counters[BLOCK + x], place)
+    for x in range(size):
+        nx, ny, nz = (
+            block[_NORMAL + x], block[_NORMAL + BLOCK + x], block[_NORMAL + 2 * BLOCK + x],
+        )  # fmt: skip
+        square = block[_COSINE + x] * block[_COSINE + x]
+        inverse = (nx * nx + ny * ny + nz * nz) / max(square, R(1e-30))
+        # A cone's cut with the surface is longer along the ray than across it.
+        a = (
+            block[D_X + x] * block[_GRAIN + x]
+            + block[D_Y + x] * block[_GRAIN + BLOCK + x]
+            + block[D_Z + x] * block[_GRAIN + 2 * BLOCK + x]
         )
-        if red + green + blue > R(0) and hits[SIDE, h] > R(0):
-            row = DIRECT if tags[DEPTH, h] <= 1 else INDIRECT
-            path = tags[PATH, h]
-            film[row, path] += red * hits[BETA, h]
-            film[row + 1, path] += green * hits[BETA + 1, h]
-            film[row + 2, path] += blue * hits[BETA + 2, h]
+        along, flat = a * a * inverse, inverse - R(1)
+        width = block[_WIDTH + x]
+        extent_u = width * block[_STEEP + x] * np.sqrt(R(1) + along)
+        extent_v = width * block[_STEEP + BLOCK + x] * np.sqrt(R(1) + max(flat - along, R(0)))
+        far, weave, _ = level_weights(
+            R, max(block[_LIMITS + x], R(1e-6)), max(block[_LIMITS + BLOCK + x], R(1e-6)),
+            block[_LIMITS + 2 * BLOCK + x], block[_LIMITS + 3 * BLOCK + x], extent_u, extent_v,
+        )  # fmt: skip
+        level, _ = pick_level(R, far, weave, block[_NUMBER + x])
+        block[_LEVEL + x] = R(level)
+
+
+@njit(**LEAN)
+def _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, limits, keys,
+               counts, block):  # fmt: skip
+    whole = rays.view(np.uint32)
+    for x in range(size):
+        k = start + x
+        # A path at its last depth still sees lights; emission of surfaces is left to `prepare`.
+        if block[REACH + x] >= ENDLESS or lane_tags[1, k] > max_depth:
+            keys[k] = -1
+            continue
+        material = triangle_material[whole[k >> 4, PRIMITIVE, k & 15]]
+        queue = FAR_LEVEL
+        if limits[material, 0] > R(0):
+            queue = int(block[_LEVEL + x]) if level == AUTO_LEVEL else level
+        key = (3 * material + queue) * 2 + (1 if block[_COSINE + x] > R(0) else 0)
+        keys[k] = key
+        counts[key] += 1
+
+
+@njit(**INLINE)
+def _advance(offsets, key):
+    place = offsets[key]
+    offsets[key] = place + 1
+    return place
+
+
+@njit(**LEAN)
+def sort_lanes(count, keys, offsets, order):
+    """The lanes that go on, in the order of their queues.
+
+    offsets : (queues,) int64 - where each queue starts; advanced to where it ends.
+    order : (count,) int32
+    """
+    for k in range(count):
+        if keys[k] >= 0:
+            order[_advance(offsets, keys[k])] = k

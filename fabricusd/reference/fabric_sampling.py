@@ -23,16 +23,18 @@ from fabricusd.appearance.sampling_lobes import (
     lobe_densities,
     sample_lobe,
 )
-from fabricusd.appearance.surface_sampling import (
+from fabricusd.appearance.stretches import (
     COS,
     PSI0,
     SET,
     SIN,
     SURFACE_WIDTH,
     TAN,
-    UNIFORM,
     VOLUME_WIDTH,
     nearest_stretch,
+)
+from fabricusd.appearance.surface_sampling import (
+    UNIFORM,
     share_at,
     view_corner,
 )
@@ -72,9 +74,11 @@ def _lobes_at(R, warp, psi0, c, s, tangent, surface, volume, theta_o, x, y, z, a
 @njit(**INLINE)
 def _load(wo, wi, start, size, block):
     for row in range(3):
+        to_viewer, to_light = wo[row][start:], wi[row][start:]
         for x in range(size):
-            block[_OX + row * BLOCK + x] = wo[row, start + x]
-            block[_IX + row * BLOCK + x] = wi[row, start + x]
+            block[_OX + row * BLOCK + x] = to_viewer[x]
+        for x in range(size):
+            block[_IX + row * BLOCK + x] = to_light[x]
 
 
 @njit(**INLINE)
@@ -122,22 +126,23 @@ def _draw(R, size, block):
 def _store(R, start, size, block, go, p_light, p_go, first):
     """Directions and densities of a block; 0 at or below the cloth."""
     for row in range(3):
+        drawn = go[row][start:]
         for x in range(size):
-            go[row, start + x] = block[_GX + row * BLOCK + x]
+            drawn[x] = block[_GX + row * BLOCK + x]
+    to_light, onwards = p_light[first + start :], p_go[first + start :]
     for x in range(size):
         lit = block[_IZ + x] > R(0) and block[_OZ + x] > R(0)
-        p_light[first + start + x] = block[_P_LIGHT + x] if lit else R(0)
+        to_light[x] = block[_P_LIGHT + x] if lit else R(0)
         seen = block[_GZ + x] > R(0) and block[_OZ + x] > R(0)
-        p_go[first + start + x] = block[_P_GO + x] if seen else R(0)
+        onwards[x] = block[_P_GO + x] if seen else R(0)
 
 
 @njit(**KERNEL)
-def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first):
-    """`far_direction` for every viewer, and `far_density` of it and of the direction to the light.
+def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first, n):
+    """`far_direction` for `n` viewers, and `far_density` of it and of the direction to the light.
 
     wo, wi, go : (3, n) real; u0, u1, u2, p_light, p_go : rows of which hits `first`... are used
     """
-    n = wo.shape[1]
     stretches = sampling.stretches
     lobes = 3 * stretches.shape[0]
     block = np.empty(_SHARES + lobes * BLOCK, wo.dtype)
@@ -194,12 +199,11 @@ def _add_stretch(R, row, shares, size, block):
 
 @njit(**KERNEL)
 def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, go, p_light, p_go,
-                  first):  # fmt: skip
+                  first, n):  # fmt: skip
     """As `sample_far` with `point_direction` and `point_density`, at the threads found.
 
     sets, threads, psi0 : (n,) what lies under each hit; a gap is sampled uniformly
     """
-    n = wo.shape[1]
     count = sampling.stretches.shape[0]
     block = np.empty(_SHARES, wo.dtype)
     for start in range(0, n, BLOCK):
@@ -222,11 +226,9 @@ def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, 
             if on_thread:
                 k = 3 * nearest_stretch(R, sampling.stretches, thread_set, thread, psi0[start + x])
                 corner = view_corner(R, block[_OX + x], block[_OY + x], block[_OZ + x])
-                a = share_at(R, sampling.shares, corner, k + SURFACE)
-                b = share_at(R, sampling.shares, corner, k + VOLUME)
-                d = share_at(R, sampling.shares, corner, k + ISOTROPIC)
-                scale = R(1.0 - UNIFORM) / (a + b + d)
-                a, b, d = a * scale, b * scale, d * scale
+                a = share_at(R, sampling.point_shares, corner, k + SURFACE)
+                b = share_at(R, sampling.point_shares, corner, k + VOLUME)
+                d = share_at(R, sampling.point_shares, corner, k + ISOTROPIC)
             block[_A + x], block[_B + x], block[_D + x] = a, b, d
             k = _choose(R, _A, 3 if on_thread else 0, u0[h], block, x)
             block[_LOBE + x] = R(_EVEN) if k < 0 else R(k)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.coverage import GAP
-from fabricusd.appearance.far import far_values
 from fabricusd.appearance.law import (
     PUBLISHED_ONLY,
     SurfaceLaw,
@@ -31,7 +30,8 @@ from fabricusd.appearance.shadow import NONE, Shadow, compile_shadow, shade
 from fabricusd.appearance.weave import back_of, find
 from fabricusd.fabric import Fabric
 from fabricusd.reference.embree import aligned_empty
-from fabricusd.reference.fabric_sampling import sample_far, sample_points
+from fabricusd.reference.fabric_sampling import sample_points
+from fabricusd.reference.far_shading import STRAIGHT, finish_far, gather, shade_far
 from fabricusd.reference.wave import (
     CHANCE,
     F_PDF,
@@ -43,14 +43,11 @@ from fabricusd.reference.wave import (
     THREAD,
     THREAD_LEVEL,
     WEIGHT,
-    WI,
-    WO,
     F,
     Wave,
 )
 
 R = np.float32
-_STRAIGHT = R(-1)
 _ONE_AT_A_TIME = threading.Lock()
 
 
@@ -114,34 +111,29 @@ class FabricShader:
     def __call__(self, level: int, back: int, wave: Wave, first: int, last: int) -> None:
         """Shade hits `first` to `last`, all on one side at one level."""
         side = self.sides[back]
+        if level == FAR_LEVEL and side.law.kind == PUBLISHED_ONLY:
+            shade_far(R, side.law.published, side.law.lobes, R(self.gap), wave.hits, first, last)
+            return
         scratch = wave.scratch or _Scratch(wave.capacity)
         wave.scratch = scratch
         vectors = scratch.views(last - first)
         wo, wi = vectors[:2]
-        _gather(wave.hits, first, wo, wi)
+        gather(wave.hits, first, last - first, wo, wi)
         if level == FAR_LEVEL:
-            self._shade_far(side, wave.hits, first, vectors)
+            self._shade_by_law(side, wave.hits, first, vectors)
         else:
             self._shade_near(side, level, back, scratch, wave.hits, first, vectors)
 
-    def _shade_far(
+    def _shade_by_law(
         self, side: _Side, hits: NDArray[np.float32], first: int, vectors: list[Any]
     ) -> None:
-        wo, wi, go, towards, onwards = vectors
-        law = side.law
-        if law.kind == PUBLISHED_ONLY:
-            sample_far(
-                R, law.lobes, wo, wi, *hits[CHANCE : CHANCE + 3], go, hits[F_PDF], hits[GO_PDF],
-                first,
-            )  # fmt: skip
-            far_values(R, law.published, wi, wo, towards, 0, wo.shape[1])
-            far_values(R, law.published, go, wo, onwards, 0, wo.shape[1])
-        else:
-            none = np.zeros(wo.shape[1], np.uint8)
-            real = np.zeros(wo.shape[1], np.float32)
-            _by_law(R, law, FAR_LEVEL, hits, first, *vectors, none, none.astype(np.int32), real,
-                    real)  # fmt: skip
-        _finish_far(R, hits, first, R(self.gap), go, towards, onwards)
+        """Level `far` of cloth with `conserving` threads."""
+        _, _, go, towards, onwards = vectors
+        count = go.shape[1]
+        none, real = np.zeros(count, np.uint8), np.zeros(count, np.float32)
+        _by_law(R, side.law, FAR_LEVEL, hits, first, *vectors, none, none.astype(np.int32), real,
+                real)  # fmt: skip
+        finish_far(R, hits, first, count, R(self.gap), go, towards, onwards)
 
     def _shade_near(
         self,
@@ -167,6 +159,7 @@ class FabricShader:
             sample_points(
                 R, law.published, law.lobes, sets, threads, psi0, wo, wi,
                 *hits[CHANCE : CHANCE + 3], go, hits[F_PDF], hits[GO_PDF], first,
+                count,
             )  # fmt: skip
             near = (R, law.published, level == THREAD_LEVEL, sets, threads, psi0, across)
             point_values(*near, wi, wo, towards, 0, count)
@@ -177,14 +170,6 @@ class FabricShader:
             R, cloth, shadow, v_sign, R(0 if self.gap == 0 else 1), hits, first, wi, go,
             towards, onwards, *found,
         )  # fmt: skip
-
-
-@njit(**LEAN)
-def _gather(hits, first, wo, wi):
-    for row in range(3):
-        for k in range(wo.shape[1]):
-            wo[row, k] = hits[WO + row, first + k]
-            wi[row, k] = hits[WI + row, first + k]
 
 
 @njit(**LEAN)
@@ -214,25 +199,13 @@ def _by_law(R, law, level, hits, first, wo, wi, go, towards, onwards, sets, thre
                 towards[0, k], towards[1, k], towards[2, k] = red, green, blue
 
 
-@njit(**LEAN)
-def _finish_far(R, hits, first, gap, go, towards, onwards):
-    """Values and weights; the gap lets its share of the paths go straight on."""
-    keep = R(1) - gap
-    for k in range(towards.shape[1]):
-        h = first + k
-        for row in range(3):
-            hits[F + row, h] = towards[row, k]
-        hits[KEEP, h], hits[THREAD, h] = keep, R(-1)
-        _finish(hits, h, keep, k, go, onwards)
-
-
 @njit(**INLINE)
 def _finish(hits, h, keep, k, go, onwards):
     pdf = hits[GO_PDF, h]
     chance = hits[CHANCE + 3, h]
     hits[F_PDF, h] *= keep
     if chance >= keep:
-        hits[GO_PDF, h] = _STRAIGHT
+        hits[GO_PDF, h] = STRAIGHT
         return
     hits[CHANCE + 3, h] = chance / keep
     hits[GO, h], hits[GO + 1, h], hits[GO + 2, h] = go[0, k], go[1, k], go[2, k]

@@ -180,9 +180,10 @@ def _add(pixels, samples, group, rows, sums, spread, counts, groups):  # type: i
 
 @njit(**INLINE)
 def _sum(rows, row, start, end):  # type: ignore[no-untyped-def]
+    values = rows[row][start:end]
     total = np.float32(0)
-    for k in range(start, end):
-        total += rows[row, k]
+    for k in range(values.size):
+        total += values[k]
     return total
 
 

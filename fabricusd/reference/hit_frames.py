@@ -55,16 +55,15 @@ def make_numbers(numbers, count, place, counters, block):
         block[NUMBERS + 6 * BLOCK + x], block[NUMBERS + 7 * BLOCK + x] = c, d
 
 
+# A place and not a row and a column: numba compiles a function anew for each constant it is given.
 @njit(**INLINE)
-def _taken(block, column, x):
+def _taken(block, at):
     """Three numbers of the triangle's record."""
-    at = TAKEN + column * BLOCK + x
     return block[at], block[at + BLOCK], block[at + 2 * BLOCK]
 
 
 @njit(**INLINE)
-def _make(block, row, x, a, b, c):
-    at = MADE + row * BLOCK + x
+def _make(block, at, a, b, c):
     block[at], block[at + BLOCK], block[at + 2 * BLOCK] = a, b, c
 
 
@@ -75,19 +74,19 @@ def make_frames(count, epsilon, block):
         dx, dy, dz = block[RAY + x], block[RAY + BLOCK + x], block[RAY + 2 * BLOCK + x]
         u, v = block[RAY + 3 * BLOCK + x], block[RAY + 4 * BLOCK + x]
         w = R(1) - u - v
-        ax, ay, az = _taken(block, E1, x)
-        bx, by, bz = _taken(block, E2, x)
+        ax, ay, az = _taken(block, TAKEN + E1 * BLOCK + x)
+        bx, by, bz = _taken(block, TAKEN + E2 * BLOCK + x)
         # From the first corner; the corners' own offsets below are exact differences.
         rx, ry, rz = u * ax + v * bx, u * ay + v * by, u * az + v * bz
-        px, py, pz = _taken(block, P0, x)
+        px, py, pz = _taken(block, TAKEN + P0 * BLOCK + x)
         px, py, pz = px + rx, py + ry, pz + rz
         gx, gy, gz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
         inverse = R(1) / math.sqrt(max(gx * gx + gy * gy + gz * gz, R(1e-38)))
         gx, gy, gz = gx * inverse, gy * inverse, gz * inverse
         side = R(1) if gx * dx + gy * dy + gz * dz <= R(0) else R(-1)
-        n0x, n0y, n0z = _taken(block, NORMALS, x)
-        n1x, n1y, n1z = _taken(block, NORMALS + 3, x)
-        n2x, n2y, n2z = _taken(block, NORMALS + 6, x)
+        n0x, n0y, n0z = _taken(block, TAKEN + NORMALS * BLOCK + x)
+        n1x, n1y, n1z = _taken(block, TAKEN + (NORMALS + 3) * BLOCK + x)
+        n2x, n2y, n2z = _taken(block, TAKEN + (NORMALS + 6) * BLOCK + x)
         # [Hanika2021]: the point lifted to the corners' tangent planes, so that the smooth
         # surface's terminator is not cut into the triangles. One lift for each side of the cloth.
         e0 = side * (rx * n0x + ry * n0y + rz * n0z)
@@ -97,14 +96,14 @@ def make_frames(count, epsilon, block):
         offset = side * (epsilon + R(1e-6) * max(abs(px), max(abs(py), abs(pz))))
         a, b, c = w * side * min(e0, R(0)), u * side * min(e1, R(0)), v * side * min(e2, R(0))
         _make(
-            block, FRONT, x,
+            block, MADE + FRONT * BLOCK + x,
             px - a * n0x - b * n1x - c * n2x + offset * gx,
             py - a * n0y - b * n1y - c * n2y + offset * gy,
             pz - a * n0z - b * n1z - c * n2z + offset * gz,
         )  # fmt: skip
         a, b, c = w * side * max(e0, R(0)), u * side * max(e1, R(0)), v * side * max(e2, R(0))
         _make(
-            block, BACK, x,
+            block, MADE + BACK * BLOCK + x,
             px - a * n0x - b * n1x - c * n2x - offset * gx,
             py - a * n0y - b * n1y - c * n2y - offset * gy,
             pz - a * n0z - b * n1z - c * n2z - offset * gz,
@@ -117,9 +116,9 @@ def make_frames(count, epsilon, block):
         away = nx * dx + ny * dy + nz * dz >= R(-1e-4)
         nx, ny = (side * gx if away else nx), (side * gy if away else ny)
         nz = side * gz if away else nz
-        t0x, t0y, t0z = _taken(block, TANGENTS, x)
-        t1x, t1y, t1z = _taken(block, TANGENTS + 3, x)
-        t2x, t2y, t2z = _taken(block, TANGENTS + 6, x)
+        t0x, t0y, t0z = _taken(block, TAKEN + TANGENTS * BLOCK + x)
+        t1x, t1y, t1z = _taken(block, TAKEN + (TANGENTS + 3) * BLOCK + x)
+        t2x, t2y, t2z = _taken(block, TAKEN + (TANGENTS + 6) * BLOCK + x)
         tx, ty = w * t0x + u * t1x + v * t2x, w * t0y + u * t1y + v * t2y
         tz = w * t0z + u * t1z + v * t2z
         d = tx * nx + ty * ny + tz * nz
@@ -134,12 +133,12 @@ def make_frames(count, epsilon, block):
         hand = block[TAKEN + HAND * BLOCK + x]
         vx, vy = hand * (ny * tz - nz * ty), hand * (nz * tx - nx * tz)
         vz = hand * (nx * ty - ny * tx)
-        _make(block, N, x, nx, ny, nz)
-        _make(block, U, x, tx, ty, tz)
-        _make(block, V, x, vx, vy, vz)
+        _make(block, MADE + N * BLOCK + x, nx, ny, nz)
+        _make(block, MADE + U * BLOCK + x, tx, ty, tz)
+        _make(block, MADE + V * BLOCK + x, vx, vy, vz)
         _make(
-            block, WO, x, -(dx * tx + dy * ty + dz * tz), -(dx * vx + dy * vy + dz * vz),
-            -(dx * nx + dy * ny + dz * nz),
+            block, MADE + WO * BLOCK + x, -(dx * tx + dy * ty + dz * tz),
+            -(dx * vx + dy * vy + dz * vz), -(dx * nx + dy * ny + dz * nz),
         )  # fmt: skip
         block[MADE + SIDE * BLOCK + x] = side
         at = TAKEN + x

@@ -11,15 +11,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.compiled import true_repeat
+from fabricusd.appearance.footprint import DEFAULT, Limits
 from fabricusd.errors import FabricError
 from fabricusd.reference import arrivals
-from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, add_emission, arrive, prepare
+from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, arrive, sort_lanes
 from fabricusd.reference.camera import Lens, camera_rays
-from fabricusd.reference.departures import depart, record_first, settle, thin_out
-from fabricusd.reference.embree import Accelerator
+from fabricusd.reference.departures import depart, record_first
+from fabricusd.reference.embree import (
+    DX,
+    DZ,
+    GEOMETRY,
+    MISS,
+    OX,
+    OZ,
+    ROWS,
+    TFAR,
+    Accelerator,
+)
 from fabricusd.reference.fabric_surface import FabricShader
-from fabricusd.reference.lights import build_lights
+from fabricusd.reference.hits import add_emission, prepare
+from fabricusd.reference.lights import build_lights, share_out
 from fabricusd.reference.preview_surface import (
     EMISSIVE,
     EMISSIVE_MAP,
@@ -29,6 +40,7 @@ from fabricusd.reference.preview_surface import (
     shade_preview,
 )
 from fabricusd.reference.scene import FabricSurface, Scene
+from fabricusd.reference.shadow_rays import settle, thin_out
 from fabricusd.reference.sobol import new_numbers
 from fabricusd.reference.triangles import build_tables
 from fabricusd.reference.wave import (
@@ -52,6 +64,8 @@ ESTIMATORS = {
     "surface": arrivals.SURFACE_ONLY,
     "uniform": arrivals.UNIFORM,
 }
+AIMED = 16
+"""Rays along each side of the picture that find what is to be lit."""
 MOST_LAYERS = 32
 """See-through surfaces that one ray may pass before it is taken as blocked."""
 
@@ -59,6 +73,7 @@ MOST_LAYERS = 32
 class Tracer:
     """A scene made ready for rays.
 
+    limits : where level "auto" goes from one level to the next
     estimator : "mis", or for tests one of "light", "surface", "uniform"; all have the same mean.
     sampler : "sobol", or for tests "random".
     """
@@ -70,6 +85,7 @@ class Tracer:
         max_bounces: int = 4,
         level: str = "auto",
         shadow: str = "horizon",
+        limits: Limits = DEFAULT,
         seed: int = 0,
         estimator: str = "mis",
         sampler: str = "sobol",
@@ -80,7 +96,7 @@ class Tracer:
             raise FabricError("max bounces", f"is {max_bounces}; it must be at least 0")
         self.tables = build_tables(scene)
         self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
-        self.lights, self.dome = build_lights(scene.lights, self.tables.centre, self.tables.radius)
+        self.lights, self.dome = build_lights(scene.lights, self.tables.centre)
         self.surfaces = build_surfaces(scene)
         shining = self.surfaces.table[:, [EMISSIVE, EMISSIVE + 1, EMISSIVE + 2]].any(axis=1)
         self.shines = bool((shining | (self.surfaces.table[:, EMISSIVE_MAP] >= 0)).any())
@@ -91,17 +107,34 @@ class Tracer:
         self.epsilon = np.float32(1e-7 * self.tables.radius + 1e-12)
         count = max(len(scene.materials), 1)
         self.shaders: list[Any] = [None] * count
-        self._repeats = np.zeros((count, 2), np.float32)
+        self._limits = np.zeros((count, 4), np.float32)
         self.opacity = np.where(
             self.surfaces.table[:, OPACITY_MAP] >= 0, -1.0, self.surfaces.table[:, OPACITY]
         ).astype(np.float32)
         for k, surface in enumerate(scene.materials):
             if isinstance(surface, FabricSurface):
                 fabric = surface.binding.fabric
-                self._repeats[k] = true_repeat(fabric)
+                self._limits[k] = limits.row(fabric)
                 self.shaders[k] = FabricShader(fabric, shadow)
                 self.opacity[k] = 1.0 - self.shaders[k].gap
         self.see_through = bool((self.opacity < 1).any())
+
+    def aim(self, lens: Lens, width: int, height: int) -> None:
+        """Choose among lights by what they do to the places that the camera sees."""
+        if len(self.lights) < 2:
+            return
+        x, y = (np.arange(AIMED) * size // AIMED for size in (width, height))
+        pixels = (y[:, None] * width + x).ravel().astype(np.int32)
+        wave = Wave(len(pixels), aovs=False)
+        camera_rays(
+            lens, width, pixels, 0, 1, self.numbers, wave.rays.reshape(len(wave.rays), -1),
+            wave.lanes[LANE_WIDTH : LANE_SPREAD + 1], wave.path_pixel, wave.path_sample,
+        )  # fmt: skip
+        self.accelerator.intersect(wave.rays, len(wave.rays))
+        rows = wave.rays.transpose(1, 0, 2).reshape(ROWS, -1)
+        ends = rows[OX : OZ + 1] + rows[DX : DZ + 1] * rows[TFAR]
+        met = rows.view(np.uint32)[GEOMETRY] != MISS
+        share_out(self.lights, self.dome, ends[:, met].T)
 
     def trace(
         self,
@@ -137,16 +170,17 @@ class Tracer:
             arrive(
                 step, self.max_bounces, self.estimator, count, wave.rays, wave.lanes,
                 wave.lane_tags, self.lights, self.dome, wave.film, wave.keys,
-                self.tables.material, self._repeats, self.tables.records, self.level,
+                self.tables.material, self._limits, self.tables.records, self.level,
                 wave.path_pixel, wave.path_sample, self.numbers, counts,
             )  # fmt: skip
             ends = np.cumsum(counts)
             hits = int(ends[-1])
             if hits == 0:
                 break
+            sort_lanes(count, wave.keys, ends - counts, wave.order)
             prepare(
-                step, self.estimator, count, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
-                ends - counts, self.tables.records, self.lights, self.dome, self.epsilon,
+                step, self.estimator, hits, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
+                wave.order, self.tables.records, self.lights, self.dome, self.epsilon,
                 wave.path_pixel, wave.path_sample, self.numbers, wave.hits, wave.tags,
             )  # fmt: skip
             if self.shines:
@@ -158,7 +192,6 @@ class Tracer:
                 record_first(
                     hits, lens.eye, lens.axis, wave.hits, wave.tags, self.tables.uv, wave.film
                 )
-            result[:] = 0
             depart(
                 self.estimator, hits, self.max_bounces, wave.hits, wave.tags, wave.film,
                 wave.shadow_rays, wave.shadow, wave.shadow_path, wave.next_rays, wave.next_lanes,

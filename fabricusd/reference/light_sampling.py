@@ -54,7 +54,8 @@ def sample_lights(lights, dome, count, choice, where, block):
     for x in range(count):
         choice[x] = choose_light(lights, block[NUMBERS + 4 * BLOCK + x])
     for j in range(lights.shape[0]):
-        found = 0
+        # Not the constant 0, for which numba would compile `_sample` once more.
+        found = np.int64(0)
         for x in range(count):
             where[found] = x
             found += 1 if choice[x] == j else 0

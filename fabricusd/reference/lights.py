@@ -1,4 +1,5 @@
-"""Lights as rows of one table: chosen by power, hit by rays; `light_sampling` draws from them.
+"""Lights as rows of one table: chosen by power. `light_sampling` draws from them, `light_hits` is
+what rays meet.
 
 Lights are no obstacles: a ray goes on behind them, so what a ray sees is the sum over all that it
 passes before its first triangle. That keeps sampling and hitting two estimators of one integral.
@@ -13,16 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.real import INLINE, LEAN, cos, sin
-from fabricusd.reference.dome import (
-    DENSITY,
-    LUMINANCE,
-    Dome,
-    build_dome,
-    cell_at,
-    place_of,
-    smooth_radiance,
-)
+from fabricusd.appearance.real import LEAN, cos, sin
+from fabricusd.reference.dome import LUMINANCE, Dome, build_dome, place_of, smooth_radiance
 from fabricusd.reference.scene import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE, Light
 
 R = np.float32
@@ -35,9 +28,12 @@ COLUMNS = 20
 
 
 def build_lights(
-    lights: list[Light], centre: NDArray[np.float64], radius: float
+    lights: list[Light], centre: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], Dome]:
-    """The table (n, COLUMNS) float32 and the dome's picture, all domes added into one."""
+    """The table (n, COLUMNS) float32 and the dome's picture, all domes added into one.
+
+    `share_out` gives the lights other chances than equal ones.
+    """
     table = np.zeros((0, COLUMNS), np.float32)
     rows = [_row(light, centre) for light in lights if light.kind != DOME]
     domes = [light for light in lights if light.kind == DOME]
@@ -49,13 +45,21 @@ def build_lights(
         rows.append(row)
     if rows:
         table = np.ascontiguousarray(rows, np.float32)
-        power = np.array([_irradiance(row, dome, radius) for row in rows])
-        total = power.sum()
-        # No light is forgotten altogether: the estimate of its power is rough.
-        share = power / total if total > 0 else np.full(len(rows), 1 / len(rows))
-        share = 0.9 * share + 0.1 / len(rows)
-        table[:, CHANCE] = share / share.sum()
+        table[:, CHANCE] = 1 / len(rows)
     return table, dome
+
+
+def share_out(table: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]) -> None:
+    """Make the chance of choosing a light proportional to how brightly it lights `places`.
+
+    places : (n, 3) [m] around the scene's centre - what the camera sees, say
+    """
+    if not len(places):
+        return
+    power = np.array([_irradiance(row, dome, places) for row in table])
+    if power.sum() > 0:
+        # No light is forgotten altogether: shadows and surfaces' directions are not known.
+        table[:, CHANCE] = 0.8 * power / power.sum() + 0.2 / len(table)
 
 
 def _row(light: Light, centre: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -89,19 +93,24 @@ def _row(light: Light, centre: NDArray[np.float64]) -> NDArray[np.float64]:
     return row
 
 
-def _irradiance(row: NDArray[np.float64], dome: Dome, radius: float) -> float:
-    """Rough irradiance at the scene's centre, for choosing among lights."""
+def _irradiance(row: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]) -> float:
+    """Mean irradiance of surfaces at `places` that face any way that the light reaches."""
     if row[KIND] == DOME:
         h, w = (int(n) for n in dome.size)
         edges = np.cos(np.pi * np.arange(h + 1) / h)
         solid = np.repeat((edges[:-1] - edges[1:]) * 2 * np.pi / w, w)
-        return float((dome.cells[:, :3] @ LUMINANCE) @ solid / 2)
-    brightness = float(row[RED : RED + 3] @ LUMINANCE)
+        return float((dome.cells[:, :3] @ LUMINANCE) @ solid / 4)
+    brightness = float(row[RED : RED + 3] @ LUMINANCE) / 2
     if row[KIND] == DISTANT:
         return brightness * (2 * math.pi * row[AREA] if row[AREA] > 0 else 1.0)
-    distance2 = float(row[P : P + 3] @ row[P : P + 3])
-    share = 0.25 if row[KIND] in (SPHERE, CYLINDER) else 0.5
-    return brightness * share * row[AREA] / max(distance2, 0.25 * radius**2, 1e-12)
+    away = np.asarray(places, np.float64) - row[P : P + 3]
+    # Nearer than its size a light is no brighter.
+    distance2 = np.maximum(np.einsum("ij,ij->i", away, away), max(float(row[AREA]), 1e-12))
+    # The share of its surface that is seen, foreshortened.
+    seen = np.full(len(away), 0.25)
+    if row[KIND] not in (SPHERE, CYLINDER):
+        seen = np.maximum(away @ row[Z : Z + 3], 0.0) / np.sqrt(distance2)
+    return brightness * float(row[AREA]) * float((seen / distance2).mean())
 
 
 def _merge_domes(domes: list[Light]) -> Dome:
@@ -146,91 +155,3 @@ def _rotation(frame: NDArray[np.float64]) -> NDArray[np.float64]:
     y = y / max(float(np.linalg.norm(y)), 1e-30)
     z = np.cross(x, y)
     return np.stack([x, y, z * np.sign(z @ frame[:3, 2] or 1.0)])
-
-
-@njit(**INLINE)
-def hit_light(light, dome, to_camera, px, py, pz, dx, dy, dz, reach):
-    """What a ray sees of one light nearer than `reach`: (r, g, b, pdf); pdf 0 where nothing.
-
-    to_camera : a dome's picture is then interpolated, and its pdf only not 0
-    """
-    kind = int(light[KIND])
-    none = R(0)
-    red, green, blue = light[RED], light[RED + 1], light[RED + 2]
-    if kind == DOME:
-        if reach < R(1e29):
-            return none, none, none, none
-        column, row = place_of(dome, dx, dy, dz)
-        if to_camera:
-            red, green, blue = smooth_radiance(dome, column, row)
-            return red, green, blue, R(1)
-        cell = dome.cells[cell_at(dome, column, row)]
-        return cell[0], cell[1], cell[2], cell[DENSITY] * light[CHANCE]
-    zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
-    if kind == DISTANT:
-        if light[AREA] <= R(0) or reach < R(1e29):
-            return none, none, none, none
-        # |d - z|^2 = 2 (1 - cos), which keeps the sun's half degree in float32.
-        ax, ay, az = dx - zx, dy - zy, dz - zz
-        if R(0.5) * (ax * ax + ay * ay + az * az) > light[AREA]:
-            return none, none, none, none
-        return red, green, blue, light[CHANCE] / (R(2) * _PI * light[AREA])
-    ax, ay, az = light[P] - px, light[P + 1] - py, light[P + 2] - pz
-    if kind == SPHERE:
-        square = ax * ax + ay * ay + az * az
-        radius2 = light[SIZE] * light[SIZE]
-        along = ax * dx + ay * dy + az * dz
-        bx, by, bz = ax - along * dx, ay - along * dy, az - along * dz
-        inside = radius2 - (bx * bx + by * by + bz * bz)
-        if square <= radius2 or along <= none or inside < none:
-            return none, none, none, none
-        if along - math.sqrt(inside) >= reach:
-            return none, none, none, none
-        sine2 = radius2 / square
-        one_minus_cos = sine2 / (R(1) + math.sqrt(R(1) - sine2))
-        return red, green, blue, light[CHANCE] / (R(2) * _PI * one_minus_cos)
-    if kind == CYLINDER:
-        t, cosine = _hit_tube(light, ax, ay, az, dx, dy, dz)
-    else:
-        t, cosine = _hit_plane(light, kind, ax, ay, az, dx, dy, dz)
-    if t <= none or t >= reach or cosine <= R(1e-6):
-        return none, none, none, none
-    return red, green, blue, light[CHANCE] * t * t / (cosine * light[AREA])
-
-
-@njit(**INLINE)
-def _hit_plane(light, kind, ax, ay, az, dx, dy, dz):
-    """Distance to a rect or disk and the cosine there; distance 0 for a miss."""
-    zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
-    cosine = -(dx * zx + dy * zy + dz * zz)
-    if cosine <= R(1e-6):
-        return R(0), R(0)
-    t = -(ax * zx + ay * zy + az * zz) / cosine
-    qx, qy, qz = t * dx - ax, t * dy - ay, t * dz - az
-    xx, xy, xz = light[X], light[X + 1], light[X + 2]
-    yx, yy, yz = light[Y], light[Y + 1], light[Y + 2]
-    a = (qx * xx + qy * xy + qz * xz) / (xx * xx + xy * xy + xz * xz)
-    b = (qx * yx + qy * yy + qz * yz) / (yx * yx + yy * yy + yz * yz)
-    inside = a * a + b * b <= R(1) if kind == DISK else max(abs(a), abs(b)) <= R(1)
-    return (t if inside else R(0)), cosine
-
-
-@njit(**INLINE)
-def _hit_tube(light, ax, ay, az, dx, dy, dz):
-    """Distance to the outside of a cylinder and the cosine there; distance 0 for a miss."""
-    xx, xy, xz = light[X], light[X + 1], light[X + 2]
-    half2 = xx * xx + xy * xy + xz * xz
-    da, pa = (dx * xx + dy * xy + dz * xz) / half2, (ax * xx + ay * xy + az * xz) / half2
-    ex, ey, ez = dx - da * xx, dy - da * xy, dz - da * xz
-    fx, fy, fz = ax - pa * xx, ay - pa * xy, az - pa * xz
-    e2 = ex * ex + ey * ey + ez * ez
-    ef = ex * fx + ey * fy + ez * fz
-    r2 = light[SIZE] * light[SIZE]
-    f2 = fx * fx + fy * fy + fz * fz
-    root = ef * ef - e2 * (f2 - r2)
-    if e2 <= R(1e-12) or root <= R(0) or f2 <= r2:
-        return R(0), R(0)
-    t = (ef - math.sqrt(root)) / e2
-    if abs(t * da - pa) > R(1):
-        return R(0), R(0)
-    return t, math.sqrt(root) / light[SIZE]

@@ -229,25 +229,24 @@ def shade_preview(surfaces, hits, tags, first, last):
     f0 = f0 * f0
     for start in range(first, last, BLOCK):
         size = min(BLOCK, last - start)
-        for x in range(size):
-            for k in range(3):
-                block[_O + k * _STEP + x] = hits[WO + k, start + x]
-                block[_I + k * _STEP + x] = hits[WI + k, start + x]
-            for k in range(4):
-                block[_CHANCE + k * _STEP + x] = hits[CHANCE + k, start + x]
+        for row, count, place in ((WO, 3, _O), (WI, 3, _I), (CHANCE, 4, _CHANCE)):
+            for k in range(count):
+                source = hits[row + k][start:]
+                for x in range(size):
+                    block[place + k * _STEP + x] = source[x]
         _look_up(surfaces, tags[MATERIAL, first], hits, start, size, block)
         _shade(f0, size, block)
+        for row, count, place in (
+            (F, 3, _F), (GO, 3, _GO), (WEIGHT, 3, _WEIGHT), (F_PDF, 1, _F_PDF),
+            (GO_PDF, 1, _GO_PDF), (KEEP, 1, _OPACITY), (CHANCE + 3, 1, _CHANCE + 3 * _STEP),
+        ):  # fmt: skip
+            for k in range(count):
+                target = hits[row + k][start:]
+                for x in range(size):
+                    target[x] = block[place + k * _STEP + x]
+        thread = hits[THREAD][start:]
         for x in range(size):
-            h = start + x
-            for k in range(3):
-                hits[F + k, h], hits[GO + k, h] = (
-                    block[_F + k * _STEP + x],
-                    block[_GO + k * _STEP + x],
-                )
-                hits[WEIGHT + k, h] = block[_WEIGHT + k * _STEP + x]
-            hits[F_PDF, h], hits[GO_PDF, h] = block[_F_PDF + x], block[_GO_PDF + x]
-            hits[KEEP, h], hits[THREAD, h] = block[_OPACITY + x], R(-1)
-            hits[CHANCE + 3, h] = block[_CHANCE + 3 * _STEP + x]
+            thread[x] = R(-1)
 
 
 @njit(**LEAN)

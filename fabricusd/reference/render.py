@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fabricusd
+from fabricusd.appearance.footprint import DEFAULT, Limits
 from fabricusd.appearance.shadow import METHODS
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
@@ -28,7 +29,7 @@ from fabricusd.reference.view_transform import view
 from fabricusd.reference.wave import Wave
 from fabricusd.reference.workers import Batches, pixels_along_z_curve, worker_count
 
-BATCH = 1 << 12
+BATCH = 1 << 13
 """Paths in a batch: enough that starting a stage costs little, few enough to stay in cache."""
 
 PASS = 16
@@ -80,6 +81,7 @@ def render(
     max_bounces: int = 4,
     level: str = "auto",
     shadow: str = "horizon",
+    limits: Limits = DEFAULT,
     aovs: tuple[str, ...] = (),
     frames: tuple[float, ...] | None = None,
     seed: int = 0,
@@ -95,6 +97,7 @@ def render(
         of several frames, each gets its number before the suffix
     fabric : on what every surface without a material of its own, and every mesh file, is made of
     spp : samples per pixel; with `noise` the most a pixel gets. Without either, 64
+    limits : where level "auto" goes from one level to the next
     noise : stop a pixel when its relative error is below this
     frames : time codes; None for the stage's default time
     exposure : of the PNG, in stops, added to the camera's own
@@ -118,7 +121,7 @@ def render(
         )
         result = render_scene(
             loaded, width=width, height=height, spp=spp, noise=noise, max_bounces=max_bounces,
-            level=level, shadow=shadow, aovs=layers, seed=seed, workers=workers,
+            level=level, shadow=shadow, limits=limits, aovs=layers, seed=seed, workers=workers,
             pixel_filter=pixel_filter, estimator=estimator, progress=progress,
         )  # fmt: skip
         if target is not None:
@@ -181,6 +184,7 @@ def render_scene(
     max_bounces: int = 4,
     level: str = "auto",
     shadow: str = "horizon",
+    limits: Limits = DEFAULT,
     aovs: tuple[str, ...] = ("beauty",),
     seed: int = 0,
     workers: int | None = None,
@@ -196,12 +200,13 @@ def render_scene(
         scene.lights = default_lights(scene)
     camera = scene.camera or default_camera(scene, width, height)
     tracer = Tracer(
-        scene, max_bounces=max_bounces, level=level, shadow=shadow, seed=seed,
+        scene, max_bounces=max_bounces, level=level, shadow=shadow, limits=limits, seed=seed,
         estimator=estimator, sampler=sampler,
     )  # fmt: skip
     if not len(tracer.tables.triangles):
         scene.note("the scene", "has no triangles to render; only its lights are seen")
     lens = build_lens(camera, width, height, tracer.tables.centre, pixel_filter)
+    tracer.aim(lens, width, height)
     film = Film(width, height, aovs)
     count = worker_count(workers)
     counters = np.zeros((count, 3), np.int64)

@@ -72,6 +72,7 @@ class Wave:
         self.hits = aligned_empty((HIT_ROWS, row))
         self.tags = aligned_empty((5, row), np.int32)
         self.keys = aligned_empty((capacity,), np.int32)
+        self.order = aligned_empty((capacity,), np.int32)
         self.path_pixel = aligned_empty((capacity,), np.uint32)
         self.path_sample = aligned_empty((capacity,), np.uint32)
         self.shadow = aligned_empty((4, row))

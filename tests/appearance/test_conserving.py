@@ -11,8 +11,8 @@ from fabricusd.appearance import conserving, multiple, plain
 from fabricusd.appearance.conserving_sampling import (
     conserving_density,
     conserving_direction,
-    conserving_sampling_tables,
 )
+from fabricusd.appearance.conserving_shares import conserving_sampling_tables
 from fabricusd.appearance.quadrature import POINTS, Rule
 from fabricusd.appearance.real import KERNEL
 from fabricusd.errors import FabricError

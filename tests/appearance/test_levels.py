@@ -169,7 +169,8 @@ def test_shadowing_multiplies_by_the_light_that_arrives_over_its_mean(level, sha
     shadowed = surface.evaluate(fabric, wi, VIEWS["normal"], uv=places, level=level, shadow=shadow)
     g = shadowing(fabric, wi, places, shadow, level=level)
     tables = compile_shadow(fabric, shadow, level=level, precision=np.float64)
-    mean = np.array([mean_lit(R, tables, *w) for w in wi])
+    sets = lookup(fabric, places).set
+    mean = np.array([mean_lit(R, tables, int(k), *w) for k, w in zip(sets, wi, strict=True)])
     assert shadowed == pytest.approx(open_sky * (g / mean)[:, None], rel=1e-9)
     assert (g.sum() < len(g)) == (shadow != "none")
     assert (mean.min() < 1) == (shadow in ("horizon", "traced"))

@@ -142,13 +142,11 @@ def relative_variance(fabric, level, wo, uv, n=3000):
 def largest_variance(name, model, level):
     """The share of uniform directions' variance that drawing may leave, MODEL section 9.4.
 
-    At level `thread` the highlight across the width is in no lobe, and rare bright samples decide;
-    `conserving` velvet, mostly light scattered more than once, is nearly even to begin with (0.7
-    where the published is 3).
+    At level `thread` the highlight across the width is in no lobe, and rare bright samples decide.
     """
     if level == "thread":
         return 1.0
-    if name == "velvet" and model != "conserving":
+    if name == "velvet":
         return 0.2
     return 0.7 if level == "far" else 0.4
 

@@ -10,8 +10,8 @@ from fabricusd.appearance.surface_sampling import (
     far_direction,
     point_density,
     point_direction,
-    sampling_tables,
 )
+from fabricusd.appearance.surface_shares import sampling_tables
 from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.weave import lookup
 from fabricusd.reference.fabric_sampling import sample_far, sample_points
@@ -40,7 +40,7 @@ def test_the_far_sampler_draws_the_same_directions_with_the_same_densities(prese
     wo, wi, u = views(700)
     go, p_light, p_go = np.empty_like(wo), np.empty(705, R), np.empty(705, R)
     rows = [np.concatenate([np.zeros(5, R), row]) for row in u]
-    sample_far(R, sampling, wo, wi, *rows, go, p_light, p_go, 5)
+    sample_far(R, sampling, wo, wi, *rows, go, p_light, p_go, 5, 700)
     for k in range(700):
         one = far_direction(R, sampling, *wo[:, k], *u[:, k])
         assert go[:, k] == pytest.approx(one, abs=2e-5)
@@ -59,7 +59,9 @@ def test_the_sampler_at_a_point_does_too_and_gaps_are_uniform(preset):
     hit = lookup(fabric, np.random.default_rng(1).uniform(0, 40, (700, 2)))
     psi0 = hit.angle.astype(R)
     go, p_light, p_go = np.empty_like(wo), np.empty(700, R), np.empty(700, R)
-    sample_points(R, tables, sampling, hit.set, hit.thread, psi0, wo, wi, *u, go, p_light, p_go, 0)
+    sample_points(
+        R, tables, sampling, hit.set, hit.thread, psi0, wo, wi, *u, go, p_light, p_go, 0, 700
+    )
     for k in range(700):
         at = (int(hit.set[k]), int(hit.thread[k]), psi0[k])
         one = point_direction(R, tables, sampling, *at, *wo[:, k], *u[:, k])

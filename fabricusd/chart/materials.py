@@ -1,0 +1,107 @@
+"""Panel: standard surfaces over baked textures against the cloth that they stand for."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import fields
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from fabricusd.appearance import surface
+from fabricusd.bake.bake import Settings, bake
+from fabricusd.chart.panel import Panel, Row
+from fabricusd.chart.timing import in_turns, typical
+from fabricusd.fabric import Binding, Fabric
+from fabricusd.preview.bake_folder import read_bake_folder
+from fabricusd.preview.fit import TexelSample, fit, forward
+from fabricusd.preview.judge import direction_pairs
+from fabricusd.preview.look import Look
+from fabricusd.preview.models import KINDS
+from fabricusd.preview.texels import NEEDED, draw_texels
+from fabricusd.schema import load
+
+PRESETS = (
+    "linen_plain", "silk_crepe_de_chine", "polyester_satin_charmeuse", "silk_shot", "velvet",
+    "wool_flannel",
+)  # fmt: skip
+QUICK_PRESETS = ("linen_plain",)
+QUICK_KINDS = ("preview", "openpbr")
+THREADS = 6400.0
+"""Along the square that is baked: a texel then spans whole repeats."""
+
+SQUARE = (
+    "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+    "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+)
+
+
+def baked_texels(fabric: Fabric, folder: Path, threads: float = THREADS) -> TexelSample:
+    """Texels of a square of `fabric`, `threads` along its side, baked at 64 x 64."""
+    scene = folder / "square.obj"
+    scene.write_text(SQUARE)
+    out = folder / f"{fabric.name}_{threads:g}"
+    binding = Binding(fabric=fabric, threads_per_uv=(threads, threads))
+    bake(scene, out, Settings(resolution=64, maps=NEEDED), fabric=binding)
+    maps = read_bake_folder(out).garments[0]
+    found = draw_texels(maps, 0, maps.lays[0])
+    assert found is not None, "the maps that were asked for are all baked"
+    return found
+
+
+def run(quick: bool) -> list[Row]:
+    """A group for each preset: every kind of surface with the textures alone and fitted, and the
+    law itself."""
+    rows = []
+    with tempfile.TemporaryDirectory() as name:
+        for preset in QUICK_PRESETS if quick else PRESETS:
+            fabric = load(preset)
+            rows += _rows(fabric, baked_texels(fabric, Path(name)), quick)
+    return rows
+
+
+def _rows(fabric: Fabric, texels: TexelSample, quick: bool) -> list[Row]:
+    wi, wo = direction_pairs()
+    # One texel is what a renderer shades; all of them are what it shows from afar.
+    one = TexelSample(**{f.name: getattr(texels, f.name)[:1] for f in fields(TexelSample)})
+    law = "the law, far"
+    runs: dict[str, Callable[[], object]] = {
+        law: lambda: surface.evaluate(fabric, wi, wo, level="far")
+    }
+    errors, highest = {law: 0.0}, {law: 0.0}
+    for kind in QUICK_KINDS if quick else KINDS:
+        found = fit(kind, texels, fabric)
+        runs[f"{kind}, fitted"] = partial(forward, kind, found.look, one, wi[None], wo[None])
+        errors[f"{kind}, fitted"] = found.delta_e
+        highest[f"{kind}, fitted"] = found.delta_e_95
+        runs[f"{kind}, textures alone"] = partial(forward, kind, Look(), one, wi[None], wo[None])
+        errors[f"{kind}, textures alone"] = found.start_delta_e
+    rows = []
+    for method, seconds in in_turns(runs, 2 if quick else 5).items():
+        cost, spread = typical(np.array(seconds) / len(wi) * 1e9)
+        figures = {"delta_e_95": highest[method]} if method in highest else {}
+        rows.append(
+            Row(
+                group=fabric.name, method=method, cost=cost, cost_spread=spread,
+                error=errors[method], figures=figures,
+            )
+        )  # fmt: skip
+    return rows
+
+
+PANEL = Panel(
+    name="materials",
+    title="Downstream materials",
+    cost="ns an evaluation",
+    error="mean delta E 2000",
+    about=(
+        "Standard surfaces over a bake whose texels span whole repeats, against level `far` over "
+        "pairs of directions of the hemisphere: `preview` is UsdPreviewSurface, `openpbr` also "
+        "stands for Standard Surface, `principled` is Blender's. A surface's cost is that of its "
+        "formulas in NumPy, the law's that of its float64 kernels; a renderer's own differ. What "
+        "Cycles shows of them is in [materials.md](materials.md)."
+    ),
+    run=run,
+)
