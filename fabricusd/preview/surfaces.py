@@ -63,8 +63,10 @@ class Maps:
         if isinstance(source, Value):
             return source
         st = self.builder.add("st", "texcoord", "vector2", "ND_texcoord_vector2")
+        # A graph's nodes and inputs share their names.
+        node = f"{name}_map" if name in PARAMETERS else name
         return self.builder.add(
-            name, "image", kind, f"ND_image_{kind}",
+            node, "image", kind, f"ND_image_{kind}",
             file=source, texcoord=st,
         )  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,13 @@ class TexelSample:
     def threads(self) -> list[int]:
         """Numbers of the threads that there are texels of."""
         return [int(one) for one in np.unique(self.thread) if one != NO_THREAD]
+
+    def part(self, chosen: slice) -> TexelSample:
+        """Some of the texels."""
+        held = {f.name: getattr(self, f.name) for f in fields(self)}
+        return TexelSample(
+            **{n: v[chosen] if isinstance(v, np.ndarray) else v for n, v in held.items()}
+        )
 
     @property
     def shares(self) -> dict[int, float]:

@@ -81,6 +81,7 @@ def test_a_look_of_resolved_threads_reads_the_fitted_maps(baked, tmp_path, monke
         file = UsdShade.Shader(prim).GetInput("file") if prim.IsA(UsdShade.Shader) else None
         if file and isinstance(file.Get(), Sdf.AssetPath):
             found.setdefault(prim.GetName(), set()).add(file.Get().path)
-    for name in ("base_color", "roughness_along", "roughness_across", "specular_tint"):
+    for name in ("base_color", "roughness_along", "roughness_across"):
         assert found[name] == {f"./look_maps/Body.{name}.exr"}
+    assert found["specular_tint_map"] == {"./look_maps/Body.specular_tint.exr"}
     assert "look_maps" not in next(iter(found["Preview_base_color"]))

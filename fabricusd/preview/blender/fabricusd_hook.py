@@ -180,7 +180,7 @@ def _reflection(nodes: Nodes, network: Network, give: Any) -> None:
     give("Roughness", nodes.math("POWER", nodes.math("MULTIPLY", smooth, rough), 0.25))
     give("Anisotropic", nodes.math("DIVIDE", less, 1.0 - NARROWEST))
     give("IOR", network.constant("specular_ior"))
-    tint, tints = tuple(network.constant("specular_tint")), network.file("specular_tint")
+    tint, tints = tuple(network.constant("specular_tint")), network.file("specular_tint_map")
     if tints is not None:
         give("Specular Tint", nodes.vector("MULTIPLY", nodes.image(tints, data=False), tint))
     else:
