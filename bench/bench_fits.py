@@ -3,10 +3,10 @@
     python bench/bench_fits.py [PRESET ...]
 
 A square of each preset is baked so that a texel spans whole repeats, and at 8 texels a thread; each
-surface is fitted to both, and where threads resolve also with each thread's own fit in the textures,
-as `fabricusd material` writes them. Delta E 2000 over pairs of directions of the hemisphere, in a light under
-which a white diffuser is white; `albedo` is the mean relative difference of directional albedo,
-`threads` the mean delta E of each thread's own texels.
+surface is fitted to both, and where threads resolve also with each thread's own fit in the
+textures, as `fabricusd material` writes them. Delta E 2000 over pairs of directions of the
+hemisphere, in a light under which a white diffuser is white; `albedo` is the mean relative
+difference of directional albedo, `threads` the mean delta E of each thread's own texels.
 """
 
 from __future__ import annotations
