@@ -236,13 +236,18 @@ class FabricLooks(bpy.types.USDHook):  # type: ignore[misc]
     def on_import(import_context: Any) -> bool:
         """Called by Blender when a USD file has been read."""
         try:
+            # Blender ships USD's Python modules; the bpy wheel does not, and get_stage would abort,
+            # or with another USD's modules be of a type that they do not know.
             import pxr.UsdShade  # noqa: F401
-        except ImportError:
-            # Blender ships USD's Python modules; the bpy wheel does not, and get_stage would abort.
-            print("fabricusd looks: no module pxr here; call rebuild_all(stage) yourself")
+
+            stage = import_context.get_stage()
+            names = getattr(import_context, "get_prim_map", dict)()
+        except (ImportError, TypeError):
+            print(
+                "fabricusd looks: not Blender's own USD modules; call rebuild_all(stage) yourself"
+            )
             return False
-        names = getattr(import_context, "get_prim_map", None)
-        return rebuild_all(import_context.get_stage(), names() if names else None) >= 0
+        return rebuild_all(stage, names) >= 0
 
 
 def register() -> None:
