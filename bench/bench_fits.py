@@ -3,8 +3,10 @@
     python bench/bench_fits.py [PRESET ...]
 
 A square of each preset is baked so that a texel spans whole repeats, and at 8 texels a thread; each
-surface is fitted to both. Delta E 2000 over pairs of directions of the hemisphere, in a light under
-which a white diffuser is white; `albedo` is the mean relative difference of directional albedo.
+surface is fitted to both, and where threads resolve also with each thread's own fit in the
+textures, as `fabricusd material` writes them. Delta E 2000 over pairs of directions of the
+hemisphere, in a light under which a white diffuser is white; `albedo` is the mean relative
+difference of directional albedo, `threads` the mean delta E of each thread's own texels.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ import tempfile
 from pathlib import Path
 
 from fabricusd.chart.materials import baked_texels
-from fabricusd.preview.fit import fit
+from fabricusd.preview.fit import Fitted, fit, fit_threads, with_threads
 from fabricusd.schema import load
 
 PRESETS = (
@@ -25,19 +27,30 @@ KINDS = ("preview", "openpbr", "principled")
 
 
 def main() -> None:
-    print("| preset | texels | surface | textures alone | fitted | 95th | albedo |")
-    print("|---|---|---|---|---|---|---|")
+    print("| preset | texels | surface | textures alone | fitted | 95th | albedo | threads |")
+    print("|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name:
         for preset in sys.argv[1:] or PRESETS:
+            fabric = load(preset)
             for words, threads in (("of whole repeats", 6400.0), ("8 a thread", 8.0)):
-                texels = baked_texels(load(preset), Path(name), threads)
+                texels = baked_texels(fabric, Path(name), threads)
                 for kind in KINDS:
-                    f = fit(kind, texels, load(preset))
-                    print(
-                        f"| {preset} | {words} | {kind} | {f.start_delta_e:.1f} | {f.delta_e:.1f} "
-                        f"| {f.delta_e_95:.1f} | {100 * f.albedo:.0f} % |",
-                        flush=True,
-                    )
+                    show(preset, words, kind, fit(kind, texels, fabric))
+                if texels.threads:
+                    looks = {n: one.look for n, one in fit_threads(texels, fabric).items()}
+                    own = with_threads(texels, looks)
+                    for kind in KINDS[1:]:
+                        found = fit(kind, own, fabric, baked=texels)
+                        show(preset, f"{words}, by thread", kind, found)
+
+
+def show(preset: str, words: str, kind: str, f: Fitted) -> None:
+    threads = "" if f.threads_delta_e is None else f"{f.threads_delta_e:.1f}"
+    print(
+        f"| {preset} | {words} | {kind} | {f.start_delta_e:.1f} | {f.delta_e:.1f} "
+        f"| {f.delta_e_95:.1f} | {100 * f.albedo:.0f} % | {threads} |",
+        flush=True,
+    )
 
 
 if __name__ == "__main__":

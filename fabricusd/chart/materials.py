@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from dataclasses import fields
 from functools import partial
 from pathlib import Path
 
@@ -16,10 +15,11 @@ from fabricusd.chart.panel import Panel, Row
 from fabricusd.chart.timing import in_turns, typical
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.preview.bake_folder import read_bake_folder
-from fabricusd.preview.fit import TexelSample, fit, forward
+from fabricusd.preview.fit import fit, forward
 from fabricusd.preview.judge import direction_pairs
 from fabricusd.preview.look import Look
 from fabricusd.preview.models import KINDS
+from fabricusd.preview.target import TexelSample
 from fabricusd.preview.texels import NEEDED, draw_texels
 from fabricusd.schema import load
 
@@ -44,7 +44,7 @@ def baked_texels(fabric: Fabric, folder: Path, threads: float = THREADS) -> Texe
     scene.write_text(SQUARE)
     out = folder / f"{fabric.name}_{threads:g}"
     binding = Binding(fabric=fabric, threads_per_uv=(threads, threads))
-    bake(scene, out, Settings(resolution=64, maps=NEEDED), fabric=binding)
+    bake(scene, out, Settings(resolution=64, maps=(*NEEDED, "thread_id")), fabric=binding)
     maps = read_bake_folder(out).garments[0]
     found = draw_texels(maps, 0, maps.lays[0])
     assert found is not None, "the maps that were asked for are all baked"
@@ -65,7 +65,7 @@ def run(quick: bool) -> list[Row]:
 def _rows(fabric: Fabric, texels: TexelSample, quick: bool) -> list[Row]:
     wi, wo = direction_pairs()
     # One texel is what a renderer shades; all of them are what it shows from afar.
-    one = TexelSample(**{f.name: getattr(texels, f.name)[:1] for f in fields(TexelSample)})
+    one = texels.part(slice(1))
     law = "the law, far"
     runs: dict[str, Callable[[], object]] = {
         law: lambda: surface.evaluate(fabric, wi, wo, level="far")

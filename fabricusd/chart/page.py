@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import platform
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -147,7 +148,10 @@ def _limits() -> list[str]:
     ]
     for name in read_limits():
         found = [choose_limits([name], bound)[0] for bound in LEVEL_BOUNDS]
-        cells = [f"{number(x.repeats)} / {number(x.pixels)}" for x in found]
+        cells = [
+            f"{number(x.repeats) if x.repeats < math.inf else 'never'} / {number(x.pixels)}"
+            for x in found
+        ]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return [*lines, ""]
 

@@ -20,8 +20,11 @@ from fabricusd.appearance.thread import evaluate as thread_value
 from fabricusd.appearance.weave import lookup
 from fabricusd.chart.cloth_picture import difference, ideal_spectrum, picture, view_of
 from fabricusd.chart.draw import pyplot, save
+from fabricusd.chart.scenes import cloth, facing
 from fabricusd.fabric import PILE_ANGLE, Fabric
 from fabricusd.files import whole_file
+from fabricusd.reference.render import render_scene
+from fabricusd.reference.scene import SPHERE, Light, Mesh, Scene
 from fabricusd.schema import load
 
 Floats = NDArray[np.float64]
@@ -255,16 +258,53 @@ def upright_threads() -> Case:
     )  # fmt: skip
 
 
+def light_at_the_surface() -> Case:
+    """A ball of light that sinks into the cloth, its centre from a metre away to within it."""
+    heights = np.concatenate(([0.001, 0.003, 0.006, 0.009], np.geomspace(0.0101, 1.0, 20)))
+    radius, linen = 0.01, load("linen_plain")
+    side = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    corners = np.array([[0, 1, 2], [0, 2, 3]])
+    plane = Mesh(
+        path="/plane", points=side, triangles=corners, uv=side[corners][..., :2],
+        material=np.zeros(2, int),
+    )  # fmt: skip
+
+    def seen(height: float) -> float:
+        frame = np.eye(4)
+        frame[2, 3] = height
+        light = Light(
+            path="/ball", kind=SPHERE, radius=radius, frame=frame, camera_visible=False,
+            radiance=(1.0 / (math.pi * radius**2),) * 3,
+        )  # fmt: skip
+        scene = Scene(
+            meshes=[plane], materials=[cloth(linen)], lights=[light], camera=facing(1e-4, 1e-4)
+        )
+        made = render_scene(
+            scene, width=4, height=4, spp=64, level="far", max_bounces=0, pixel_filter="box"
+        )
+        return float(made.layers["beauty"][..., :3].mean())
+
+    ours = np.array([seen(h) for h in heights])
+    return Case(
+        where="light at or inside the surface", axis="height of the light's centre [m]",
+        unit="irradiance [W/m²] of 1 W/sr", x=heights, published=1.0 / heights**2,
+        ours=ours / ours[-1] / heights[-1] ** 2, log_x=True,
+        said="1/r² of a point grows without bound, a ball gives no more than its radiance; what it "
+        "has swallowed sees none of its outside",
+    )  # fmt: skip
+
+
 CASES: tuple[Callable[[], Case], ...] = (
     mirror_at_grazing, along_the_thread, wide_lobes, white_furnace, steep_curves, far_uv,
-    middle_distance, growing_energy, below_the_cloth, upright_threads,
+    middle_distance, growing_energy, below_the_cloth, upright_threads, light_at_the_surface,
 )  # fmt: skip
 
 ELSEWHERE = {
     "degenerate, mirrored, overlapping or missing UV": "refused or named in a note; "
     "tests/bake/test_garment.py, tests/reference/test_usd_scene.py",
     "a 1×1 and a 4096×4096 grid": "tests/appearance/test_failures.py",
-    "grazing camera on a thin fold; light at or inside the surface": "not charted",
+    "grazing camera on a thin fold": "rays leave from beside the shading point, "
+    "tests/reference/test_integrator.py",
 }
 """Rows of section 10 that are no formula of one variable, and what is done about them."""
 

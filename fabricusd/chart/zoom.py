@@ -152,9 +152,10 @@ PANEL = Panel(
     error="rms difference over mean",
     about=(
         "A flat cloth, a pixel so many threads wide, the camera rolled, level `weave` "
-        "with shadows by `horizon`; `auto` goes from `far` to `weave` and no further. The reference is the cloth's spectrum below the picture's "
-        "Nyquist frequency. Alias is what the picture holds beside it, moiré above all; blur what "
-        "it lacks of it, shift how far its mean is off. Their squares add up to that of the error."
+        "with shadows by `horizon`; `auto` goes from `far` to `weave` and no further. The "
+        "reference is the cloth's spectrum below the picture's Nyquist frequency. Alias is what "
+        "the picture holds beside it, moiré above all; blur what it lacks of it, shift how far its "
+        "mean is off. Their squares add up to that of the error."
     ),
     run=run,
     draw=draw,

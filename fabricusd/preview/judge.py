@@ -2,7 +2,7 @@
 
 A pair's colour is that in a light under which a white diffuser is white. The sky is even, and its
 colours are the directional albedos of the views: a highlight that is a little out of place spoils
-pairs, and not the picture under a sky. Both count alike.
+pairs, and not the picture under a sky.
 """
 
 from __future__ import annotations
@@ -16,6 +16,10 @@ Floats = NDArray[np.float64]
 
 VIEWS, LIGHTS = 16, 96
 """Directions of the hemisphere, even in solid angle; the views reach down to 80 degrees."""
+
+SKY = 0.2
+"""How much the sky counts, the pairs the rest: enough that body colours do not stray where
+highlights cannot be met, and not so much that pairs get worse for it."""
 
 
 def hemisphere(count: int, lowest: float = 0.0) -> Floats:
@@ -48,8 +52,8 @@ class Judge:
     def __init__(self, target: Floats, weight: Floats) -> None:
         self.colors = _colors(target)
         self.weight = weight / weight.sum()
-        each = np.repeat([1.0 / (VIEWS * LIGHTS), 1.0 / VIEWS], [VIEWS * LIGHTS, VIEWS])
-        self._share = np.sqrt(0.5 * self.weight[:, None] * each)[..., None]
+        each = np.repeat([(1.0 - SKY) / (VIEWS * LIGHTS), SKY / VIEWS], [VIEWS * LIGHTS, VIEWS])
+        self._share = np.sqrt(self.weight[:, None] * each)[..., None]
         self._lab = lab(self.colors)
         lightness, chroma = self._lab[..., 0], np.hypot(self._lab[..., 1], self._lab[..., 2])
         self._hue = self._lab[..., 1:] / np.maximum(chroma, 1e-6)[..., None]
@@ -60,13 +64,23 @@ class Judge:
             axis=-1,
         )
 
-    def residuals(self, values: Floats) -> Floats:
+    def residuals(self, values: Floats, less: Floats | float = 1.0) -> Floats:
         """Differences of lightness, chroma and hue, scaled like delta E 2000 about the target, but
-        smooth; their squares add up to a mean squared delta E."""
+        smooth; their squares add up to a mean squared delta E.
+
+        less : (rows, VIEWS * LIGHTS + VIEWS) factor on each
+        """
         off = lab(_colors(values)) - self._lab
         a, b, hue = off[..., 1], off[..., 2], self._hue
         parts = (off[..., 0], a * hue[..., 0] + b * hue[..., 1], b * hue[..., 0] - a * hue[..., 1])
-        return np.asarray((np.stack(parts, axis=-1) / self._scale * self._share).ravel())
+        share = self._share * np.asarray(less)[..., None]
+        return np.asarray((np.stack(parts, axis=-1) / self._scale * share).ravel())
+
+    def evened(self, values: Floats) -> Floats:
+        """Factors for `residuals` with which their squares add up to a mean delta E, about these
+        values: 1/sqrt(delta E), at most 1."""
+        error = delta_e_2000(_colors(values), self.colors)
+        return np.asarray(1.0 / np.sqrt(np.maximum(error, 1.0)))
 
     def delta_e(self, values: Floats) -> Floats:
         """(rows, VIEWS * LIGHTS) delta E 2000 of the pairs."""
@@ -77,9 +91,9 @@ class Judge:
         return delta_e_2000(albedo(values), self.colors[:, VIEWS * LIGHTS :])
 
     def score(self, values: Floats) -> float:
-        """Mean delta E 2000 of pairs and sky, which count alike; rows by their weight."""
-        pairs, sky = self.delta_e(values), self.delta_e_of_sky(values)
-        return float(0.5 * self.weight @ (pairs.mean(axis=1) + sky.mean(axis=1)))
+        """Mean delta E 2000 of pairs and, by SKY, of the sky; rows by their weight."""
+        pairs, sky = self.delta_e(values).mean(axis=1), self.delta_e_of_sky(values).mean(axis=1)
+        return float(self.weight @ ((1.0 - SKY) * pairs + SKY * sky))
 
 
 def _colors(values: Floats) -> Floats:

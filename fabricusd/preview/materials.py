@@ -143,5 +143,9 @@ def _report(made: Written) -> dict[str, Any]:
             where: {kind: one.as_dict() for kind, one in fits.items()}
             for where, fits in made.fits.items()
         },
+        "threads": {
+            where: {str(number): one.as_dict() for number, one in threads.items()}
+            for where, threads in made.threads.items()
+        },
         "notes": made.notes,
     }

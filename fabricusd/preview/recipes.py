@@ -11,13 +11,14 @@ import numpy as np
 
 from fabricusd.errors import FabricError
 from fabricusd.preview.bake_folder import BakeFolder, MapSet
-from fabricusd.preview.fit import Fitted, fit
+from fabricusd.preview.fit import Fitted, fit, fit_threads, thread_factors, with_threads
 from fabricusd.preview.graph import Texture, Value
 from fabricusd.preview.hair import hair
 from fabricusd.preview.layer import MaterialRecipe, Recipes
 from fabricusd.preview.look import Look
-from fabricusd.preview.surfaces import GRAPHS, MAPS, Inputs, parameter_values, preview
+from fabricusd.preview.surfaces import GRAPHS, MAPS, NO_TINT, Inputs, parameter_values, preview
 from fabricusd.preview.texels import draw_texels, mean_texel
+from fabricusd.preview.thread_maps import COLUMNS, Factors, write_thread_maps
 from fabricusd.reference.images import read_mip_level, write_png
 from fabricusd.schema.write import prim_name
 
@@ -36,6 +37,7 @@ NEUTRAL = {
     "opacity": Value("float", 1.0),
     "normal": Value("vector3", (0.5, 0.5, 1.0)),
     "tangent": Value("vector3", (1.0, 0.0, 0.0)),
+    "specular_tint": NO_TINT,
 }
 """What stands in for a map that is not there."""
 
@@ -61,11 +63,12 @@ class Settings:
 
 @dataclass(kw_only=True)
 class Written:
-    """The files that were made, what had to be left out, and the fits."""
+    """The files that were made, what had to be left out, the fits of surfaces and of threads."""
 
     files: list[Path] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     fits: dict[str, dict[str, Fitted]] = field(default_factory=dict)
+    threads: dict[str, dict[int, Fitted]] = field(default_factory=dict)
 
 
 def recipes(
@@ -76,15 +79,20 @@ def recipes(
     found: dict[tuple[str, int, str], MaterialRecipe] = {}
     documents = []
     for maps in folder.garments:
+        found_looks, fitted = _garment_looks(maps, path, settings, made, progress)
         textures = texture_inputs(maps, path, made)
+        of_threads = textures if fitted is maps else texture_inputs(fitted, path, made)
         for number, lay in enumerate(maps.lays):
             name = prim_name(maps.name if len(maps.lays) == 1 else f"{maps.name}_{number}")
-            looks = _looks(maps, number, settings, made, progress)
-            means = mean_inputs(maps, number)
+            looks = found_looks[number]
+            means, of_means = mean_inputs(maps, number), mean_inputs(fitted, number)
             cover = means["opacity"].value
             assert isinstance(cover, float)
             opaque = cover > OPAQUE
-            for variant, inputs in (("baked", textures), ("procedural", means)):
+            for variant, plain, inputs in (
+                ("baked", textures, of_threads),
+                ("procedural", means, of_means),
+            ):
                 title = name if variant == "baked" else f"{name}_plain"
                 graphs = {
                     s: GRAPHS[s](inputs, opaque) if s in GRAPHS else hair(inputs, opaque, lay)
@@ -94,7 +102,7 @@ def recipes(
                 found[maps.name, number, variant] = MaterialRecipe(
                     name=title,
                     graphs=(
-                        ("", preview(inputs, looks["preview"], opaque)),
+                        ("", preview(plain, looks["preview"], opaque)),
                         ("", graphs[first]),
                     ),
                     parameters=parameter_values(looks[first])
@@ -117,15 +125,23 @@ def texture_inputs(maps: MapSet, path: Path, made: Written) -> Inputs:
     return found
 
 
-def _coded_normals(maps: MapSet, path: Path, made: Written) -> Path:
-    """Normals as 16-bit PNG files beside the layer: readers of normal maps ask for codes."""
+def maps_folder(path: Path) -> Path:
+    """The folder beside a look for textures of its own, made where it is not there."""
     folder = path.with_name(f"{path.stem}_maps")
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise FabricError(str(folder), f"cannot be made: {error.strerror}; use -o") from error
+    return folder
+
+
+def _coded_normals(maps: MapSet, path: Path, made: Written) -> Path:
+    """Normals as 16-bit PNG files beside the layer: readers of normal maps ask for codes."""
+    folder = maps_folder(path)
     for number, source in maps.textures["normal"].items():
         target = folder / f"{maps.name}.normal.{number}.png"
+        if target in made.files:
+            continue
         codes = np.clip(0.5 * read_mip_level(source) + 0.5, 0.0, 1.0)
         # Texels outside the layout hold no direction; they point straight up.
         codes[np.all(codes == 0.5, axis=-1)] = (0.5, 0.5, 1.0)
@@ -147,29 +163,60 @@ def mean_inputs(maps: MapSet, number: int) -> dict[str, Value]:
     }
 
 
+def _garment_looks(
+    maps: MapSet, path: Path, settings: Settings, made: Written, progress: Progress | None
+) -> tuple[list[dict[str, Look]], MapSet]:
+    """The looks of each lay, and the maps that all surfaces but UsdPreviewSurface take: those of
+    the bake, or where texels resolve threads, with each thread's own fit in them."""
+    looks, factors = [], {}
+    for number in range(len(maps.lays)):
+        of_lay, of_threads = _looks(maps, number, settings, made, progress)
+        looks.append(of_lay)
+        if of_threads:
+            factors[number] = of_threads
+    if not factors:
+        return looks, maps
+    fitted = write_thread_maps(maps, factors, maps_folder(path))
+    made.files += [fitted.textures[name][t] for name in COLUMNS for t in fitted.textures[name]]
+    return looks, fitted
+
+
 def _looks(
     maps: MapSet, number: int, settings: Settings, made: Written,
     progress: Progress | None,
-) -> dict[str, Look]:  # fmt: skip
-    """The look for each surface that is written; lays of one fabric and scale share a fit."""
+) -> tuple[dict[str, Look], Factors]:  # fmt: skip
+    """The look for each surface that is written, and the factors of each thread, if any."""
     lay = maps.lays[number]
     kinds = ("preview", "principled", *(s for s in settings.surfaces if s in GRAPHS))
     plain = dict.fromkeys(("preview", "principled", *settings.surfaces), Look())
     if not settings.fitted:
-        return plain
+        return plain, {}
     if lay.fabric is None:
         made.notes.append(
             f"fabric '{lay.name}' is not in the folder; its parameters are not fitted"
         )
-        return plain
+        return plain, {}
     texels = draw_texels(maps, number, lay)
     if texels is None:
         made.notes.append(f"{maps.name} lacks maps that a fit needs; its parameters are not fitted")
-        return plain
+        return plain, {}
+
+    def fitting(what: str) -> None:
+        if progress:
+            progress(f"fitting {what} to {lay.name} on {maps.name}")
+
+    factors: Factors = {}
+    own = texels
+    if texels.threads:
+        fitting("threads")
+        threads = fit_threads(texels, lay.fabric)
+        looks = {one: fitted.look for one, fitted in threads.items()}
+        own, factors = with_threads(texels, looks), thread_factors(looks, texels.shares)
+        made.threads[f"{maps.name} {lay.name}"] = threads
     found = {}
     for kind in kinds:
-        if progress:
-            progress(f"fitting {kind} to {lay.name} on {maps.name}")
-        found[kind] = fit(kind, texels, lay.fabric)
+        fitting(kind)
+        takes = texels if kind == "preview" else own
+        found[kind] = fit(kind, takes, lay.fabric, baked=texels)
     made.fits[f"{maps.name} {lay.name}"] = found
-    return plain | {kind: one.look for kind, one in found.items()}
+    return plain | {kind: one.look for kind, one in found.items()}, factors

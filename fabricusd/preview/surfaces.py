@@ -21,8 +21,12 @@ MAPS = {
     "opacity": "float",
     "normal": "vector3",
     "tangent": "vector3",
+    "specular_tint": "color3",
 }
 """Maps that a surface reads, and their types."""
+
+NO_TINT = Value("color3", (1.0, 1.0, 1.0))
+"""What stands for map `specular_tint`, which only fits to threads have."""
 
 PARAMETERS = {
     "base_color_scale": "color3",
@@ -59,8 +63,10 @@ class Maps:
         if isinstance(source, Value):
             return source
         st = self.builder.add("st", "texcoord", "vector2", "ND_texcoord_vector2")
+        # A graph's nodes and inputs share their names.
+        node = f"{name}_map" if name in PARAMETERS else name
         return self.builder.add(
-            name, "image", kind, f"ND_image_{kind}",
+            node, "image", kind, f"ND_image_{kind}",
             file=source, texcoord=st,
         )  # fmt: skip
 
@@ -116,6 +122,14 @@ def _base(b: Builder, read: Maps) -> Link:
     return b.add("base", "clamp", "color3", "ND_clamp_color3FA", **inputs)
 
 
+def _tint(b: Builder, read: Maps) -> Source:
+    if read.maps.get("specular_tint", NO_TINT) == NO_TINT:
+        return Parameter("specular_tint")
+    return b.math(
+        "tint_scaled", "multiply", "color3", read("specular_tint"), Parameter("specular_tint")
+    )
+
+
 def _fourth_root(b: Builder, value: Link) -> Link:
     return b.math("roughness", "power", "float", value, one(0.25))
 
@@ -139,7 +153,7 @@ def openpbr(maps: Inputs, opaque: bool) -> Graph:
     frame = _frame(b, read)
     inputs: dict[str, Source] = {
         "base_color": _base(b, read),
-        "specular_color": Parameter("specular_tint"),
+        "specular_color": _tint(b, read),
         "specular_ior": Parameter("specular_ior"),
         "specular_roughness": _fourth_root(b, mean),
         "specular_roughness_anisotropy": _anisotropy(b, smooth, rough),
@@ -172,7 +186,7 @@ def standard_surface(maps: Inputs, opaque: bool) -> Graph:
         "base": one(1.0),
         "base_color": _base(b, read),
         "specular": one(1.0),
-        "specular_color": Parameter("specular_tint"),
+        "specular_color": _tint(b, read),
         "specular_IOR": Parameter("specular_ior"),
         "specular_roughness": _fourth_root(b, product),
         "specular_anisotropy": _anisotropy(b, smooth, rough),
@@ -218,7 +232,7 @@ def gltf_pbr(maps: Inputs, opaque: bool) -> Graph:
         "metallic": one(0.0),
         "roughness": b.math("roughness", "power", "float", smooth, one(0.5)),
         "anisotropy_strength": b.math("strength", "power", "float", square, one(0.5)),
-        "specular_color": Parameter("specular_tint"),
+        "specular_color": _tint(b, read),
         "ior": Parameter("specular_ior"),
         "sheen_color": sheen,
         "sheen_roughness": Parameter("fuzz_roughness"),

@@ -8,13 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 
+from fabricusd.bake.bake import FEWEST
+from fabricusd.bake.maps import GAP_ID
 from fabricusd.preview.bake_folder import BakedLay, MapSet
-from fabricusd.preview.fit import TexelSample
+from fabricusd.preview.target import NO_THREAD, TexelSample
 from fabricusd.reference.images import read_mip_level
 
 DRAWN, KINDS = 2048, 12
 """Texels drawn of each lay, and the kinds that they are sorted into, each standing for its share:
 the threads of a repeat at several tangent angles."""
+
+LEAST, MOST = 0.02, 8
+"""Share of the texels that a thread must have to be fitted by itself, and how many threads are."""
 
 NEEDED = ("base_color", "roughness_along", "roughness_across", "normal", "tangent", "opacity")
 
@@ -51,31 +56,57 @@ def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
         ),
         axis=1,
     )  # fmt: skip
-    rows, weight = _kinds(rows)
+    numbers = np.full(len(chosen), NO_THREAD)
+    if resolved(maps, lay):
+        numbers = _threads(read_mip_level(maps.textures["thread_id"][tile]).ravel()[chosen])
+    shown = np.unique(numbers)
+    most = max(KINDS // len(shown), 4)
+    groups = [_kinds(rows[numbers == one], most) for one in shown]
+    means = np.concatenate([group for group, _ in groups])
+    share = np.array([np.mean(numbers == one) for one in shown])
+    normal = means[:, 6:9] / np.maximum(np.linalg.norm(means[:, 6:9], axis=1, keepdims=True), 1e-9)
     return TexelSample(
-        base=rows[:, :3],
-        smooth=rows[:, 3],
-        rough=rows[:, 4],
-        opacity=rows[:, 5],
-        normal=rows[:, 6:9] / np.maximum(np.linalg.norm(rows[:, 6:9], axis=1, keepdims=True), 1e-9),
-        tangent=rows[:, 9:],
-        weight=weight,
+        base=means[:, :3],
+        smooth=means[:, 3],
+        rough=means[:, 4],
+        opacity=means[:, 5],
+        normal=normal,
+        tangent=means[:, 9:],
+        weight=np.concatenate([w * s for (_, w), s in zip(groups, share, strict=True)]),
+        thread=np.repeat(shown, [len(w) for _, w in groups]),
     )
 
 
+def resolved(maps: MapSet, lay: BakedLay) -> bool:
+    """Whether a texel belongs to one thread, mostly, and the bake says to which."""
+    if "thread_id" not in maps.textures or lay.fabric is None:
+        return False
+    width = read_mip_level(next(iter(maps.textures["thread_id"].values()))).shape[1]
+    return bool(np.abs(lay.matrix).sum(axis=1).max() / width <= 1.0 / FEWEST)
+
+
+def _threads(ids: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Numbers of the threads, NO_THREAD for gaps and for threads that hardly show; for all where
+    but one thread shows."""
+    numbers = np.where(ids == GAP_ID, NO_THREAD, ids).astype(np.int64)
+    shown, counts = np.unique(numbers[numbers != NO_THREAD], return_counts=True)
+    kept = shown[counts >= LEAST * len(ids)][:MOST]
+    return np.where(np.isin(numbers, kept) & (len(kept) > 1), numbers, NO_THREAD)
+
+
 def _kinds(
-    rows: NDArray[np.float64],
+    rows: NDArray[np.float64], most: int = KINDS
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(n, c) texels -> at most KINDS means of like ones, and their shares."""
+    """(n, c) texels -> at most `most` means of like ones, and their shares."""
     different, counts = np.unique(np.round(rows, 2), axis=0, return_counts=True)
-    if len(different) <= KINDS:
+    if len(different) <= most:
         # Where a texel spans whole repeats all texels are alike, and one stands for them.
         return different, counts / counts.sum()
     with warnings.catch_warnings():
         # A kind may stay empty; its share is then 0.
         warnings.simplefilter("ignore", UserWarning)
-        means, kind = kmeans2(rows, KINDS, minit="++", seed=1)
-    counts = np.bincount(kind, minlength=KINDS)
+        means, kind = kmeans2(rows, most, minit="++", seed=1)
+    counts = np.bincount(kind, minlength=most)
     return means[counts > 0], counts[counts > 0] / counts.sum()
 
 

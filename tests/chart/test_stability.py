@@ -20,6 +20,7 @@ FAILS = {
     "growing_energy": lambda c: c.published[-1] > 100.0 > c.ours[-1],
     "below_the_cloth": lambda c: not np.isfinite(c.published).all(),
     "upright_threads": lambda c: c.published[-1] > 1000.0,
+    "light_at_the_surface": lambda c: c.published[0] > 50 * c.ours.max(),
 }
 WITHIN = {
     "mirror_at_grazing": 2.0,
@@ -32,6 +33,8 @@ WITHIN = {
     "growing_energy": 1.0,
     "below_the_cloth": 0.01,
     "upright_threads": 12.0,
+    # A ball of radius r cannot light more than a sky of its radiance: 1/r^2.
+    "light_at_the_surface": 1.05e4 * 1.5,
 }
 
 

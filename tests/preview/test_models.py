@@ -11,13 +11,15 @@ import numpy as np
 import pytest
 from bake.meshes import quad_scene
 
+from fabricusd.appearance.coverage import coverage
 from fabricusd.bake.garment import garments
 from fabricusd.bake.maps import REGISTRY, Texels
 from fabricusd.bake.recipe import recipe
-from fabricusd.preview.fit import TexelSample, fit, forward
-from fabricusd.preview.judge import LIGHTS, VIEWS, Judge, direction_pairs, hemisphere
+from fabricusd.preview.fit import fit, fit_threads, forward, with_threads
+from fabricusd.preview.judge import LIGHTS, SKY, VIEWS, Judge, direction_pairs, hemisphere
 from fabricusd.preview.look import Look
 from fabricusd.preview.models import KINDS, Surface, evaluate
+from fabricusd.preview.target import TexelSample, target_of
 from fabricusd.preview.texels import KINDS as KINDS_OF_TEXELS
 from fabricusd.preview.texels import NEEDED, _kinds
 from fabricusd.schema import load, preset_names
@@ -100,8 +102,8 @@ def test_a_fit_returns_the_surface_that_made_the_data(kind, monkeypatch):
         base_color_scale=(0.5, 0.8, 1.2), specular_ior=2.0, smooth_scale=0.8, rough_scale=1.0
     )
     wi, wo = direction_pairs()
-    made = forward(kind, truth, texels(), wi[None], wo[None])
-    monkeypatch.setattr("fabricusd.preview.fit.surface.evaluate", lambda *_, **__: made)
+    made = forward(kind, truth, texels(), wi[None], wo[None])[0]
+    monkeypatch.setattr("fabricusd.preview.target.surface.evaluate", lambda *_, **__: made)
     found = fit(kind, texels(), load("linen_plain"))
     assert found.delta_e < 0.3
     assert found.albedo < 0.01
@@ -156,7 +158,8 @@ def test_residuals_are_a_mean_squared_delta_e():
     near = base * 1.01
     squares = judge.delta_e(near) ** 2
     sky = judge.delta_e_of_sky(near) ** 2
-    expected = 0.5 * np.array([0.25, 0.75]) @ (squares.mean(axis=1) + sky.mean(axis=1))
+    each = (1.0 - SKY) * squares.mean(axis=1) + SKY * sky.mean(axis=1)
+    expected = np.array([0.25, 0.75]) @ each
     assert np.sum(judge.residuals(near) ** 2) == pytest.approx(expected, rel=0.1)
     assert judge.score(base) == 0.0
 
@@ -177,3 +180,43 @@ def test_half_the_cover_is_half_the_light():
     whole = forward("openpbr", Look(), texels(), wi, wo)
     half = forward("openpbr", Look(), texels(opacity=np.full(1, 0.5)), wi, wo)
     assert np.allclose(half, 0.5 * whole)
+
+
+def two_threads():
+    """Shot silk's texels: flat warp, and weft at three angles; as a bake that resolves them has."""
+    lean = np.radians([0.0, -20.0, 0.0, 20.0])
+    normal = np.stack((np.sin(lean), 0 * lean, np.cos(lean)), axis=1)
+    return TexelSample(
+        base=np.array([[0.9, 0.05, 0.1]] + 3 * [[0.1, 0.5, 0.2]]), smooth=np.full(4, 0.5),
+        rough=np.full(4, 0.8), opacity=np.ones(4), normal=normal,
+        tangent=np.tile([0.0, 1.0, 0.0], (4, 1)), weight=np.array([0.14, 0.28, 0.3, 0.28]),
+        thread=np.array([3, 0, 0, 0]),
+    )  # fmt: skip
+
+
+def test_the_mean_of_the_threads_rows_is_level_far():
+    fabric = load("silk_shot")
+    target = target_of(fabric, two_threads())
+    area = coverage(fabric).area
+    both = area[0] * target.values[1] + area[1] * target.values[2]
+    assert np.abs(both - target.values[0]).mean() < 0.05 * target.values[0].mean()
+    assert target.weight == pytest.approx([1.0, 0.86, 0.14])
+    assert target.members.sum(axis=1) == pytest.approx(1.0)
+
+
+def test_threads_of_two_colours_are_fitted_better_one_by_one(monkeypatch):
+    monkeypatch.setattr("fabricusd.preview.judge.VIEWS", 6)
+    monkeypatch.setattr("fabricusd.preview.judge.LIGHTS", 48)
+    fabric, baked = load("silk_shot"), two_threads()
+    threads = fit_threads(baked, fabric)
+    weft, warp = threads[0].look, threads[3].look
+    assert weft.specular_ior == warp.specular_ior
+    # The weft is green, the warp red.
+    assert weft.specular_tint[1] > weft.specular_tint[0]
+    assert warp.specular_tint[0] > warp.specular_tint[1]
+    looks = {one: fitted.look for one, fitted in threads.items()}
+    together = fit("openpbr", baked, fabric)
+    apart = fit("openpbr", with_threads(baked, looks), fabric, baked=baked)
+    assert apart.start_score == pytest.approx(together.start_score)
+    assert apart.threads_delta_e < 0.9 * together.threads_delta_e
+    assert apart.score < together.score

@@ -17,7 +17,10 @@ from fabricusd.preview.surfaces import GRAPHS, MAPS, parameter_values, preview
 from fabricusd.preview.write_usd import write_material
 from fabricusd.schema import load
 
-LOOK = Look(smooth_scale=0.8, rough_scale=0.9, base_color_scale=(1.5, 1.0, 0.5), fuzz_weight=0.25)
+LOOK = Look(
+    smooth_scale=0.8, rough_scale=0.9, base_color_scale=(1.5, 1.0, 0.5), fuzz_weight=0.25,
+    specular_tint=(0.8, 0.6, 0.4),
+)  # fmt: skip
 CONSTANTS = {
     "base_color": Value("color3", (0.5, 0.4, 0.3)),
     "roughness_along": Value("float", 0.4),
@@ -25,6 +28,7 @@ CONSTANTS = {
     "opacity": Value("float", 0.7),
     "normal": Value("vector3", (0.5, 0.5, 1.0)),
     "tangent": Value("vector3", (0.6, 0.8, 0.0)),
+    "specular_tint": Value("color3", (0.5, 1.0, 1.0)),
 }
 ALPHA_SMOOTH, ALPHA_ROUGH = (0.4 * 0.8) ** 2, (0.9 * 0.9) ** 2
 
@@ -92,6 +96,14 @@ def test_the_tangent_is_the_rougher_axis_and_the_colour_is_scaled(kind):
     tangent = given.get("geometry_tangent", given.get("tangent"))
     assert np.allclose(tangent, (-0.8, 0.6, 0.0))
     assert np.allclose(given["base_color"], (0.75, 0.4, 0.15))
+    assert np.allclose(given["specular_color"], (0.4, 0.6, 0.4))
+
+
+@pytest.mark.parametrize("kind", GRAPHS)
+def test_without_a_map_of_it_the_tint_is_the_parameter(kind):
+    plain = {name: value for name, value in CONSTANTS.items() if name != "specular_tint"}
+    graph = GRAPHS[kind](plain, False)
+    assert graph.node(graph.terminal).inputs["specular_color"] == Parameter("specular_tint")
 
 
 def networks():

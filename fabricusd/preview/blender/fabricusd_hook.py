@@ -180,7 +180,12 @@ def _reflection(nodes: Nodes, network: Network, give: Any) -> None:
     give("Roughness", nodes.math("POWER", nodes.math("MULTIPLY", smooth, rough), 0.25))
     give("Anisotropic", nodes.math("DIVIDE", less, 1.0 - NARROWEST))
     give("IOR", network.constant("specular_ior"))
-    give("Specular Tint", (*network.constant("specular_tint"), 1.0))
+    tint, tints = tuple(network.constant("specular_tint")), network.file("specular_tint_map")
+    if tints is not None:
+        give("Specular Tint", nodes.vector("MULTIPLY", nodes.image(tints, data=False), tint))
+    else:
+        own = network.fixed("tint_scaled", "in1") or (1.0, 1.0, 1.0)
+        give("Specular Tint", (*(a * b for a, b in zip(tint, own, strict=True)), 1.0))
     # The rougher axis, a quarter turn from the map's direction: (-y, x), coded for a normal map.
     fixed = network.fixed("tangent_x", "in")
     directions = network.file("tangent")
@@ -231,13 +236,18 @@ class FabricLooks(bpy.types.USDHook):  # type: ignore[misc]
     def on_import(import_context: Any) -> bool:
         """Called by Blender when a USD file has been read."""
         try:
+            # Blender ships USD's Python modules; the bpy wheel does not, and get_stage would abort,
+            # or with another USD's modules be of a type that they do not know.
             import pxr.UsdShade  # noqa: F401
-        except ImportError:
-            # Blender ships USD's Python modules; the bpy wheel does not, and get_stage would abort.
-            print("fabricusd looks: no module pxr here; call rebuild_all(stage) yourself")
+
+            stage = import_context.get_stage()
+            names = getattr(import_context, "get_prim_map", dict)()
+        except (ImportError, TypeError):
+            print(
+                "fabricusd looks: not Blender's own USD modules; call rebuild_all(stage) yourself"
+            )
             return False
-        names = getattr(import_context, "get_prim_map", None)
-        return rebuild_all(import_context.get_stage(), names() if names else None) >= 0
+        return rebuild_all(stage, names) >= 0
 
 
 def register() -> None:
