@@ -8,8 +8,8 @@ them. Lengths are in metres, +y is up. Everything is computed here: no file is r
 
 from __future__ import annotations
 
+import argparse
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -352,7 +352,9 @@ def _figure(stage: Usd.Stage) -> None:
 
 
 def main() -> None:
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parent
+    parser = argparse.ArgumentParser(description="Make the sample scenes.")
+    parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).resolve().parent)
+    folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     for make in (make_cylinders, make_drape, make_skirt):
         print(make(folder))

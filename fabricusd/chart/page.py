@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import fabricusd
+from fabricusd.appearance.footprint import DEFAULT
 from fabricusd.chart.choice import BOUNDS as LEVEL_BOUNDS
 from fabricusd.chart.choice import cheapest, choose_limits, read_limits, read_table
 from fabricusd.chart.panel import Panel, Row, relative_costs
@@ -141,8 +142,8 @@ def _limits() -> list[str]:
         "Level `auto` with a bound: `far` from so many repeats under a pixel on / `thread` from so "
         "many pixels on a thread on, `weave` between. There and at every wider pixel the level is "
         "within the bound of `thread` filtered: rms over the pixels, over the cloth's mean, the "
-        "worst of three lights, without shadows. Without a bound the levels change at 1 / 1, "
-        "gradually.\n",
+        "worst of three lights, without shadows. Without a bound the levels change "
+        f"about {DEFAULT.repeats:g} / {DEFAULT.pixels:g}, gradually.\n",
         "| preset | " + " | ".join(f"{b:g}" for b in LEVEL_BOUNDS) + " |",
         "|---|" + "---|" * len(LEVEL_BOUNDS),
     ]

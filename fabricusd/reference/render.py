@@ -216,16 +216,19 @@ def render_scene(
     rays, shadow_rays, not_finite = (int(x) for x in counters.sum(axis=0))
     if not_finite:
         scene.note("the picture", f"lost {not_finite} values that were not finite")
+    embree, triangles = tracer.accelerator.version, len(tracer.tables.triangles)
+    # Triangles and their hierarchy make room for the layers.
+    del tracer
     error = film.relative_error()
     metadata = {
         "Software": f"fabricusd {fabricusd.__version__}",
-        "fabricusd:embree": tracer.accelerator.version,
+        "fabricusd:embree": embree,
         "fabricusd:python": platform.python_version(),
         "fabricusd:numpy": np.__version__,
         "fabricusd:samples": most, "fabricusd:noise": noise or 0.0,
         "fabricusd:maxBounces": max_bounces, "fabricusd:level": level, "fabricusd:shadow": shadow,
         "fabricusd:seed": seed, "fabricusd:workers": count, "fabricusd:pixelFilter": pixel_filter,
-        "fabricusd:camera": camera.path, "fabricusd:triangles": len(tracer.tables.triangles),
+        "fabricusd:camera": camera.path, "fabricusd:triangles": triangles,
         "fabricusd:rays": str(rays + shadow_rays), "fabricusd:seconds": round(seconds, 3),
         "fabricusd:preparationSeconds": round(built - begun, 3),
         "fabricusd:notFinite": not_finite, "fabricusd:complete": int(complete),

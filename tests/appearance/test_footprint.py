@@ -57,14 +57,14 @@ def test_weights_change_smoothly_with_the_extent(a: float, b: float) -> None:
     step = 1e-3  # of an octave
     extents = 2.0 ** (np.array([[a, b]]) + step * np.arange(50)[:, None])
     change = np.abs(np.diff(weights(LINEN, extents), axis=0))
-    assert change.max() <= 1.2 * step
+    assert change.max() <= 2.4 * step
 
 
 def test_far_comes_later_for_a_larger_repeat() -> None:
-    assert weights(LINEN, [[2, 2]])[0, FAR] == pytest.approx(0.5)
+    assert weights(LINEN, [[1.6, 1.6]])[0, FAR] == pytest.approx(0.5)
     satin = PRESETS["polyester_satin_charmeuse"]
-    assert weights(satin, [[2, 2]])[0, FAR] == 0
-    assert weights(satin, [[5, 5]])[0, FAR] == pytest.approx(0.5)
+    assert weights(satin, [[1.6, 1.6]])[0, FAR] == 0
+    assert weights(satin, [[4, 4]])[0, FAR] == pytest.approx(0.5)
 
 
 @given(st.floats(-3, 5))
