@@ -23,6 +23,7 @@ from fabricusd.appearance.sampling_lobes import (
     lobe_densities,
     sample_lobe,
 )
+from fabricusd.appearance.share_fit import AZIMUTHS
 from fabricusd.appearance.stretches import (
     COS,
     PSI0,
@@ -45,10 +46,12 @@ _EVEN = 3
 """In place of a lobe: uniform over the hemisphere."""
 
 # Rows of a block: the viewer, the light, the drawn direction; the stretch of thread it is drawn
-# from; two uniform numbers; both densities; three shares; after them the shares of all lobes.
+# from; two uniform numbers; both densities; three shares; where the view lies on their grid; after
+# that the shares of all lobes.
 (_OX, _OY, _OZ, _IX, _IY, _IZ, _GX, _GY, _GZ, _WARP, _PSI0, _COS, _SIN, _TAN, _ON_SURFACE,
- _ON_VOLUME, _LOBE, _U1, _U2, _P_LIGHT, _P_GO, _A, _B, _D, _SHARES) = (
-    row * BLOCK for row in range(25)
+ _ON_VOLUME, _LOBE, _U1, _U2, _P_LIGHT, _P_GO, _A, _B, _D, _ELEVATION, _AZIMUTH, _UP, _ROUND,
+ _SHARES) = (
+    row * BLOCK for row in range(29)
 )  # fmt: skip
 
 
@@ -79,6 +82,42 @@ def _load(wo, wi, start, size, block):
             block[_OX + row * BLOCK + x] = to_viewer[x]
         for x in range(size):
             block[_IX + row * BLOCK + x] = to_light[x]
+
+
+@njit(**INLINE)
+def _find_views(R, size, block):
+    """`view_corner` of all viewers."""
+    for x in range(size):
+        row, column, _, up, round_ = view_corner(R, block[_OX + x], block[_OY + x], block[_OZ + x])
+        block[_ELEVATION + x], block[_AZIMUTH + x] = R(row), R(column)
+        block[_UP + x], block[_ROUND + x] = up, round_
+
+
+@njit(**INLINE)
+def _corner(block, x):
+    """What `view_corner` found."""
+    column = int(block[_AZIMUTH + x])
+    following = column + 1 if column + 1 < AZIMUTHS else 0
+    return int(block[_ELEVATION + x]), column, following, block[_UP + x], block[_ROUND + x]
+
+
+@njit(**LEAN)
+def _read_shares(R, shares, size, block, mixed):
+    """The shares of all lobes, `share_at`: read lobe by lobe where they lie side by side, and then
+    laid out hit by hit."""
+    lobes = shares.shape[2]
+    for x in range(size):
+        row, column, following, up, round_ = _corner(block, x)
+        a, b = shares[row][column], shares[row][following]
+        c, d = shares[row + 1][column], shares[row + 1][following]
+        into = mixed[x * lobes :]
+        for k in range(lobes):
+            low, high = a[k] + round_ * (b[k] - a[k]), c[k] + round_ * (d[k] - c[k])
+            into[k] = low + up * (high - low)
+    for k in range(lobes):
+        into = block[_SHARES + k * BLOCK :]
+        for x in range(size):
+            into[x] = mixed[x * lobes + k]
 
 
 @njit(**INLINE)
@@ -146,13 +185,13 @@ def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first, n):
     stretches = sampling.stretches
     lobes = 3 * stretches.shape[0]
     block = np.empty(_SHARES + lobes * BLOCK, wo.dtype)
+    mixed = np.empty(lobes * BLOCK, wo.dtype)
     for start in range(0, n, BLOCK):
         size = min(BLOCK, n - start)
         _load(wo, wi, start, size, block)
+        _find_views(R, size, block)
+        _read_shares(R, sampling.shares, size, block, mixed)
         for x in range(size):
-            corner = view_corner(R, block[_OX + x], block[_OY + x], block[_OZ + x])
-            for k in range(lobes):
-                block[_SHARES + k * BLOCK + x] = share_at(R, sampling.shares, corner, k)
             h = first + start + x
             k = _choose(R, _SHARES, lobes, u0[h], block, x)
             block[_U1 + x], block[_U2 + x] = u1[h], u2[h]
@@ -209,6 +248,7 @@ def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, 
     for start in range(0, n, BLOCK):
         size = min(BLOCK, n - start)
         _load(wo, wi, start, size, block)
+        _find_views(R, size, block)
         for x in range(size):
             h = first + start + x
             block[_U1 + x], block[_U2 + x] = u1[h], u2[h]
@@ -225,7 +265,7 @@ def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, 
             a = b = d = R(0)
             if on_thread:
                 k = 3 * nearest_stretch(R, sampling.stretches, thread_set, thread, psi0[start + x])
-                corner = view_corner(R, block[_OX + x], block[_OY + x], block[_OZ + x])
+                corner = _corner(block, x)
                 a = share_at(R, sampling.point_shares, corner, k + SURFACE)
                 b = share_at(R, sampling.point_shares, corner, k + VOLUME)
                 d = share_at(R, sampling.point_shares, corner, k + ISOTROPIC)
