@@ -5,8 +5,8 @@
 A square of each preset is baked so that a texel spans whole repeats, and at 8 texels a thread; each
 surface is fitted to both, and where threads resolve also with each thread's own fit in the
 textures, as `fabricusd material` writes them. Delta E 2000 over pairs of directions of the
-hemisphere, in a light under which a white diffuser is white; `albedo` is the mean relative
-difference of directional albedo, `threads` the mean delta E of each thread's own texels.
+hemisphere, in a light under which a white diffuser is white: mean, 95th percentile, and the mean
+relative difference of directional albedo; `threads` is OpenPBR's mean of each thread's own texels.
 """
 
 from __future__ import annotations
@@ -27,30 +27,30 @@ KINDS = ("preview", "openpbr", "principled")
 
 
 def main() -> None:
-    print("| preset | texels | surface | textures alone | fitted | 95th | albedo | threads |")
-    print("|---|---|---|---|---|---|---|---|")
+    print("| preset | texels | textures alone | preview | openpbr | principled | threads |")
+    print("|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name:
         for preset in sys.argv[1:] or PRESETS:
             fabric = load(preset)
             for words, threads in (("of whole repeats", 6400.0), ("8 a thread", 8.0)):
                 texels = baked_texels(fabric, Path(name), threads)
-                for kind in KINDS:
-                    show(preset, words, kind, fit(kind, texels, fabric))
+                show(preset, words, {kind: fit(kind, texels, fabric) for kind in KINDS})
                 if texels.threads:
                     looks = {n: one.look for n, one in fit_threads(texels, fabric).items()}
                     own = with_threads(texels, looks)
-                    for kind in KINDS[1:]:
-                        found = fit(kind, own, fabric, baked=texels)
-                        show(preset, f"{words}, by thread", kind, found)
+                    made = {k: fit(k, own, fabric, baked=texels) for k in KINDS if k != "preview"}
+                    show(preset, f"{words}, by thread", made)
 
 
-def show(preset: str, words: str, kind: str, f: Fitted) -> None:
-    threads = "" if f.threads_delta_e is None else f"{f.threads_delta_e:.1f}"
-    print(
-        f"| {preset} | {words} | {kind} | {f.start_delta_e:.1f} | {f.delta_e:.1f} "
-        f"| {f.delta_e_95:.1f} | {100 * f.albedo:.0f} % | {threads} |",
-        flush=True,
-    )
+def show(preset: str, words: str, made: dict[str, Fitted]) -> None:
+    cells = [
+        f"{f.delta_e:.1f}, {f.delta_e_95:.1f}, {100 * f.albedo:.0f} %" if f else ""
+        for f in map(made.get, KINDS)
+    ]
+    one = made["openpbr"]
+    threads = "" if one.threads_delta_e is None else f"{one.threads_delta_e:.1f}"
+    row = (preset, words, f"{one.start_delta_e:.1f}", *cells, threads)
+    print("|", " | ".join(row), "|", flush=True)
 
 
 if __name__ == "__main__":

@@ -38,8 +38,9 @@ ELEVATIONS = 16
 MOST_CELLS = 256
 """Cells that the mean of `g` is taken over."""
 
-LEAST_LIGHT = 1.0 / 32.0
-"""Least mean of `g`: at the horizon it falls to 0, and `g` over its mean would have no bound."""
+LEAST_LIGHT = 0.1
+"""Least mean of `g`: at the horizon it falls to 0, and `g` over its mean would have no bound. A set
+that lies in the shade of the other but for a few places is not made up for by these."""
 
 LOWEST = math.tan(math.radians(0.25))
 """Slope below which a horizon counts as level: half the sun's disc."""

@@ -37,7 +37,7 @@ class MapSet:
     """The textures of one garment.
 
     textures : map -> UDIM number -> file; only those that exist
-    missing : files that the manifest names and the folder lacks
+    missing : map and file of what the manifest names and the folder lacks; "mesh" for the mesh
     prims : paths in the scene that was baked
     own_uv : False where the textures are not in the scene's own UVs
     udim : whether the textures are UDIM tiles
@@ -46,7 +46,7 @@ class MapSet:
     folder: Path
     name: str
     textures: dict[str, dict[int, Path]]
-    missing: tuple[str, ...]
+    missing: tuple[tuple[str, str], ...]
     mesh: Path
     prims: tuple[str, ...]
     lays: tuple[BakedLay, ...]
@@ -76,9 +76,9 @@ class BakeFolder:
     settings: dict[str, Any]
 
     @property
-    def missing(self) -> tuple[str, ...]:
-        """Names of all files that the manifest names and the folder lacks."""
-        return tuple(name for one in self.garments for name in one.missing)
+    def missing(self) -> tuple[tuple[str, str], ...]:
+        """Map and file of all that the manifest names and the folder lacks."""
+        return tuple(pair for one in self.garments for pair in one.missing)
 
 
 def read_bake_folder(path: str | os.PathLike[str]) -> BakeFolder:
@@ -126,9 +126,9 @@ def _garment(
             if path.is_file():
                 textures.setdefault(texture, {})[int(number)] = path
             else:
-                missing.append(record["file"])
+                missing.append((texture, record["file"]))
     if not (folder / said["mesh"]).is_file():
-        missing.append(said["mesh"])
+        missing.append(("mesh", said["mesh"]))
     lays = []
     for lay in said["lays"]:
         if lay["fabric"] not in known:

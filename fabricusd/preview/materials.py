@@ -19,7 +19,7 @@ from fabricusd.preview.osl import write_osl
 from fabricusd.preview.package import write_usdz
 from fabricusd.preview.paths import asset_path
 from fabricusd.preview.recipes import Progress, Settings, Written, recipes
-from fabricusd.preview.surfaces import GRAPHS
+from fabricusd.preview.surfaces import GRAPHS, MAPS
 from fabricusd.preview.u3m import write_u3m
 from fabricusd.preview.wearers import find_wearers
 
@@ -50,8 +50,8 @@ def write_materials(
     path = Path(out) if out is not None else folder.path / "look.usda"
     _check_target(path, clobber)
     made = Written()
-    for name in folder.missing:
-        made.notes.append(f"{folder.path / name} is missing; a constant stands in for it")
+    for name, file in folder.missing:
+        made.notes.append(f"{folder.path / file} is missing; {_without(name)}")
     dressed = find_wearers(Path(scene), folder.garments) if scene is not None else None
     made.notes += dressed.notes if dressed else ()
     if dry_run:
@@ -73,6 +73,15 @@ def write_materials(
     made.files += [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
     _write_more(folder, path, settings, made, clobber)
     return made
+
+
+def _without(name: str) -> str:
+    """What a look does where the bake has lost a map."""
+    if name in MAPS:
+        return "a constant stands in for it"
+    if name == "thread_id":
+        return "threads are not fitted one by one"
+    return "the scene's own is used" if name == "mesh" else "no material reads it"
 
 
 def _check_surfaces(folder: BakeFolder, settings: Settings) -> None:

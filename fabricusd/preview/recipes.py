@@ -131,7 +131,9 @@ def maps_folder(path: Path) -> Path:
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
-        raise FabricError(str(folder), f"cannot be made: {error.strerror}; use -o") from error
+        raise FabricError(
+            str(folder), f"cannot be made: {error.strerror}; name another place"
+        ) from error
     return folder
 
 
@@ -198,7 +200,9 @@ def _looks(
         return plain, {}
     texels = draw_texels(maps, number, lay)
     if texels is None:
-        made.notes.append(f"{maps.name} lacks maps that a fit needs; its parameters are not fitted")
+        note = f"{maps.name} lacks maps that a fit needs; its parameters are not fitted"
+        if note not in made.notes:
+            made.notes.append(note)
         return plain, {}
 
     def fitting(what: str) -> None:

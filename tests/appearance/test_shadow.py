@@ -344,8 +344,9 @@ def test_the_mean_of_light_is_that_of_the_threads_slopes() -> None:
         mean = compile_shadow(fabric, "horizon", precision=np.float64).mean
         assert (mean > 0).all(), name
         assert (mean <= 1 + 1e-12).all(), name
-        assert mean[-1] == pytest.approx(1.0, abs=1e-6)
-        assert (mean[:, 0] == mean[:, -1]).all()
-        assert (np.diff(mean, axis=0) > -0.02).all()
+        assert mean[:, -1] == pytest.approx(1.0, abs=1e-6)
+        assert (mean[:, :, 0] == mean[:, :, -1]).all()
+        # A slope that the rising light just begins to reach may lie in shadow: not quite monotone.
+        assert (np.diff(mean, axis=1) > -0.05).all()
     flat = compile_shadow(PRESETS["velvet"], "traced", precision=np.float64).mean
     assert flat == pytest.approx(np.ones_like(flat))

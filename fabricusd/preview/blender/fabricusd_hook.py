@@ -241,7 +241,7 @@ class FabricLooks(bpy.types.USDHook):  # type: ignore[misc]
             import pxr.UsdShade  # noqa: F401
 
             stage = import_context.get_stage()
-            names = getattr(import_context, "get_prim_map", dict)()
+            names: Any = getattr(import_context, "get_prim_map", dict)()
         except (ImportError, TypeError):
             print(
                 "fabricusd looks: not Blender's own USD modules; call rebuild_all(stage) yourself"
