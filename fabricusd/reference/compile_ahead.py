@@ -36,7 +36,9 @@ class CompileAhead:
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
-        if worker_count(None) > 1 and not _compiled():
+        # Inside another program `executable` is that program, which must not be started again.
+        python = Path(sys.executable or "").name.startswith("python")
+        if python and worker_count(None) > 1 and not _compiled():
             self._process = subprocess.Popen(
                 [sys.executable, "-c", f"import {__name__} as ahead; ahead.compile_shading()"],
                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -71,7 +73,7 @@ def compile_shading() -> None:
     shade_far(R, tables, lobes, R(0), wave.hits, 0, 1)
     shade_preview(build_surfaces(Scene(materials=[PreviewSurface()])), wave.hits, wave.tags, 0, 1)
     depart(
-        0, 1, 1, wave.hits, wave.tags, wave.film, wave.shadow_rays, wave.shadow, wave.shadow_path,
-        wave.next_rays, wave.next_lanes, wave.next_tags, np.zeros(3, np.int64),
+        0, 0, 1, 1, wave.hits, wave.tags, wave.film, wave.shadow_rays, wave.shadow,
+        wave.shadow_path, wave.next_rays, wave.next_lanes, wave.next_tags, np.zeros(3, np.int64),
     )  # fmt: skip
     Film(4, 4, ("beauty",)).add(np.zeros(1, np.int32), 16, wave.film)

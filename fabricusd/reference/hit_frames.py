@@ -43,16 +43,20 @@ BLOCK_ROWS = RECORD + 5 + SIDE + 1 + 8 + 11 + 13
 
 @njit(**LEAN)
 def make_numbers(numbers, count, place, counters, block):
-    """Eight uniform numbers a hit, by its path's pixel and sample."""
+    """Eight uniform numbers a hit, by its path's pixel and sample.
+
+    The first two of a set of four are the most even together. They become its second and third,
+    which say where, while the first chooses among lobes or lights.
+    """
     for x in range(count):
         a, b, c, d = four_numbers(numbers, counters[x], counters[BLOCK + x], place)
-        block[NUMBERS + x], block[NUMBERS + BLOCK + x] = a, b
-        block[NUMBERS + 2 * BLOCK + x], block[NUMBERS + 3 * BLOCK + x] = c, d
+        block[NUMBERS + x], block[NUMBERS + BLOCK + x] = c, a
+        block[NUMBERS + 2 * BLOCK + x], block[NUMBERS + 3 * BLOCK + x] = b, d
     following = np.uint32(place + np.uint32(1))
     for x in range(count):
         a, b, c, d = four_numbers(numbers, counters[x], counters[BLOCK + x], following)
-        block[NUMBERS + 4 * BLOCK + x], block[NUMBERS + 5 * BLOCK + x] = a, b
-        block[NUMBERS + 6 * BLOCK + x], block[NUMBERS + 7 * BLOCK + x] = c, d
+        block[NUMBERS + 4 * BLOCK + x], block[NUMBERS + 5 * BLOCK + x] = c, a
+        block[NUMBERS + 6 * BLOCK + x], block[NUMBERS + 7 * BLOCK + x] = b, d
 
 
 # A place and not a row and a column: numba compiles a function anew for each constant it is given.

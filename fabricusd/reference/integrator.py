@@ -198,7 +198,7 @@ class Tracer:
                     hits, lens.eye, lens.axis, wave.hits, wave.tags, self.tables.uv, wave.film
                 )
             depart(
-                self.estimator, hits, self.max_bounces, wave.hits, wave.tags, wave.film,
+                step, self.estimator, hits, self.max_bounces, wave.hits, wave.tags, wave.film,
                 wave.shadow_rays, wave.shadow, wave.shadow_path, wave.next_rays, wave.next_lanes,
                 wave.next_tags, result,
             )  # fmt: skip
