@@ -304,7 +304,7 @@ ELSEWHERE = {
     "tests/bake/test_garment.py, tests/reference/test_usd_scene.py",
     "a 1×1 and a 4096×4096 grid": "tests/appearance/test_failures.py",
     "grazing camera on a thin fold": "rays leave from beside the shading point, "
-    "tests/reference/test_integrator.py",
+    "tests/reference/test_terminator.py",
 }
 """Rows of section 10 that are no formula of one variable, and what is done about them."""
 
