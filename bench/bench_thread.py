@@ -71,13 +71,18 @@ def main() -> None:
     numpy_rate = n / best(lambda: microcylinder_in_numpy(LINEN, wi, wo), few)
     m = n // 10
     i, o = wi[:, :m].T.astype(float), wo[:, :m].T.astype(float)
-    plain_rate = m / best(lambda: plain.thread_value(LINEN, "microcylinder", i, o), few)
-
-    print(f"{n} pairs, best of {options.repeats}; M evaluations/s, and times plain NumPy")
-    print(f"{'NumPy float32, microcylinder':44}{numpy_rate / 1e6:8.1f}{1.0:8.1f}")
+    plain_rate = {
+        model: m / best(lambda model=model: plain.thread_value(LINEN, model, i, o), few)
+        for model in MODELS
+    }
     print(
-        f"{'plain.thread_value, float64':44}{plain_rate / 1e6:8.1f}{plain_rate / numpy_rate:8.1f}"
+        f"{n} pairs, best of {options.repeats}; M evaluations/s; times NumPy's float32 "
+        "microcylinder; times the same model in plain float64"
     )
+    print(f"{'NumPy float32, microcylinder':44}{numpy_rate / 1e6:8.1f}{1.0:8.1f}")
+    for model, rate in plain_rate.items():
+        label = f"plain.thread_value, {model}, float64"
+        print(f"{label:44}{rate / 1e6:8.1f}{rate / numpy_rate:8.1f}{1.0:8.1f}")
     fastest = 0.0
     for count in sorted({1, workers}):
         numba.set_num_threads(count)
@@ -93,7 +98,8 @@ def main() -> None:
                 if model == "microcylinder" and precision is np.float32:
                     fastest = max(fastest, rate)
                 label = f"{model}, {precision.__name__}, {count} worker(s)"
-                print(f"{label:44}{rate / 1e6:8.1f}{rate / numpy_rate:8.1f}")
+                ratios = f"{rate / numpy_rate:8.1f}{rate / plain_rate[model]:8.1f}"
+                print(f"{label:44}{rate / 1e6:8.1f}{ratios}")
     # The least that such a loop can do with the same memory: read both directions, write the value.
     floor = n / best(lambda: np.add(wi, wo, out=out), options.repeats)
     print(f"{'only reading and writing that memory':44}{floor / 1e6:8.1f}{floor / numpy_rate:8.1f}")
