@@ -49,13 +49,16 @@ def best_shares(
     least : share of the rest that the lobes divide evenly before the measured ones, for what the
         few directions of a lobe miss
     """
+    all_lobes = np.zeros((len(found), found.shape[2] - LOBES))
+    if not len(possible):
+        return all_lobes
     value, even = found[:, :, VALUE], found[:, :, EVEN]
     lobes = np.ascontiguousarray(found[:, :, LOBES + possible])
     drawn_by = lobes.mean(axis=2)
     weight = np.divide(value * value, drawn_by, out=np.zeros_like(value), where=drawn_by > 1e-9)
     # A view's scale cancels, and squares of dim views would vanish in single precision.
     weight /= np.maximum(weight.max(axis=1, keepdims=True, initial=0.0), np.float32(1e-30))
-    level = np.full(lobes.shape[::2], 1.0 / max(lobes.shape[2], 1), np.float32)
+    level = np.full(lobes.shape[::2], 1.0 / lobes.shape[2], np.float32)
     shares = level
     for _ in range(ADAPTATIONS):
         p = uniform * even + (1.0 - uniform) * (lobes @ shares[:, :, None])[:, :, 0]
@@ -63,7 +66,6 @@ def best_shares(
         part = shares * (over[:, None, :] @ lobes)[:, 0, :]
         total = part.sum(axis=1, keepdims=True)
         shares = np.where(total > 0, part / np.where(total > 0, total, 1.0), level)
-    all_lobes = np.zeros((len(found), found.shape[2] - LOBES))
     all_lobes[:, possible] = (1.0 - uniform) * ((1.0 - least) * shares + least * level)
     return all_lobes
 
