@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -91,6 +92,24 @@ def _rows(fabric: Fabric, texels: TexelSample, quick: bool) -> list[Row]:
     return rows
 
 
+def draw(figure: Any, rows: Sequence[Row]) -> None:
+    """Bars of delta E by preset and surface, fitted in full and with the textures alone in grey."""
+    axes = figure.subplots()
+    presets = list(dict.fromkeys(row.group for row in rows))
+    kinds = [k for k in KINDS if any(row.method.startswith(f"{k},") for row in rows)]
+    error = {(row.group, row.method): row.error for row in rows}
+    width, x = 0.8 / len(kinds), np.arange(len(presets))
+    for n, kind in enumerate(kinds):
+        at = x + (n - 0.5 * (len(kinds) - 1)) * width
+        alone = [error[p, f"{kind}, textures alone"] for p in presets]
+        axes.bar(at, alone, width, color="0.85", label="textures alone" if n == 0 else None)
+        axes.bar(at, [error[p, f"{kind}, fitted"] for p in presets], 0.8 * width, label=kind)
+    axes.set_xticks(x, presets, fontsize=8)
+    axes.set_ylabel(PANEL.error)
+    axes.grid(axis="y", alpha=0.3)
+    axes.legend(fontsize=8, ncols=3)
+
+
 PANEL = Panel(
     name="materials",
     title="Downstream materials",
@@ -104,4 +123,5 @@ PANEL = Panel(
         "Cycles shows of them is in [materials.md](materials.md)."
     ),
     run=run,
+    draw=draw,
 )
