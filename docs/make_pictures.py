@@ -14,7 +14,7 @@ from fabricusd.reference.view_transform import view
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "samples"))
 
-SIZES = {"cylinders": (432, 240), "skirt": (288, 384)}
+SIZES = {"cylinders": (432, 240), "skirt": (288, 384), "drape": (432, 324)}
 
 
 def main() -> None:
@@ -23,9 +23,9 @@ def main() -> None:
     parser.add_argument("names", nargs="*", default=list(SIZES))
     parser.add_argument("--spp", type=int, default=96)
     options = parser.parse_args()
-    from make_samples import make_cylinders, make_skirt
+    from make_samples import make_cylinders, make_drape, make_skirt
 
-    made = {"cylinders": make_cylinders, "skirt": make_skirt}
+    made = {"cylinders": make_cylinders, "skirt": make_skirt, "drape": make_drape}
     with tempfile.TemporaryDirectory() as folder:
         for name in options.names:
             width, height = SIZES[name]
