@@ -10,7 +10,6 @@ satin's `weave` is off by 1.3 of the mean where a thread is two pixels wide, `ch
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +26,9 @@ LEVELS = ("far", "weave", "thread")
 FAR, WEAVE, THREAD = range(3)
 
 
+_NEVER = 1e30
+
+
 class Limits(NamedTuple):
     """Where level `auto` goes from one level to the next.
 
@@ -41,10 +43,12 @@ class Limits(NamedTuple):
     octaves: float = 0.5
 
     def row(self, fabric: Fabric) -> tuple[float, float, float, float]:
-        """What `level_weights` takes for a fabric."""
+        """What `level_weights` takes for a fabric; limits that are never reached stay finite, so
+        that over an infinite extent they are not 0/0."""
         ends, picks = true_repeat(fabric)
-        thread = math.inf if self.pixels <= 0 else 1.0 / self.pixels
-        return self.repeats * ends, self.repeats * picks, thread, self.octaves
+        repeats = min(self.repeats, _NEVER)
+        thread = 1.0 / max(self.pixels, 1.0 / _NEVER)
+        return repeats * ends, repeats * picks, thread, self.octaves
 
 
 DEFAULT = Limits()
