@@ -20,7 +20,7 @@ from fabricusd.preview.surfaces import GRAPHS, MAPS, NO_TINT, Inputs, parameter_
 from fabricusd.preview.texels import draw_texels, mean_texel
 from fabricusd.preview.thread_maps import COLUMNS, Factors, write_thread_maps
 from fabricusd.reference.images import read_mip_level, write_png
-from fabricusd.schema.write import prim_name
+from fabricusd.schema.names import prim_name
 
 Progress = Callable[[str], None]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
+from fabricusd.files import readable_file
 from fabricusd.schema.weaves.color import srgb_from_linear
-from fabricusd.schema.weaves.files import ordinary_file
 
 
 def read_codes(path: str | os.PathLike[str], largest: int) -> NDArray[np.uint32]:
@@ -20,7 +20,7 @@ def read_codes(path: str | os.PathLike[str], largest: int) -> NDArray[np.uint32]
     """
     import OpenImageIO as oiio
 
-    where = str(ordinary_file(path))
+    where = str(readable_file(path))
     reader = oiio.ImageInput.open(where)
     if reader is None:
         reason = " ".join(oiio.geterror().split())[:200]
