@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, one_line
 from fabricusd.fabric import describe_limits, within_limits
 from fabricusd.schema import attributes, weave_rows
 from fabricusd.schema.attributes import Attribute
@@ -413,8 +413,11 @@ def binding_api_applied(prim: Usd.Prim) -> Iterator[Fault]:
 
 
 def run(checked: Rule, prim: Usd.Prim) -> list[Fault]:
-    """The faults that one rule finds on one prim, with USD's own errors as faults."""
+    """The faults that one rule finds on one prim, with values that cannot be read as faults."""
     try:
         return list(checked.function(prim))
     except Tf.ErrorException as error:
-        return [("", f"cannot be read: {error}")]
+        return [("", f"cannot be read: {one_line(str(error), 300)}; it must be whole")]
+    except TypeError:
+        # Of a wrong type in a layer, or of a damaged .usdc in which type and value disagree.
+        return [("", "holds a value of a wrong type; each must be of the schema's type")]

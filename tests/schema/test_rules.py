@@ -135,6 +135,14 @@ def test_every_problem_says_what_would_be_accepted():
                 assert "must" in finding.problem, finding
 
 
+@pytest.mark.parametrize("written", ["mystery thread:ior = 3", "float thread:curve:positions = 3"])
+def test_a_value_of_a_wrong_type_is_a_finding_of_every_rule(written, tmp_path):
+    path = tmp_path / "cloth.usda"
+    thread = f'def FabricThread "Warp"\n{{\n{written}\n}}'
+    path.write_text(f'#usda 1.0\ndef Fabric "Cloth"\n{{\n{thread}\n}}\n')
+    assert "PropertyTypeMatches" in {finding.rule for finding in check(str(path))}
+
+
 def test_bounds_are_told_in_the_unit_of_the_file(tmp_path):
     path = tmp_path / "cloth.usda"
     thread = 'def FabricThread "Warp"\n{\ndouble thread:gammaSurface = 200\n}'
