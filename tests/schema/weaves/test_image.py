@@ -273,8 +273,7 @@ def test_a_file_that_is_no_image_is_refused_in_one_line(
 def test_a_header_that_is_no_text_is_refused_in_one_line(tmp_path: Path, byte: int) -> None:
     path = save(tmp_path / "image.exr", np.zeros((3, 4, 3), np.float32), "half")
     data = path.read_bytes()
-    assert b"compression" in data
-    path.write_bytes(data.replace(b"compression\0compression", bytes([byte, 0]) + b"c"))
+    path.write_bytes(data.replace(b"chlist", bytes([byte]) + b"hlist"))
     with pytest.raises(FabricError, match=r"image\.exr is not an image") as caught:
         read_image(path)
     assert str(caught.value).isprintable()
