@@ -168,7 +168,7 @@ class Tracer:
         counts = np.zeros(QUEUES * len(self.shaders), np.int64)
         result = np.zeros(3, np.int64)
         for step in range(self.max_bounces + 2 + MOST_LAYERS):
-            self.accelerator.intersect(wave.rays, (count + 15) // 16)
+            self.accelerator.intersect(wave.rays, (count + 15) // 16, coherent=step == 0)
             counters[0] += count
             arrive(
                 step, self.max_bounces, self.estimator, count, wave.rays, wave.lanes,
