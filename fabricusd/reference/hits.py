@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, whole
 from fabricusd.reference.arrivals import NUMBERS_PER_STEP, SURFACE_ONLY, UNIFORM
 from fabricusd.reference.embree import DX, HIT_U, HIT_V, PRIMITIVE, TFAR
 from fabricusd.reference.hit_frames import (
@@ -57,10 +57,11 @@ def prepare(step, estimator, count, rays, lanes, lane_tags, keys, order, records
     block = np.empty(BLOCK_ROWS * BLOCK, np.float32)
     counters = np.empty(2 * BLOCK, np.uint32)
     choice, where = np.empty(BLOCK, np.int32), np.empty(BLOCK + 1, np.int32)
+    count = whole(count)
     for start in range(0, count, BLOCK):
         size = min(BLOCK, count - start)
         for x in range(size):
-            _take(order[start + x], start + x, x, rays, lanes, lane_tags, keys, records,
+            _take(whole(order[start + x]), start + x, x, rays, lanes, lane_tags, keys, records,
                   path_pixel, path_sample, block, counters, hits, tags)  # fmt: skip
         make_frames(size, epsilon, block)
         make_numbers(numbers, size, np.uint32(2 + NUMBERS_PER_STEP * step), counters, block)
@@ -77,10 +78,10 @@ def prepare(step, estimator, count, rays, lanes, lane_tags, keys, order, records
 def _take(k, h, x, rays, lanes, lane_tags, keys, records, path_pixel, path_sample, block, counters,
           hits, tags):  # fmt: skip
     """Lane `k` as hit `h`: what goes on unchanged, and place `x` of the block for what does not."""
-    whole = rays.view(np.uint32)
+    bits = rays.view(np.uint32)
     p, lane = k >> 4, k & 15
-    triangle, key = whole[p, PRIMITIVE, lane], keys[k]
-    path = lane_tags[0, k]
+    triangle, key = bits[p, PRIMITIVE, lane], whole(keys[k])
+    path = whole(lane_tags[0, k])
     tags[PATH, h], tags[DEPTH, h] = path, lane_tags[1, k]
     tags[TRIANGLE, h], tags[MATERIAL, h], tags[LEVEL, h] = triangle, key // 6, (key // 2) % 3
     for row in range(3):
