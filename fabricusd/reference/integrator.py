@@ -182,7 +182,7 @@ class Tracer:
                 break
             sort_lanes(count, wave.keys, ends - counts, wave.order)
             prepare(
-                step, self.estimator, hits, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
+                step, self.estimator, ends, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
                 wave.order, self.tables.records, self.lights, self.dome, self.epsilon,
                 wave.path_pixel, wave.path_sample, self.numbers, wave.hits, wave.tags,
             )  # fmt: skip
