@@ -168,7 +168,7 @@ def _bring(start, size, block, hits):
 @njit(**INLINE)
 def _bring_rows(source, first, end, start, size, block, hits):
     for row in range(first, end):
-        into, at = hits[row][start:], source + (row - first) * BLOCK
+        into, at = hits[row][start:], whole(source + (row - first) * BLOCK)
         for x in range(size):
             into[x] = block[at + x]
 

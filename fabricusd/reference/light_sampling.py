@@ -111,7 +111,7 @@ def _sample(light, dome, begin, end, block):
     if kind == DOME:
         _sample_dome(light, dome, begin, end, block)
         return
-    for y in range(begin, end):
+    for y in range(whole(begin), whole(end)):
         block[_RED + y], block[_GREEN + y] = light[RED], light[RED + 1]
         block[_BLUE + y] = light[RED + 2]
     if kind == DISTANT:
@@ -135,13 +135,13 @@ def _keep(block, y, dx, dy, dz, distance, pdf):
 @njit(**LEAN)
 def _sample_dome(light, dome, begin, end, block):
     chance = light[CHANCE]
-    for y in range(begin, end):
+    for y in range(whole(begin), whole(end)):
         j, down, i, along = choose_cell(dome, block[_U0 + y], block[_U1 + y])
         cell = dome.cells[j * dome.size[1] + i]
         block[_RED + y], block[_GREEN + y], block[_BLUE + y] = cell[0], cell[1], cell[2]
         block[_DISTANCE + y], block[_PDF + y] = FAR, cell[DENSITY] * chance
         block[_DX + y], block[_DY + y], block[_DZ + y] = R(j), down, R(i) + along
-    for y in range(begin, end):
+    for y in range(whole(begin), whole(end)):
         dx, dy, dz = direction_in(dome, block[_DX + y], block[_DY + y], block[_DZ + y])
         block[_DX + y], block[_DY + y], block[_DZ + y] = dx, dy, dz
 
@@ -166,11 +166,11 @@ def _sample_distant(light, begin, end, block):
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
     chance, wide = light[CHANCE], light[AREA]
     if wide <= R(0):
-        for y in range(begin, end):
+        for y in range(whole(begin), whole(end)):
             _keep(block, y, zx, zy, zz, FAR, -chance)
         return
     pdf = chance / (R(2) * _PI * wide)
-    for y in range(begin, end):
+    for y in range(whole(begin), whole(end)):
         dx, dy, dz = _cone(zx, zy, zz, wide, block[_U0 + y], block[_U1 + y])
         _keep(block, y, dx, dy, dz, FAR, pdf)
 
@@ -179,7 +179,7 @@ def _sample_distant(light, begin, end, block):
 def _sample_sphere(light, begin, end, block):
     cx, cy, cz = light[P], light[P + 1], light[P + 2]
     chance, radius2 = light[CHANCE], light[SIZE] * light[SIZE]
-    for y in range(begin, end):
+    for y in range(whole(begin), whole(end)):
         ax, ay, az = cx - block[_PX + y], cy - block[_PY + y], cz - block[_PZ + y]
         square = ax * ax + ay * ay + az * az
         outside = square > radius2
@@ -223,14 +223,14 @@ def _keep_flat(light, block, y, a, b):
 
 @njit(**LEAN)
 def _sample_rect(light, begin, end, block):
-    for y in range(begin, end):
+    for y in range(whole(begin), whole(end)):
         a, b = R(2) * block[_U0 + y] - R(1), R(2) * block[_U1 + y] - R(1)
         _keep_flat(light, block, y, a, b)
 
 
 @njit(**LEAN)
 def _sample_disk(light, begin, end, block):
-    for y in range(begin, end):
+    for y in range(whole(begin), whole(end)):
         r, phi = math.sqrt(block[_U0 + y]), R(2) * _PI * block[_U1 + y]
         _keep_flat(light, block, y, r * cos(R, phi), r * sin(R, phi))
 
@@ -238,7 +238,7 @@ def _sample_disk(light, begin, end, block):
 @njit(**LEAN)
 def _sample_cylinder(light, begin, end, block):
     r = light[SIZE]
-    for y in range(begin, end):
+    for y in range(whole(begin), whole(end)):
         a, phi = R(2) * block[_U0 + y] - R(1), R(2) * _PI * block[_U1 + y]
         c, s = cos(R, phi), sin(R, phi)
         nx = c * light[Y] + s * light[Z]
