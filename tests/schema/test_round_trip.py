@@ -203,6 +203,7 @@ def test_a_back_called_as_its_front_is_written_under_another_name():
 )  # fmt: skip
 def test_a_prims_name_is_the_nearest_to_the_text(text, name):
     assert prim_name(text) == name
+    assert prim_name(text, ascii_only=True).isascii()
 
 
 def test_sublayers_payloads_and_variants_are_read_as_composed(tmp_path):
