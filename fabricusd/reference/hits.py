@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, PART
 from fabricusd.reference.arrivals import NUMBERS_PER_STEP, SURFACE_ONLY, UNIFORM
 from fabricusd.reference.embree import DX, HIT_U, HIT_V, PRIMITIVE, TFAR
 from fabricusd.reference.hit_frames import (
@@ -99,7 +99,7 @@ def _take(k, h, x, rays, lanes, lane_tags, keys, records, path_pixel, path_sampl
     counters[x], counters[BLOCK + x] = path_pixel[path], path_sample[path]
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _bring(start, size, block, hits):
     """Bring the block's frames, numbers and lights to the hits."""
     _bring_rows(MADE, 0, SIDE + 1, start, size, block, hits)

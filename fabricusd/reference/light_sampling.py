@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, LEAN, cos, sin
+from fabricusd.appearance.real import INLINE, PART, cos, sin
 from fabricusd.reference.dome import DENSITY, choose_cell, direction_in
 from fabricusd.reference.hit_frames import BLOCK, CHOSEN, DRAWN, MADE, NUMBERS
 from fabricusd.reference.lights import AREA, CHANCE, KIND, RED, SIZE, P, X, Y, Z
@@ -45,7 +45,7 @@ def choose_light(table, u):
     return last
 
 
-@njit(**LEAN)
+@njit(**PART)
 def sample_lights(lights, dome, count, choice, where, block):
     """Rows WI to LIGHT_PDF of `count` hits, by three of their numbers.
 
@@ -99,7 +99,7 @@ def _turn(count, block):
         block[_LIGHT + 2 * BLOCK + x] *= inverse
 
 
-@njit(**LEAN)
+@njit(**PART)
 def no_lights(count, block):
     """The same rows where no light is sampled."""
     for row in range(11):
@@ -109,7 +109,7 @@ def no_lights(count, block):
         block[_WI + 2 * BLOCK + x], block[_DISTANCE + x] = R(1), FAR
 
 
-@njit(**LEAN)
+@njit(**PART)
 def sample_evenly(count, block):
     """Directions uniform over the sphere instead, for the estimator that knows no lights."""
     no_lights(count, block)
@@ -121,7 +121,7 @@ def sample_evenly(count, block):
         block[_WI + 2 * BLOCK + x] = z
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample(light, dome, count, block):
     """Directions to one light."""
     kind = int(light[KIND])
@@ -149,7 +149,7 @@ def _keep(block, y, dx, dy, dz, distance, pdf):
     block[_REACH + y], block[_CHANCE + y] = distance, pdf
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample_dome(light, dome, count, block):
     chance = light[CHANCE]
     for y in range(count):
@@ -178,7 +178,7 @@ def _cone(ax, ay, az, one_minus_cos, u0, u1):
     return x, y, -a * sign * ax - b * ay + c * az
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample_distant(light, count, block):
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
     chance, wide = light[CHANCE], light[AREA]
@@ -192,7 +192,7 @@ def _sample_distant(light, count, block):
         _keep(block, y, dx, dy, dz, FAR, pdf)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample_sphere(light, count, block):
     cx, cy, cz = light[P], light[P + 1], light[P + 2]
     chance, radius2 = light[CHANCE], light[SIZE] * light[SIZE]
@@ -238,21 +238,21 @@ def _keep_flat(light, block, y, a, b):
     )  # fmt: skip
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample_rect(light, count, block):
     for y in range(count):
         a, b = R(2) * block[_U0 + y] - R(1), R(2) * block[_U1 + y] - R(1)
         _keep_flat(light, block, y, a, b)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample_disk(light, count, block):
     for y in range(count):
         r, phi = math.sqrt(block[_U0 + y]), R(2) * _PI * block[_U1 + y]
         _keep_flat(light, block, y, r * cos(R, phi), r * sin(R, phi))
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample_cylinder(light, count, block):
     r = light[SIZE]
     for y in range(count):
