@@ -29,10 +29,10 @@ from make_samples import Grid, camera, define_grid, dress, look_at, make_drape  
 
 from fabricusd.bake.bake import Settings as BakeSettings  # noqa: E402
 from fabricusd.bake.bake import bake  # noqa: E402
+from fabricusd.images import read_exr_layers, write_png  # noqa: E402
 from fabricusd.preview.materials import write_materials  # noqa: E402
 from fabricusd.preview.osl import write_osl  # noqa: E402
 from fabricusd.quality.pictures import difference  # noqa: E402
-from fabricusd.reference.images import read_exr_layers, write_png  # noqa: E402
 from fabricusd.reference.render import render  # noqa: E402
 from fabricusd.reference.view_transform import srgb_encode  # noqa: E402
 from fabricusd.schema import load  # noqa: E402

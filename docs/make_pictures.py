@@ -7,8 +7,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from fabricusd.images import write_png
 from fabricusd.reference import render
-from fabricusd.reference.images import write_png
 from fabricusd.reference.view_transform import view
 
 HERE = Path(__file__).resolve().parent

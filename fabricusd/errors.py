@@ -3,6 +3,15 @@
 from __future__ import annotations
 
 
+def one_line(text: str, longest: int = 600) -> str:
+    """`text` on one line of at most `longest` characters, `?` for what would not print.
+
+    What libraries say of a damaged file holds line ends and bytes of that file.
+    """
+    line = "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
+    return line if len(line) <= longest else line[: longest - 3] + "..."
+
+
 class FabricError(ValueError):
     """Input that cannot be used: where it is, what it holds, what would be accepted.
 

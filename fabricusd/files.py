@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,11 +22,12 @@ def whole_file(path: str | os.PathLike[str], *, clobber: bool = True) -> Iterato
     file is replaced in one step, or refused before anything is written when `clobber` is False.
     """
     target = Path(path)
-    if target.is_dir():
+    # os.path answers False where pathlib raises: names too long, folders nobody may look into.
+    if os.path.isdir(target):
         raise FabricError(str(target), "is a directory; it must be a file's name")
-    if not clobber and target.exists():
+    if not clobber and os.path.lexists(target):
         raise FabricError(str(target), "exists; it must be a new name with --no-clobber")
-    if not target.parent.is_dir():
+    if not os.path.isdir(target.parent):
         raise FabricError(
             str(target), f"is in '{target.parent}', which is no directory; make it first"
         )
@@ -56,15 +58,29 @@ def remove_partial_files(folder: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def readable_file(path: str | os.PathLike[str]) -> Path:
-    """`path` if it is a file that can be opened and is not empty; FabricError otherwise."""
+def readable_file(path: str | os.PathLike[str], missing: str = "") -> Path:
+    """`path` if it is a file that can be opened, has an end, and is not empty.
+
+    FabricError otherwise; `missing` is what it says where there is nothing of that name.
+    """
+    if not os.fspath(path):
+        raise FabricError("''", "names no file; it must name one")
     source = Path(path)
-    if source.is_dir():
-        raise FabricError(str(source), "is a directory; it must be a file")
     try:
+        mode = source.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise FabricError(str(source), "is a directory; it must be a file")
+        if not stat.S_ISREG(mode):
+            raise FabricError(str(source), "is a pipe or a device; it must be a file")
         with source.open("rb") as stream:
             if not stream.read(1):
                 raise FabricError(str(source), "is empty; it must hold something")
     except OSError as error:
-        raise FabricError(str(source), f"cannot be read: {error.strerror}") from error
+        gone = missing and isinstance(error, FileNotFoundError | NotADirectoryError)
+        problem = missing if gone else f"cannot be read: {error.strerror}"
+        raise FabricError(str(source), problem) from error
+    except ValueError as error:
+        if isinstance(error, FabricError):
+            raise
+        raise FabricError(repr(str(source)), f"is no file name: {error}") from None
     return source

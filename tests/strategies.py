@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from fabricusd.fabric import DEGREE, MODELS, Fabric, TangentCurve, Thread, ThreadSet, Weave
 
-NAMES = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,10}", fullmatch=True)
+NAMES = st.from_regex(r"[A-Za-zäßαя麻_][A-Za-z0-9äßαя麻_]{0,10}", fullmatch=True)
 TEXT = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), max_size=40)
 
 

@@ -21,7 +21,7 @@ from fabricusd.bake.maps import TextureMap
 from fabricusd.bake.planes import PLANES
 from fabricusd.bake.scratch import Scratch
 from fabricusd.bake.sheet import Sheet
-from fabricusd.reference.images import write_16_bit, write_mip_exr
+from fabricusd.images import write_16_bit, write_mip_exr
 from fabricusd.reference.workers import Batches
 
 Progress = Callable[[str, int, int], Any]

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numba
 import numpy as np
-import OpenImageIO
 
 from fabricusd import __version__
 from fabricusd.bake.maps import TextureMap
 from fabricusd.bake.scratch import sha256
 from fabricusd.files import whole_file
+from fabricusd.images import OPENIMAGEIO
 
 if TYPE_CHECKING:
     from fabricusd.bake.bake import Baked, Settings
@@ -37,7 +37,7 @@ def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any
             "python": ".".join(map(str, sys.version_info[:3])),
             "numpy": np.__version__,
             "numba": numba.__version__,
-            "OpenImageIO": OpenImageIO.VERSION_STRING,
+            "OpenImageIO": OPENIMAGEIO,
         },
         "scene": {"file": scene.name, "sha256": sha256(scene)},
         "settings": asdict(settings),

@@ -9,7 +9,7 @@ import numpy as np
 from fabricusd.bake.garment import Garment
 from fabricusd.bake.raster import overlap_map, texel_triangles, times_covered
 from fabricusd.errors import FabricError
-from fabricusd.reference.images import write_png
+from fabricusd.images import write_png
 
 
 def refuse_overlaps(

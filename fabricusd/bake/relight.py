@@ -32,7 +32,7 @@ from fabricusd.bake.planes import PARTS
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.files import readable_file
-from fabricusd.reference.images import read_mip_level
+from fabricusd.images import read_mip_level
 
 Floats = NDArray[np.float64]
 

@@ -8,6 +8,8 @@ import os
 import shutil
 import sys
 
+from fabricusd.cli.stdout import can_show, write_utf8
+
 EPILOG = """FILE is a USD file, FILE:/PRIM, a WIF draft, or a preset
 
 example:
@@ -37,12 +39,11 @@ def run(options: argparse.Namespace) -> int:
     """Print one fabric."""
     from fabricusd.schema.anysource import load_any
 
-    source = f"{options.file}:{options.prim}" if options.prim else options.file
+    source = f"{options.file}:/{options.prim.lstrip('/')}" if options.prim else options.file
     if options.flatten:
-        from fabricusd.schema.source import open_stage
+        from fabricusd.schema.source import flattened
 
-        stage, _ = open_stage(source)
-        print(stage.Flatten().ExportToString(), end="")
+        write_utf8(flattened(source))
         return 0
     fabric, notes = load_any(source)
     for note in notes:
@@ -51,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     if options.wif:
         from fabricusd.schema.weaves import from_fabric, wif_text
 
-        sys.stdout.write(wif_text(from_fabric(fabric)))
+        write_utf8(wif_text(from_fabric(fabric)))
         return 0
     from fabricusd.schema.describe import as_dict, in_words
 
@@ -66,6 +67,8 @@ def run(options: argparse.Namespace) -> int:
     if not options.no_draft:
         from fabricusd.schema.weaves import draw
 
+        plain = not can_show("▀▄█…")
+        lines = max(size.lines, 48)
         print()
-        print(draw(fabric, width=size.columns, height=max(size.lines, 48), color=color))
+        print(draw(fabric, width=size.columns, height=lines, color=color, ascii_only=plain))
     return 0

@@ -7,7 +7,7 @@ import json
 import sys
 from typing import Any
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, one_line
 
 EPILOG = """status: 0 clean, 1 findings, 2 a file cannot be read
 
@@ -46,15 +46,15 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps([finding.as_dict() for finding in findings], indent=2))
     else:
         for finding in findings:
-            print(f"{finding.severity}: {finding}")
+            print(one_line(f"{finding.severity}: {finding}"))
     for refusal in unreadable:
-        print(f"fabricusd: {refusal}", file=sys.stderr)
+        print(one_line(f"fabricusd: {refusal}"), file=sys.stderr)
     errors = sum(finding.severity == "error" for finding in findings)
     warnings = len(findings) - errors
-    if not options.quiet and not options.json:
+    checked = len(options.files) - len(unreadable)
+    if checked and not options.quiet and not options.json:
         print(
-            f"{_count(len(options.files), 'file')}: {_count(errors, 'error')}, "
-            f"{_count(warnings, 'warning')}",
+            f"{_count(checked, 'file')}: {_count(errors, 'error')}, {_count(warnings, 'warning')}",
             file=sys.stderr,
         )
     if unreadable:

@@ -38,8 +38,8 @@ def _bound(text: str) -> float:
 
 def run(options: argparse.Namespace) -> int:
     """Print the figures, draw the map, judge the bounds."""
+    from fabricusd.images import read_image, write_png
     from fabricusd.quality.pictures import difference, flip_map, heat
-    from fabricusd.reference.images import read_image, write_png
 
     high_range = options.a.lower().endswith(".exr") and options.b.lower().endswith(".exr")
     a, b = read_image(options.a), read_image(options.b)

@@ -8,14 +8,14 @@ and `run`, and its name in COMMANDS. Only the module of the command that is aske
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from typing import NoReturn
 
 from fabricusd import __version__
-from fabricusd.errors import FabricError
+from fabricusd.cli.stdout import drop_stdout, ready_stdout
+from fabricusd.errors import FabricError, one_line
 
 COMMANDS = {
     "new": "make a fabric from a preset, a weave, an image or a WIF draft",
@@ -72,20 +72,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     command = next((word for word in given if word in COMMANDS), None)
     options = build_parser(command).parse_args(given)
+    ready_stdout()
     try:
         status: int = options.run(options)
         sys.stdout.flush()
         return status
     except FabricError as error:
-        print(f"fabricusd: {error}", file=sys.stderr)
-        return 2
+        return _refused(str(error))
     except BrokenPipeError:
-        # A reader such as `head` has had enough; keep Python from complaining at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # A reader such as `head` has had enough.
+        drop_stdout()
         return 0
+    except OSError as error:
+        drop_stdout()
+        return _refused(f"{error.filename or 'the output'} cannot be written: {error.strerror}")
+    except MemoryError:
+        return _refused("there is not memory enough for that")
     except KeyboardInterrupt:
         print("fabricusd: interrupted", file=sys.stderr)
         return 130
+
+
+def _refused(line: str) -> int:
+    print(f"fabricusd: {one_line(line)}", file=sys.stderr)
+    return 2
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
+from fabricusd.cli.stdout import write_utf8
 from fabricusd.errors import FabricError
 
 if TYPE_CHECKING:
@@ -14,6 +15,13 @@ if TYPE_CHECKING:
 
 LONGEST_ORDER = 16384
 """Most threads of one colour in a row; also the largest draft that is read."""
+
+NUMBERS = {
+    "ends_per_cm": (0.01, 10000.0, "ends/cm"),
+    "picks_per_cm": (0.01, 10000.0, "picks/cm"),
+    "thickness": (0.0, 1000.0, "mm"),
+}
+"""Least and most that a number on the command line may be; more or less is a mistaken unit."""
 
 EPILOG = """WEAVE is a name (plain, basket 2/2, twill 2/1 S, satin 8 step 3, herringbone 2/2 8,
 houndstooth, ...) or an expression in end i and pick j (mod(2*i + j, 5) < 4).
@@ -68,15 +76,16 @@ def run(options: argparse.Namespace) -> int:
         return 0
     fabric, notes = _fabric(options)
     fabric = _changed(fabric, options)
+    _write(fabric, options)
     for note in notes:
         if not options.quiet:
             print(f"fabricusd: {note}", file=sys.stderr)
-    _write(fabric, options)
     return 0
 
 
 def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
-    if options.preset:
+    _require_numbers(options)
+    if options.preset is not None:
         from fabricusd.schema.read import load
         from fabricusd.schema.source import preset_names
 
@@ -86,10 +95,9 @@ def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
                 f"is no preset; it must be one of {', '.join(preset_names())}",
             )
         for option in ("thread", "warp_color", "weft_color", "thickness", "invert"):
-            if getattr(options, option):
-                raise FabricError(
-                    f"--{option.replace('_', '-')}", "does not go with --preset; edit the layer"
-                )
+            # Not by equality: 0 equals False.
+            if not any(getattr(options, option) is unset for unset in (None, False)):
+                raise FabricError(_flag(option), "does not go with --preset; edit the layer")
         return load(options.preset), ()
     from dataclasses import replace
 
@@ -97,21 +105,34 @@ def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
 
     draft = _draft(options)
     for which, density in (("warp", options.ends_per_cm), ("weft", options.picks_per_cm)):
-        if density and density > 0:
+        if density is not None:
             told = {f"{which}_spacing": 0.01 / density, f"{which}_spacings": ()}
             draft = replace(draft, **told)
     fabric = to_fabric(draft, _base_thread(options))
     return fabric, (*draft.warnings, *losses(draft))
 
 
+def _flag(option: str) -> str:
+    return f"--{option.replace('_', '-')}"
+
+
+def _require_numbers(options: argparse.Namespace) -> None:
+    for option, (low, high, unit) in NUMBERS.items():
+        value = getattr(options, option)
+        if value is not None and not low <= value <= high:
+            raise FabricError(
+                _flag(option), f"is {value:g}; it must be from {low:g} to {high:g} {unit}"
+            )
+
+
 def _draft(options: argparse.Namespace) -> Draft:
     from fabricusd.schema.weaves import parse_weave, read_wif, with_colors
 
-    if options.invert and not options.image:
+    if options.invert and options.image is None:
         raise FabricError("--invert", "goes with --image only")
-    if options.wif:
+    if options.wif is not None:
         draft = read_wif(options.wif)
-    elif options.image:
+    elif options.image is not None:
         return _image_draft(options)
     else:
         draft = parse_weave(options.weave)
@@ -187,7 +208,7 @@ def _changed(fabric: Fabric, options: argparse.Namespace) -> Fabric:
     if not name and not options.preset:
         name = Path(options.output or options.wif or options.image or fabric.name).stem
     if name:
-        from fabricusd.schema.write import prim_name
+        from fabricusd.schema.names import prim_name
 
         changes["name"] = prim_name(name)
     return replace(fabric, **changes)
@@ -198,16 +219,16 @@ def _write(fabric: Fabric, options: argparse.Namespace) -> None:
     from fabricusd.schema.write import EXTENSIONS, save, usd_text
 
     output = options.output
-    wif = bool(output) and output.lower().endswith(".wif")
-    if output and not wif and not output.endswith(EXTENSIONS):
+    wif = output is not None and output.lower().endswith(".wif")
+    if output is not None and not wif and not output.lower().endswith(EXTENSIONS):
         raise FabricError(
             f"-o '{output}'", f"has another suffix than {', '.join((*EXTENSIONS, '.wif'))}"
         )
     if options.dry_run:
         print(f"fabricusd: would write {fabric.name} to {output or 'stdout'}", file=sys.stderr)
         (wif_text(from_fabric(fabric)) if wif else usd_text(fabric))
-    elif not output:
-        sys.stdout.write(usd_text(fabric))
+    elif output is None:
+        write_utf8(usd_text(fabric))
     elif wif:
         write_wif(from_fabric(fabric), output, clobber=not options.no_clobber)
     else:

@@ -25,7 +25,7 @@ from fabricusd.preview.paths import asset_path
 from fabricusd.preview.wearers import Dressed, NewUV, Wearer
 from fabricusd.preview.write_usd import write_material
 from fabricusd.schema import write_binding, write_fabric
-from fabricusd.schema.write import prim_name
+from fabricusd.schema.names import prim_name
 
 VARIANT_SET = "fabricLook"
 VARIANTS = ("baked", "procedural", "off")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fabricusd.errors import FabricError
+from fabricusd.images import read_mip_level, write_png
 from fabricusd.preview.bake_folder import BakeFolder, MapSet
 from fabricusd.preview.fit import Fitted, fit, fit_threads, thread_factors, with_threads
 from fabricusd.preview.graph import Texture, Value
@@ -19,8 +20,7 @@ from fabricusd.preview.look import Look
 from fabricusd.preview.surfaces import GRAPHS, MAPS, NO_TINT, Inputs, parameter_values, preview
 from fabricusd.preview.texels import draw_texels, mean_texel
 from fabricusd.preview.thread_maps import COLUMNS, Factors, write_thread_maps
-from fabricusd.reference.images import read_mip_level, write_png
-from fabricusd.schema.write import prim_name
+from fabricusd.schema.names import prim_name
 
 Progress = Callable[[str], None]
 

@@ -10,9 +10,9 @@ from scipy.cluster.vq import kmeans2
 
 from fabricusd.bake.bake import FEWEST
 from fabricusd.bake.maps import GAP_ID
+from fabricusd.images import read_mip_level
 from fabricusd.preview.bake_folder import BakedLay, MapSet
 from fabricusd.preview.target import NO_THREAD, TexelSample
-from fabricusd.reference.images import read_mip_level
 
 DRAWN, KINDS = 2048, 12
 """Texels drawn of each lay, and the kinds that they are sorted into, each standing for its share:

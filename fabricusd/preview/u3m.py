@@ -23,11 +23,11 @@ from fabricusd.bake.bake import Settings, bake
 from fabricusd.bake.manifest import write_json
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
+from fabricusd.images import read_mip_level, write_png
 from fabricusd.preview.bake_folder import MapSet, read_bake_folder
 from fabricusd.preview.fit import fit
 from fabricusd.preview.look import Look
 from fabricusd.preview.texels import NEEDED, draw_texels
-from fabricusd.reference.images import read_mip_level, write_png
 from fabricusd.reference.view_transform import srgb_encode
 from fabricusd.schema.weaves.recognise import recognise
 

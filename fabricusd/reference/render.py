@@ -18,10 +18,10 @@ from fabricusd.appearance.footprint import DEFAULT, Limits
 from fabricusd.appearance.shadow import METHODS
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
+from fabricusd.images import write_exr, write_png
 from fabricusd.reference.camera import build_lens, default_camera
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import AOVS, Film, require_aovs
-from fabricusd.reference.images import write_exr, write_png
 from fabricusd.reference.integrator import Tracer
 from fabricusd.reference.read import read_scene
 from fabricusd.reference.scene import Scene

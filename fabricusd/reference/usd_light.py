@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdLux
 
 from fabricusd.errors import FabricError
-from fabricusd.reference.images import read_image
+from fabricusd.images import read_image
 from fabricusd.reference.scene import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE, Light, Scene
 
 _KINDS = {

@@ -10,7 +10,7 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
-from fabricusd.reference.images import read_image
+from fabricusd.images import read_image
 from fabricusd.reference.scene import FabricSurface, PreviewSurface, Scene, Texture
 from fabricusd.schema import read_binding
 

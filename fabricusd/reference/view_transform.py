@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.schema.weaves.color import linear_from_srgb, srgb_from_linear
+from fabricusd.srgb import linear_from_srgb, srgb_from_linear
 
 _A, _B, _C, _D, _E = 2.51, 0.03, 2.43, 0.59, 0.14
 GREY = 0.18

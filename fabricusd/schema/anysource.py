@@ -22,7 +22,7 @@ def load_any(source: str | os.PathLike[str]) -> tuple[Fabric, tuple[str, ...]]:
         from fabricusd.schema.weaves import losses, read_image, read_wif, to_fabric
 
         draft = read_wif(text) if text.lower().endswith(".wif") else read_image(text)
-        return to_fabric(draft), (*draft.warnings, *losses(draft))
+        return to_fabric(draft, name=Path(text).stem), (*draft.warnings, *losses(draft))
     from fabricusd.schema.read import load
 
     return load(text), ()

@@ -10,7 +10,7 @@ from pxr import Usd
 
 from fabricusd.schema.anysource import is_draft, load_any
 from fabricusd.schema.rules import RULES, applies, run
-from fabricusd.schema.source import open_stage
+from fabricusd.schema.source import open_stage, usd_errors
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,8 @@ def check(source: str | os.PathLike[str]) -> list[Finding]:
         return [Finding("DraftIsComplete", "warning", str(source), "", "", note) for note in notes]
     stage, file = open_stage(source)
     findings: list[Finding] = []
-    for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
-        findings.extend(check_prim(prim, file))
+    every = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
+    with usd_errors(file, "checked"):
+        for prim in every:
+            findings.extend(check_prim(prim, file))
     return findings

@@ -13,8 +13,9 @@ from fabricusd.fabric import Binding, Fabric, TangentCurve, Thread, ThreadSet, W
 from fabricusd.schema import attributes, weave_rows
 from fabricusd.schema.attributes import DEGREE, Attribute, to_si
 from fabricusd.schema.check import check_prim
+from fabricusd.schema.names import free_name
 from fabricusd.schema.rules import thread_prims
-from fabricusd.schema.source import find_fabric, open_stage, split_source
+from fabricusd.schema.source import find_fabric, open_stage, split_source, usd_errors
 
 
 def load(source: str | os.PathLike[str]) -> Fabric:
@@ -23,11 +24,12 @@ def load(source: str | os.PathLike[str]) -> Fabric:
     FabricError, naming place, value and what would be accepted, where it breaks a rule.
     """
     stage, file = open_stage(source)
-    prim = find_fabric(stage, file, split_source(source)[1])
-    try:
-        return read_fabric(prim)
-    except FabricError as error:
-        raise error.inside(f"{file}:") from error
+    with usd_errors(file, "read as a fabric"):
+        prim = find_fabric(stage, file, split_source(source)[1])
+        try:
+            return read_fabric(prim)
+        except FabricError as error:
+            raise error.inside(f"{file}:") from error
 
 
 def read_fabric(prim: Usd.Prim) -> Fabric:
@@ -59,13 +61,8 @@ def read_side(prim: Usd.Prim, front: Usd.Prim | None = None) -> Fabric:
     threads: dict[str, Thread] = {}
     for thread_prim in thread_prims(prim):
         _require_clean(thread_prim)
-        name = thread_prim.GetName()
-        if name in threads:
-            raise FabricError(
-                f"{prim.GetPath()} fabric:threads",
-                f"targets two prims named {name}; names must differ",
-            )
-        threads[name] = read_thread(thread_prim)
+        # Two threads of one name may come from two libraries.
+        threads[free_name(thread_prim.GetName(), threads)] = read_thread(thread_prim)
     rows = prim.GetAttribute("fabric:weave:rows").Get()
     return Fabric(
         name=prim.GetName(),

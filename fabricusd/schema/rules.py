@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, one_line
 from fabricusd.fabric import describe_limits, within_limits
 from fabricusd.schema import attributes, weave_rows
 from fabricusd.schema.attributes import Attribute
@@ -92,6 +92,23 @@ def property_type_matches(prim: Usd.Prim) -> Iterator[Fault]:
                         yield name, f"is of type {spec.typeName}, {where}; it must be {wanted}"
 
 
+@rule(FABRIC, THREAD, BINDING)
+def value_at_rest(prim: Usd.Prim) -> Iterator[Fault]:
+    """Every attribute has a value of its own at the default time, which is what is read."""
+    for definition in _definitions(prim):
+        for name in definition.GetPropertyNames():
+            attribute = prim.GetAttribute(name)
+            if not attribute or definition.GetSpecType(name) != Sdf.SpecTypeAttribute:
+                continue
+            at_rest = attribute.GetResolveInfo(Usd.TimeCode.Default())
+            if attribute.HasAuthoredConnections():
+                yield name, "is connected to another attribute; it must have a value instead"
+            elif attribute.GetResolveInfo().HasAuthoredValue() and not at_rest.HasAuthoredValue():
+                yield name, "has values in time but none at rest; it must have a default value"
+            elif at_rest.ValueIsBlocked():
+                yield name, "is blocked with None; it must have a value"
+
+
 @rule(FABRIC, THREAD, BINDING, severity="warning")
 def property_known(prim: Usd.Prim) -> Iterator[Fault]:
     """Every property in the fabric: and thread: namespaces is in the schema."""
@@ -147,7 +164,9 @@ def thread_prims(prim: Usd.Prim) -> list[Usd.Prim]:
     if relationship and relationship.HasAuthoredTargets():
         targets = relationship.GetForwardedTargets()
         return [prim.GetStage().GetPrimAtPath(path) for path in targets]
-    return [child for child in prim.GetChildren() if child.GetTypeName() == "FabricThread"]
+    # An instance shows its children to those who ask for them alone.
+    children = prim.GetFilteredChildren(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
+    return [child for child in children if child.GetTypeName() == "FabricThread"]
 
 
 def _forwarding_cycle(relationship: Usd.Relationship) -> list[str]:
@@ -394,8 +413,11 @@ def binding_api_applied(prim: Usd.Prim) -> Iterator[Fault]:
 
 
 def run(checked: Rule, prim: Usd.Prim) -> list[Fault]:
-    """The faults that one rule finds on one prim, with USD's own errors as faults."""
+    """The faults that one rule finds on one prim, with values that cannot be read as faults."""
     try:
         return list(checked.function(prim))
     except Tf.ErrorException as error:
-        return [("", f"cannot be read: {error}")]
+        return [("", f"cannot be read: {one_line(str(error), 300)}; it must be whole")]
+    except TypeError:
+        # Of a wrong type in a layer, or of a damaged .usdc in which type and value disagree.
+        return [("", "holds a value of a wrong type; each must be of the schema's type")]

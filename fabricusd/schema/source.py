@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from pxr import Sdf, Tf, Usd, UsdUtils
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, one_line
 from fabricusd.files import readable_file
 from fabricusd.schema.plugin import require_schema
 
@@ -23,12 +26,13 @@ def split_source(source: str | os.PathLike[str]) -> tuple[Path, str]:
     """`FILE[:/PRIM]` or a preset's name -> (file, prim path or "")."""
     text = os.fspath(source)
     file, separator, prim = text.rpartition(":/")
-    if not separator:
-        file, prim = text, ""
+    # `C:/cloth.usda` begins with a drive, which is no file.
+    if not separator or (len(file) == 1 and file.isalpha()):
+        file, separator = text, ""
     if not file:
         raise FabricError(repr(text), "names no file; it must be a USD file or a preset")
     prim = f"/{prim}" if separator else ""
-    if not Path(file).exists() and file in preset_names():
+    if not os.path.exists(file) and file in preset_names():
         return PRESETS / f"{file}.usda", prim
     return Path(file), prim
 
@@ -40,44 +44,76 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
     USD, or does not compose.
     """
     path, _ = split_source(source)
-    if not path.exists():
-        near = f"; presets are {', '.join(preset_names())}" if not path.suffix else ""
-        raise FabricError(str(path), f"is no file{near}")
-    readable_file(path)
-    if Sdf.FileFormat.FindByExtension(str(path)) is None:
-        raise FabricError(str(path), "is not USD; it must be .usda, .usdc, .usd or .usdz")
-    require_schema()
-    # USD also prints composition errors as warnings; they are raised below, once.
+    near = f"; presets are {', '.join(preset_names())}" if not path.suffix else ""
+    readable_file(path, missing=f"is no file{near}")
+    with usd_errors(str(path)):
+        if Sdf.FileFormat.FindByExtension(str(path)) is None:
+            raise FabricError(str(path), "is not USD; it must be .usda, .usdc, .usd or .usdz")
+        require_schema()
+        stage = _composed(str(path))
+        errors = stage.GetCompositionErrors()
+        if errors:
+            raise FabricError(str(path), f"does not compose: {one_line(str(errors[0]), 300)}")
+    return stage, str(path)
+
+
+def _composed(path: str) -> Usd.Stage:
+    # USD also prints composition errors as warnings; `open_stage` raises them, once.
     silence = UsdUtils.CoalescingDiagnosticDelegate()
     try:
-        layer = Sdf.Layer.FindOrOpen(str(path))
+        layer = Sdf.Layer.FindOrOpen(path)
         if layer is None:
-            raise FabricError(str(path), "is not USD; it cannot be parsed")
+            raise FabricError(path, "is not USD; it cannot be parsed")
         stage = Usd.Stage.Open(layer)
         for used in stage.GetUsedLayers():
             # The process may hold an older reading of the file; edits nobody saved are kept.
             if not used.dirty and not used.anonymous:
                 used.Reload()
-    except Tf.ErrorException as error:
-        raise FabricError(str(path), f"cannot be parsed as USD: {_first_line(error)}") from error
+        return stage
     finally:
         silence.TakeUncoalescedDiagnostics()
         del silence
-    errors = stage.GetCompositionErrors()
-    if errors:
-        raise FabricError(str(path), f"does not compose: {_one_line(str(errors[0]))}")
-    return stage, str(path)
 
 
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
+def flattened(source: str | os.PathLike[str]) -> str:
+    """The composed stage of `source` as USD text; FabricError as from `open_stage`."""
+    stage, file = open_stage(source)
+    with usd_errors(file, "flattened"):
+        return str(stage.Flatten().ExportToString())
 
 
-def _first_line(error: Tf.ErrorException) -> str:
-    """USD's own words without the place in its source code that says them."""
-    text = _one_line(str(error))
-    _, separator, after = text.partition(" : ")
-    return (after if separator else text).strip("'\" ")
+@contextmanager
+def usd_errors(where: str, doing: str = "parsed as USD") -> Iterator[None]:
+    """What USD raises in the block as a FabricError of one line; `where` is the file."""
+    try:
+        try:
+            yield
+        except Tf.ErrorException as error:
+            raise FabricError(where, f"cannot be {doing}: {_usd_words(error)}") from error
+    except UnicodeEncodeError as error:
+        raise FabricError(where, "has a name that is not UTF-8; USD needs one that is") from error
+    except UnicodeDecodeError as error:
+        byte = f"the byte {error.object[error.start]:#04x}{_line_of_byte(where)}"
+        raise FabricError(where, f"holds {byte}; its text must be UTF-8") from error
+
+
+def _usd_words(error: Tf.ErrorException) -> str:
+    """What is wrong, without names of USD's source code; UnicodeDecodeError where it is no text."""
+    words = error.args[0].commentary if error.args else str(error)
+    return one_line(re.sub(r"parse error matching \S.*? at '", "does not parse at '", words), 300)
+
+
+def _line_of_byte(file: str) -> str:
+    """` in line 7` of a text layer, where its first byte is that is not UTF-8; else nothing."""
+    try:
+        data = Path(file).read_bytes()
+        if data.startswith(b"#usda"):
+            data.decode()
+    except UnicodeDecodeError as error:
+        return f" in line {data.count(bytes([10]), 0, error.start) + 1}"
+    except OSError:
+        pass
+    return ""
 
 
 def find_fabric(stage: Usd.Stage, file: str, prim_path: str = "") -> Usd.Prim:
@@ -95,7 +131,8 @@ def find_fabric(stage: Usd.Stage, file: str, prim_path: str = "") -> Usd.Prim:
     default = stage.GetDefaultPrim()
     if default and default.GetTypeName() == "Fabric":
         return default
-    found = [prim for prim in stage.Traverse() if prim.GetTypeName() == "Fabric"]
+    every = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
+    found = [prim for prim in every if prim.GetTypeName() == "Fabric"]
     if not found:
         raise FabricError(file, "holds no Fabric prim")
     if len(found) > 1:

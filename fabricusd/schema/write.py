@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Sequence
 
-from pxr import Sdf, Tf, Usd, Vt
+from pxr import Sdf, Usd, Vt
 
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric, Thread
 from fabricusd.files import whole_file
 from fabricusd.schema import attributes, weave_rows
 from fabricusd.schema.attributes import DEGREE, Attribute, from_si, unscale
+from fabricusd.schema.names import free_name, prim_name
+from fabricusd.schema.source import usd_errors
 
 EXTENSIONS = (".usda", ".usdc", ".usd")
 
@@ -30,14 +31,12 @@ def save_all(
     Of several with one name the first is written.
     """
     target = os.fspath(path)
-    if not target.endswith(EXTENSIONS):
+    if not target.lower().endswith(EXTENSIONS):
         raise FabricError(target, f"has another suffix than {', '.join(EXTENSIONS)}")
     layer = _layer(fabrics)
-    with whole_file(target, clobber=clobber) as temporary:
-        try:
-            layer.Export(str(temporary))
-        except Tf.ErrorException as error:
-            raise FabricError(target, f"cannot be written: {error}") from error
+    with usd_errors(target, "written"), whole_file(target, clobber=clobber) as temporary:
+        if not layer.Export(str(temporary)):
+            raise FabricError(target, "cannot be written")
 
 
 def usd_text(fabric: Fabric) -> str:
@@ -60,13 +59,12 @@ def _layer(fabrics: Sequence[Fabric]) -> Sdf.Layer:
     return layer
 
 
-def prim_name(text: str) -> str:
-    """The nearest valid prim name: letters, digits and _, not starting with a digit."""
-    return str(Tf.MakeValidIdentifier(re.sub(r"\W+", "_", text.strip()) or "Fabric"))
-
-
 def write_fabric(stage: Usd.Stage, path: Sdf.Path | str, fabric: Fabric) -> Usd.Prim:
-    """Define a Fabric prim with its threads as children, and its back as a sibling."""
+    """Define a Fabric prim with its threads as children, and its back as a sibling.
+
+    A name that is no prim's becomes the nearest; threads of one name, and a back that is called
+    as its front, have a number put after theirs.
+    """
     path = Sdf.Path(path)
     prim = stage.DefinePrim(path, "Fabric")
     _document(prim, fabric.documentation)
@@ -88,9 +86,7 @@ def write_fabric(stage: Usd.Stage, path: Sdf.Path | str, fabric: Fabric) -> Usd.
         _set(prim, "fabric:opaque", "bool", True)
     _set_numbers(prim, attributes.FABRIC, fabric)
     if fabric.back is not None:
-        name = prim_name(fabric.back.name)
-        if name == path.name:
-            raise FabricError("back", f"has the front's name, {name}; it must have its own")
+        name = free_name(prim_name(fabric.back.name), (path.name,))
         back = write_fabric(stage, path.ReplaceName(name), fabric.back)
         prim.CreateRelationship("fabric:back", custom=False).SetTargets([back.GetPath()])
     return prim
@@ -120,12 +116,7 @@ def _unique_names(names: Sequence[str]) -> list[str]:
     """Valid prim names; two that fall together are told apart by a number."""
     taken: dict[str, None] = {}
     for name in names:
-        base = candidate = prim_name(name)
-        count = 1
-        while candidate in taken:
-            count += 1
-            candidate = f"{base}_{count}"
-        taken[candidate] = None
+        taken[free_name(prim_name(name), taken)] = None
     return list(taken)
 
 

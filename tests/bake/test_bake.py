@@ -25,7 +25,7 @@ from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
 from fabricusd.files import whole_file
-from fabricusd.reference.images import read_mip_level
+from fabricusd.images import read_mip_level
 from fabricusd.schema import load
 
 MAPS = ("normal", "thread_id", "lay", "base_color")

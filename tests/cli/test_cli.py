@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from fabricusd.cli.main import COMMANDS, main
 from fabricusd.fabric import Fabric
 from fabricusd.schema import load, preset_names
+
+ROOT = str(Path(__file__).resolve().parents[2])
 
 
 def run(capsys, *arguments: str) -> tuple[int, str, str]:
@@ -124,6 +128,8 @@ BAD = {
     "no source": ["new", "-o", "a.usda"],
     "two sources": ["new", "--preset", "velvet", "--weave", "plain"],
     "an unknown preset": ["new", "--preset", "velours"],
+    "a preset without a name": ["new", "--preset", ""],
+    "a preset with an option for drafts": ["new", "--preset", "velvet", "--thickness", "0"],
     "an unknown weave": ["new", "--weave", "twil 2/1"],
     "a satin that is none": ["new", "--weave", "satin 6 step 2"],
     "an expression that is none": ["new", "--weave", "mod(i + j, 0) < 1"],
@@ -134,15 +140,24 @@ BAD = {
     "a negative density": ["new", "--weave", "plain", "--ends-per-cm", "-3"],
     "a density that is no number": ["new", "--weave", "plain", "--ends-per-cm", "many"],
     "a NaN density": ["new", "--weave", "plain", "--picks-per-cm", "nan"],
+    "a density beyond numbers": ["new", "--weave", "plain", "--ends-per-cm", "1e308"],
+    "an endless thickness": ["new", "--weave", "plain", "--thickness", "inf"],
     "a negative thickness": ["new", "--weave", "plain", "--thickness", "-1"],
     "an output of another kind": ["new", "--preset", "velvet", "-o", "a.fbx"],
     "an output in no folder": ["new", "--preset", "velvet", "-o", "nowhere/a.usda"],
+    "an output without a name": ["new", "--weave", "plain", "-o", ""],
+    "an output whose name is too long": ["new", "--weave", "plain", "-o", "a" * 300 + ".usda"],
+    "an output whose name is no text": ["new", "--weave", "plain", "-o", "\udcff.usda"],
     "a missing draft": ["new", "--wif", "nowhere.wif"],
+    "a draft without a name": ["new", "--wif", ""],
     "a missing image": ["new", "--image", "nowhere.png"],
+    "an image without a name": ["new", "--image", ""],
     "invert without an image": ["new", "--weave", "plain", "--invert"],
     "cat of nothing": ["cat", "nowhere.usda"],
     "cat of a prim that is not there": ["cat", "velvet", "/Nowhere"],
     "flatten of a missing file": ["cat", "nowhere.usda", "--flatten"],
+    "cat of a name with a line end": ["cat", "no\nwhere.usda"],
+    "cat of a name that is too long": ["cat", "a" * 300 + ".usda"],
     "check of nothing": ["check"],
     "check of a missing file": ["check", "nowhere.usda"],
     "check of a folder": ["check", "."],
@@ -156,11 +171,49 @@ def test_bad_input_is_one_line_and_status_2_and_writes_nothing(case, capsys, tmp
     (tmp_path / "taken").write_text("")
     before = sorted(tmp_path.iterdir())
     status, _, err = run(capsys, *BAD[case])
-    lines = [line for line in err.splitlines() if "errors" not in line]
+    lines = err.splitlines()
     assert status == 2
     assert len(lines) == 1, err
     assert lines[0].startswith("fabricusd")
+    assert lines[0].isprintable()
     assert sorted(tmp_path.iterdir()) == before
+
+
+WRITES = {
+    "a full disk": (["cat", "velvet"], "/dev/full", "", 2),
+    "a full disk, for a layer": (["new", "--preset", "velvet"], "/dev/full", "", 2),
+    "an output of few characters": (["cat", "velvet"], "out", "ascii", 0),
+    "an output of Windows": (["cat", "velvet"], "out", "cp1252", 0),
+}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has /dev/full")
+@pytest.mark.parametrize("case", WRITES)
+def test_no_standard_output_makes_a_traceback(case, tmp_path, monkeypatch):
+    arguments, out, encoding, wanted = WRITES[case]
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONIOENCODING", encoding)
+    with open(out, "w") as stdout:
+        done = subprocess.run(
+            [sys.executable, "-m", "fabricusd", *arguments],
+            stdout=stdout, stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": ROOT}
+        )  # fmt: skip
+    assert done.returncode == wanted
+    assert len(done.stderr.splitlines()) == (1 if wanted else 0), done.stderr
+
+
+def test_a_layer_is_printed_as_utf_8_whatever_the_output_is(tmp_path):
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONPATH": ROOT}
+    done = subprocess.run(
+        [sys.executable, "-m", "fabricusd", "new", "--weave", "plain", "--name", "Größe", "-q"],
+        stdout=subprocess.PIPE, env=environment, check=True,
+    )  # fmt: skip
+    (tmp_path / "x.usda").write_bytes(done.stdout)
+    assert load(tmp_path / "x.usda").name == "Größe"
+
+
+def test_a_prim_is_named_with_its_slash_or_without(capsys):
+    assert run(capsys, "cat", "velvet", "velvet") == run(capsys, "cat", "velvet", "/velvet")
 
 
 def test_check_tells_findings_by_status(capsys, tmp_path):
@@ -187,8 +240,6 @@ def test_list_rules_prints_each_with_its_meaning(capsys):
 
 
 def test_plugin_path_is_a_folder_with_a_plug_info(capsys):
-    from pathlib import Path
-
     _, out, _ = run(capsys, "plugin-path")
     assert (Path(out.strip()) / "plugInfo.json").is_file()
 

@@ -12,11 +12,11 @@ from pxr import Sdf, Usd, UsdShade
 from fabricusd.bake.bake import Settings as BakeSettings
 from fabricusd.bake.bake import bake
 from fabricusd.bake.maps import GAP_ID
+from fabricusd.images import read_mip_level
 from fabricusd.preview.bake_folder import read_bake_folder
 from fabricusd.preview.materials import write_materials
 from fabricusd.preview.texels import NEEDED
 from fabricusd.preview.thread_maps import write_thread_maps
-from fabricusd.reference.images import read_mip_level
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from fabricusd.images import write_exr
 from fabricusd.reference.film import AOVS
-from fabricusd.reference.images import write_exr
 from fabricusd.reference.render import RenderResult
 from fabricusd.reference.scene import DOME, RECT, Camera, Light, PreviewSurface
 from fabricusd.schema import load

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from fabricusd.images import read_exr_layers
 from fabricusd.quality.statistics import z_test
-from fabricusd.reference.images import read_exr_layers
 from tests.reference.goldens import CASES, FOLDER, SIZE, render_case
 from tests.reference.scenes import blocks
 

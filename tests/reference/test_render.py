@@ -10,9 +10,9 @@ import pytest
 from pxr import Usd, UsdGeom
 
 from fabricusd.errors import FabricError
+from fabricusd.images import read_exr_layers, read_image
 from fabricusd.reference import workers
 from fabricusd.reference.film import AOVS
-from fabricusd.reference.images import read_exr_layers, read_image
 from fabricusd.reference.render import render
 from fabricusd.reference.scene import Scene
 from fabricusd.reference.view_transform import srgb_decode, srgb_encode, tone_curve, view

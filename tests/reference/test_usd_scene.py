@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
-from fabricusd.reference.images import write_exr, write_png
+from fabricusd.images import write_exr, write_png
 from fabricusd.reference.scene import FabricSurface, PreviewSurface
 from fabricusd.reference.triangles import build_tables
 from tests.reference.stages import area, bind_fabric, new_stage, read, square, up_share

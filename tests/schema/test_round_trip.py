@@ -21,6 +21,7 @@ from fabricusd.schema import (
     write_fabric,
 )
 from fabricusd.schema.attributes import DEGREE, unscale
+from fabricusd.schema.names import prim_name
 
 
 def assert_same(one: Fabric, other: Fabric) -> None:
@@ -101,6 +102,75 @@ def Fabric "Cloth"
 """
     )
     assert load(f"{tmp_path / 'library.usda'}:/Cloth").threads["Silk"].ior == 1.345
+
+
+TWO_LIBRARIES = """#usda 1.0
+def Scope "Library"
+{
+    def FabricThread "Silk"
+    {
+        double thread:ior = 1.345
+    }
+}
+def Fabric "Cloth"
+{
+    rel fabric:threads = [</Cloth/Silk>, </Library/Silk>]
+    int[] fabric:weft:threads = [1]
+    def FabricThread "Silk"
+    {
+    }
+}
+"""
+
+
+def test_threads_of_one_name_from_two_places_are_told_apart(tmp_path):
+    (tmp_path / "two.usda").write_text(TWO_LIBRARIES)
+    fabric = load(tmp_path / "two.usda")
+    assert [(name, t.ior) for name, t in fabric.threads.items()] == [
+        ("Silk", 1.5),
+        ("Silk_2", 1.345),
+    ]
+    save(fabric, tmp_path / "again.usda")
+    assert_same(load(tmp_path / "again.usda"), fabric)
+
+
+@pytest.mark.parametrize("where", ["Fabric", "Scope"])
+def test_an_instanceable_fabric_is_read(where, tmp_path):
+    save(load("velvet"), tmp_path / "velvet.usda")
+    inside = 'def Fabric "velvet" (references = @velvet.usda@)\n{\n}'
+    library = f'def Scope "Library"\n{{\n{inside}\n}}'
+    target, name = ("</Library/velvet>", "velvet") if where == "Fabric" else ("</Library>", "Shop")
+    (tmp_path / "shop.usda").write_text(
+        f"""#usda 1.0
+(
+    defaultPrim = "{name}"
+)
+class {library[4:]}
+def {where} "{name}" (
+    instanceable = true
+    references = {target}
+)
+{{
+}}
+"""
+    )
+    assert_same(load(tmp_path / "shop.usda"), load("velvet"))
+
+
+def test_a_back_called_as_its_front_is_written_under_another_name():
+    stage = Usd.Stage.CreateInMemory()
+    fabric = Fabric(name="Cloth", back=Fabric(name="Cloth", opaque=True))
+    again = read_fabric(write_fabric(stage, "/Cloth", fabric))
+    assert again == replace(fabric, back=replace(fabric.back, name="Cloth_2"))
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [("2229", "_2229"), ("4 black", "_4_black"), ("Größe", "Größe"), ("麻 布", "麻_布"),
+     ("", "Fabric"), ("a²", "a_"), ("²", "_"), ("\udcff", "_")],
+)  # fmt: skip
+def test_a_prims_name_is_the_nearest_to_the_text(text, name):
+    assert prim_name(text) == name
 
 
 def test_sublayers_payloads_and_variants_are_read_as_composed(tmp_path):

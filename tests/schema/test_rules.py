@@ -100,6 +100,10 @@ def test_a_thread_value_out_of_range_is_named_with_its_place(attribute, text, tm
         ("double fabric:warp:density", "-20"),
         ("double fabric:weft:density", "0"),
         ("double fabric:warp:density", "nan"),
+        ("double fabric:warp:density", "None"),
+        ("double fabric:warp:density.timeSamples", "{ 1: 20 }"),
+        ("double fabric:warp:density.connect", "</Cloth/Warp.thread:ior>"),
+        ("string[] fabric:weave:rows", "None"),
         ("double fabric:warp:coverage", "-0.5"),
         ("double fabric:weft:coverage", "1.01"),
         ("double fabric:maskingWidth", "0"),
@@ -119,7 +123,7 @@ def test_a_fabric_value_out_of_range_is_named_with_its_place(attribute, text, tm
     path = tmp_path / "cloth.usda"
     body = f'{attribute} = {text}\ndef FabricThread "Warp" {{ }}'
     path.write_text(f'#usda 1.0\ndef Fabric "Cloth"\n{{\n{body}\n}}\n')
-    name = attribute.split()[-1]
+    name = attribute.split()[-1].partition(".")[0]
     with pytest.raises(FabricError, match=rf"/Cloth {name}.*must"):
         load(path)
 
@@ -129,6 +133,14 @@ def test_every_problem_says_what_would_be_accepted():
         for finding in check(str(sample)):
             if finding.severity == "error":
                 assert "must" in finding.problem, finding
+
+
+@pytest.mark.parametrize("written", ["mystery thread:ior = 3", "float thread:curve:positions = 3"])
+def test_a_value_of_a_wrong_type_is_a_finding_of_every_rule(written, tmp_path):
+    path = tmp_path / "cloth.usda"
+    thread = f'def FabricThread "Warp"\n{{\n{written}\n}}'
+    path.write_text(f'#usda 1.0\ndef Fabric "Cloth"\n{{\n{thread}\n}}\n')
+    assert "PropertyTypeMatches" in {finding.rule for finding in check(str(path))}
 
 
 def test_bounds_are_told_in_the_unit_of_the_file(tmp_path):

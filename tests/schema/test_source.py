@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import pytest
 
 from fabricusd import FabricError
 from fabricusd.schema import check, load, save
+from fabricusd.schema.source import split_source
 
 TWO = """#usda 1.0
 def Fabric "A"
@@ -38,6 +40,14 @@ CASES = {
     "a text that is no USD": (("t.usda", "hello"), "{}", "cannot be parsed as USD"),
     "a truncated USD text": (("t.usda", '#usda 1.0\ndef Fabric "A" {'), "{}", r"t.usda:2"),
     "a truncated binary": (("t.usdc", b"PXR-USDC\0\0"), "{}", "cannot be parsed as USD"),
+    "a text that is not UTF-8": (
+        ("t.usda", b'#usda 1.0\ndef Fabric "A"\n{\n\xff\n}\n'), "{}", "byte 0xff in line 4"),
+    "documentation that is not UTF-8": (
+        ("t.usda", b'#usda 1.0\ndef Fabric "A" (doc = "\xe9")\n{\ndef FabricThread "T" {\n}\n}'),
+        "{}", "byte 0xe9 in line 2; .* UTF-8"),
+    "a text that is a parser's riddle": (
+        ("t.usda", '#usda 1.0\ndef Fabric "A"\n{\ndouble a.spline = { 1: 5; 2: 8}\n}\n'), "{}",
+        "t.usda:4.* does not parse at"),
     "another kind of file": (("t.txt", "hello"), "{}", "is not USD; it must be .usda"),
     "a stage without a fabric": (("x.usda", '#usda 1.0\ndef Xform "X"\n{\n}\n'), "{}",
                                  "holds no Fabric prim"),
@@ -61,8 +71,21 @@ def test_a_broken_source_is_one_clear_line(case, tmp_path, capfd):
         source = source.format(write(tmp_path, *file))
     with pytest.raises(FabricError, match=message) as caught:
         load(source)
-    assert "\n" not in str(caught.value)
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 700
     assert capfd.readouterr().err == ""
+
+
+def test_a_drive_is_no_file():
+    assert split_source("C:/cloth.usda") == (Path("C:/cloth.usda"), "")
+    assert split_source("C:/cloth.usda:/A/B") == (Path("C:/cloth.usda"), "/A/B")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes in folders here")
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "a.usda")
+    with pytest.raises(FabricError, match="is a pipe or a device"):
+        load(tmp_path / "a.usda")
 
 
 @pytest.mark.parametrize("reader", [load, check])
@@ -109,8 +132,6 @@ def test_no_clobber_keeps_what_is_there(tmp_path):
 
 
 def test_a_write_that_fails_half_way_leaves_the_old_file_whole(tmp_path, monkeypatch):
-    from pathlib import Path
-
     target = tmp_path / "cloth.usda"
     save(load("velvet"), target)
     kept = target.read_bytes()

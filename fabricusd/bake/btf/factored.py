@@ -17,7 +17,7 @@ from fabricusd.bake.btf.interpolate import evaluate
 from fabricusd.bake.btf.matrix import Btf
 from fabricusd.errors import FabricError
 from fabricusd.files import readable_file, whole_file
-from fabricusd.reference.images import read_exr_layers, write_exr
+from fabricusd.images import read_exr_layers, write_exr
 
 Floats = NDArray[np.float64]
 

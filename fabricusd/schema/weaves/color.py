@@ -1,7 +1,6 @@
 """Display colours of drafts and images, and the linear Rec. 709 colours of threads.
 
-WIF colour tables, palette images and `#rrggbb` are display codes; threads are linear. The two
-transfer functions here are all that importing needs, so that no colour library has to load.
+WIF colour tables, palette images and `#rrggbb` are display codes; threads are linear.
 """
 
 from __future__ import annotations
@@ -14,26 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.errors import FabricError
+from fabricusd.srgb import linear_from_srgb, srgb_from_linear
 
 RGB = tuple[float, float, float]
-
-
-def linear_from_srgb(display: ArrayLike) -> NDArray[np.float64]:
-    """(...) display values, 0 to 1 -> (...) float64 linear. [IEC61966] section 5.2."""
-    v = np.asarray(display, np.float64)
-    return np.where(v <= 0.04045, v / 12.92, ((np.maximum(v, 0.04045) + 0.055) / 1.055) ** 2.4)
-
-
-def srgb_from_linear(linear: ArrayLike) -> NDArray[np.float64]:
-    """(...) linear values, 0 to 1 -> (...) float64 display. [IEC61966] section 5.3.
-
-    `linear_from_srgb(srgb_from_linear(x)) == x` within 1e-7: the standard rounds the constants
-    of its two pieces, so the pieces do not quite meet.
-    """
-    v = np.asarray(linear, np.float64)
-    return np.where(
-        v <= 0.0031308, v * 12.92, 1.055 * np.maximum(v, 0.0031308) ** (1 / 2.4) - 0.055
-    )
 
 
 def palette_from_codes(codes: ArrayLike, low: float = 0, high: float = 255) -> tuple[RGB, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -49,7 +50,7 @@ def to_fabric(
         sequences.append(tuple(sequence))
     lines = [f"Draft: {draft.source or draft.title or draft.weave.name}."]
     lines += [f"Author: {draft.author}."] if draft.author else []
-    documentation = " ".join([*lines, *losses(draft), draft.notes]).strip()
+    documentation = " ".join([*lines, *losses(draft, density), draft.notes]).strip()
     return Fabric(
         name=name or "Fabric",
         threads=_threads(draft, base_thread, list(kinds)),
@@ -91,16 +92,27 @@ def from_fabric(fabric: Fabric) -> Draft:
     return Draft(
         weave=fabric.weave,
         palette=tuple(used),
-        title=fabric.name if fabric.name != "Fabric" else fabric.weave.name,
+        title=_title(fabric),
         notes=fabric.documentation,
         warnings=tuple(warnings),
         **fields,  # type: ignore[arg-type]
     )
 
 
-def losses(draft: Draft) -> tuple[str, ...]:
-    """One sentence for each thing in `draft` that a fabric cannot carry or has to assume."""
-    found = []
+def _title(fabric: Fabric) -> str:
+    """The weave's name where the fabric's is none of its own, or that one spelt as a prim's."""
+    spelt = re.sub(r"\W+", "_", fabric.weave.name).strip("_")
+    own = fabric.name != "Fabric" and fabric.name.strip("_") != spelt
+    return fabric.name if own else fabric.weave.name
+
+
+def losses(draft: Draft, density: float | None = None) -> tuple[str, ...]:
+    """One sentence for each thing in `draft` that a fabric cannot carry or has to assume.
+
+    `density` as in `to_fabric`.
+    """
+    found, assumed = [], []
+    per_cm = (ThreadSet().density if density is None else density) / 100
     for side in (draft.warp, draft.weft):
         hidden = side.spacings.count(0.0)
         if hidden:
@@ -112,7 +124,9 @@ def losses(draft: Draft) -> tuple[str, ...]:
                 f"{max(shown) * 1e3:.4g} mm; the fabric has its mean."
             )
         if side.spacing is None and not shown:
-            found.append(f"The draft has no {side.label} spacing; the density is assumed.")
+            assumed.append(f"{per_cm:g} {'ends' if side.label == 'warp' else 'picks'}/cm")
+    if assumed:
+        found.append(f"The draft has no density; {' and '.join(assumed)} are assumed.")
     return tuple(found)
 
 

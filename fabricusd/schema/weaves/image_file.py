@@ -1,15 +1,15 @@
-"""The pixels of an image file. The one file of the importers that knows OpenImageIO."""
+"""The pixels of an image file as display colours."""
 
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
-from fabricusd.schema.weaves.color import srgb_from_linear
-from fabricusd.schema.weaves.files import ordinary_file
+from fabricusd.srgb import srgb_from_linear
 
 
 def read_codes(path: str | os.PathLike[str], largest: int) -> NDArray[np.uint32]:
@@ -18,38 +18,21 @@ def read_codes(path: str | os.PathLike[str], largest: int) -> NDArray[np.uint32]
     Floating-point images are linear and are encoded for display; transparency shows white.
     Raises FabricError for what is not an image of 1 to `largest` pixels a side.
     """
-    import OpenImageIO as oiio
+    # Here, so that drafts of other kinds do not wait for OpenImageIO.
+    from fabricusd.images import read_flat
 
-    where = str(ordinary_file(path))
-    reader = oiio.ImageInput.open(where)
-    if reader is None:
-        reason = " ".join(oiio.geterror().split())[:200]
-        raise FabricError(where, f"is not an image ({reason}); it must be one")
-    spec = reader.spec()
-    if not (1 <= spec.width <= largest and 1 <= spec.height <= largest and spec.depth <= 1):
-        raise FabricError(
-            where,
-            f"is {spec.width} x {spec.height} x {spec.depth} pixels; it must be from 1 to "
-            f"{largest} a side, and flat",
-        )
-    if spec.deep or spec.nchannels < 1:
-        raise FabricError(where, "has no pixels of one colour each; it must be a flat image")
-    linear = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
-    used = min(spec.nchannels, 4)
-    pixels = reader.read_image(0, 0, 0, used, oiio.FLOAT if linear else oiio.UINT8)
-    reason = " ".join(reader.geterror().split())[:200]
-    reader.close()
-    if pixels is None or reason:
-        raise FabricError(
-            where, f"cannot be read to its end ({reason or 'no pixels'}); it must be a whole image"
-        )
-    pixels = np.asarray(pixels).reshape(spec.height, spec.width, used)
-    if linear:
-        pixels = _display(where, pixels)
-    alpha = spec.alpha_channel
-    if 0 <= alpha < used:
+    pixels, alpha = read_flat(path, largest)
+    shown: NDArray[np.uint8] = np.asarray(
+        _display(str(path), pixels) if pixels.dtype == np.float32 else pixels, np.uint8
+    )
+    if alpha >= 0:
         # Colours come multiplied by alpha, so adding what is left of 1 lays them on white.
-        pixels = _over_white(pixels, alpha)
+        shown = _over_white(shown, alpha)
+    return _packed(shown)
+
+
+def _packed(pixels: NDArray[np.uint8]) -> NDArray[np.uint32]:
+    """(h, w, c) uint8 -> (h, w) uint32 0xRRGGBB."""
     codes = pixels[..., 0].astype(np.uint32)
     if pixels.shape[2] < 3:
         codes *= np.uint32(0x010101)
@@ -60,7 +43,7 @@ def read_codes(path: str | os.PathLike[str], largest: int) -> NDArray[np.uint32]
     return codes
 
 
-def _display(where: str, pixels: NDArray[np.float32]) -> NDArray[np.uint8]:
+def _display(where: str, pixels: NDArray[Any]) -> NDArray[np.uint8]:
     """Linear to 8-bit display codes."""
     bad = ~np.isfinite(pixels).all(axis=2)
     if bad.any():

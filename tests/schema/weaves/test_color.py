@@ -8,11 +8,10 @@ import pytest
 from fabricusd.errors import FabricError
 from fabricusd.schema.weaves.color import (
     codes_from_palette,
-    linear_from_srgb,
     palette_from_codes,
     parse_color,
-    srgb_from_linear,
 )
+from fabricusd.srgb import linear_from_srgb, srgb_from_linear
 
 
 def test_transfer_functions_are_those_of_colour_science() -> None:

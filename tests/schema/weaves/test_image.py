@@ -246,7 +246,9 @@ def test_an_unknown_mode_is_refused() -> None:
 
 
 @pytest.mark.parametrize("kind", ["missing", "directory", "empty", "text", "truncated", "no name"])
-def test_a_file_that_is_no_image_is_refused_in_one_line(tmp_path: Path, kind: str) -> None:
+def test_a_file_that_is_no_image_is_refused_in_one_line(
+    tmp_path: Path, kind: str, capfd: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "image.png"
     if kind == "directory":
         path.mkdir()
@@ -264,3 +266,14 @@ def test_a_file_that_is_no_image_is_refused_in_one_line(tmp_path: Path, kind: st
         read_image(path)
     assert str(caught.value).isprintable()
     assert "image.png" in str(caught.value) or kind == "no name"
+    assert capfd.readouterr().err == ""  # libpng would say its own
+
+
+@pytest.mark.parametrize("byte", [0x07, 0xE9])
+def test_a_header_that_is_no_text_is_refused_in_one_line(tmp_path: Path, byte: int) -> None:
+    path = save(tmp_path / "image.exr", np.zeros((3, 4, 3), np.float32), "half")
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"chlist", bytes([byte]) + b"hlist"))
+    with pytest.raises(FabricError, match=r"image\.exr is not an image") as caught:
+        read_image(path)
+    assert str(caught.value).isprintable()

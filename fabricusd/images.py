@@ -4,15 +4,45 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, one_line
 from fabricusd.files import readable_file, whole_file
-from fabricusd.reference.view_transform import srgb_decode
+from fabricusd.srgb import linear_from_srgb
+
+OPENIMAGEIO: str = oiio.VERSION_STRING
+"""Which version of the library reads and writes."""
+
+
+def _reason(source: Any) -> str:
+    """What `source`, or OpenImageIO itself, has to complain of; it quotes damaged files."""
+    try:
+        return one_line(str(source.geterror()), 200)
+    except UnicodeDecodeError:
+        return "its header is no text"
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """libpng and its like write their own lines past Python, to file descriptor 2."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # closed
+        yield
+        return
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nothing)
 
 
 def write_exr(
@@ -59,11 +89,46 @@ def _write(path: str | os.PathLike[str], spec: Any, data: NDArray[Any]) -> None:
         if output is None:
             raise FabricError(str(path), "is no picture format; it must end in .exr or .png")
         good = output.open(str(temporary), spec) and output.write_image(data) and output.close()
-        reason = output.geterror()
+        reason = _reason(output)
         # The file is complete only once the writer is gone.
         del output
         if not good:
-            raise FabricError(str(path), f"cannot be written: {' '.join(str(reason).split())}")
+            raise FabricError(str(path), f"cannot be written: {reason}")
+
+
+def read_flat(
+    path: str | os.PathLike[str], largest: int
+) -> tuple[NDArray[np.uint8] | NDArray[np.float32], int]:
+    """((h, w, c) pixels as they are in the file, c up to 4; the channel of opacity, or -1).
+
+    uint8 display codes; float32, linear, from a file of floating-point numbers. Raises FabricError
+    for what is not a whole flat image of 1 to `largest` pixels a side.
+    """
+    where = str(readable_file(path))
+    with _silence():
+        reader: Any = oiio.ImageInput.open(where)
+        if reader is None:
+            raise FabricError(where, f"is not an image ({_reason(oiio)}); it must be one")
+        spec = reader.spec()
+        if not (1 <= spec.width <= largest and 1 <= spec.height <= largest and spec.depth <= 1):
+            raise FabricError(
+                where,
+                f"is {spec.width} x {spec.height} x {spec.depth} pixels; it must be from 1 to "
+                f"{largest} a side, and flat",
+            )
+        if spec.deep or spec.nchannels < 1:
+            raise FabricError(where, "has no pixels of one colour each; it must be a flat image")
+        linear = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
+        used = min(spec.nchannels, 4)
+        pixels = reader.read_image(0, 0, 0, used, oiio.FLOAT if linear else oiio.UINT8)
+        reason = _reason(reader)
+        reader.close()
+    if pixels is None or reason:
+        raise FabricError(
+            where, f"cannot be read to its end ({reason or 'no pixels'}); it must be a whole image"
+        )
+    alpha = spec.alpha_channel if 0 <= spec.alpha_channel < used else -1
+    return np.asarray(pixels).reshape(spec.height, spec.width, used), alpha
 
 
 def read_image(
@@ -76,10 +141,10 @@ def read_image(
     """
     source = readable_file(path)
     buffer = oiio.ImageBuf(str(source))
-    pixels = buffer.get_pixels(oiio.FLOAT) if buffer.read(0, 0, True, oiio.FLOAT) else None
+    with _silence():
+        pixels = buffer.get_pixels(oiio.FLOAT) if buffer.read(0, 0, True, oiio.FLOAT) else None
     if pixels is None or pixels.size == 0:
-        reason = " ".join(str(buffer.geterror()).split())
-        raise FabricError(str(path), f"cannot be read as a picture: {reason}")
+        raise FabricError(str(path), f"cannot be read as a picture: {_reason(buffer)}")
     spec = buffer.nativespec()
     eight_bit = spec.format.basetype == oiio.UINT8
     pixels = np.asarray(pixels, np.float32)
@@ -89,7 +154,7 @@ def read_image(
         h, w = pixels.shape[0] // step * step, pixels.shape[1] // step * step
         pixels = pixels[:h, :w].reshape(h // step, step, w // step, step, -1).mean(axis=(1, 3))
     if color_space == "sRGB" or (color_space == "auto" and eight_bit):
-        pixels = srgb_decode(pixels)
+        pixels = linear_from_srgb(pixels).astype(np.float32)
     return np.ascontiguousarray(pixels, np.float32)
 
 
@@ -147,11 +212,11 @@ def write_mip_exr(
                 good = good and output.write_tiles(0, side, row, end, 0, 1, band)
                 row = end
         good = good and output.close()
-        reason = output.geterror() if output is not None else "no EXR writer"
+        reason = _reason(output) if output is not None else "no EXR writer"
         # The file is complete only once the writer is gone.
         del output
         if not good:
-            raise FabricError(str(path), f"cannot be written: {' '.join(str(reason).split())}")
+            raise FabricError(str(path), f"cannot be written: {reason}")
 
 
 def write_16_bit(
@@ -187,10 +252,10 @@ def write_16_bit(
             good = good and output.write_scanlines(row, row + len(band), 0, pixels)
             row += len(band)
         good = good and output.close()
-        reason = output.geterror() if output is not None else "no writer"
+        reason = _reason(output) if output is not None else "no writer"
         del output
         if not good:
-            raise FabricError(str(path), f"cannot be written: {' '.join(str(reason).split())}")
+            raise FabricError(str(path), f"cannot be written: {reason}")
 
 
 def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.float32]:
@@ -200,7 +265,7 @@ def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.f
     plain.attribute("oiio:UnassociatedAlpha", 1)
     buffer = oiio.ImageBuf(str(readable_file(path)), 0, level, plain)
     if buffer.has_error or level >= max(buffer.nmiplevels, 1):
-        raise FabricError(str(path), f"has no level {level}: {buffer.geterror()}")
+        raise FabricError(str(path), f"has no level {level}: {_reason(buffer)}")
     return np.asarray(buffer.get_pixels(oiio.FLOAT), np.float32)
 
 
@@ -211,7 +276,7 @@ def read_middle(path: str | os.PathLike[str], most: int) -> NDArray[np.float32]:
     """
     source: Any = oiio.ImageInput.open(str(readable_file(path)))
     if source is None:
-        raise FabricError(str(path), f"cannot be read: {oiio.geterror()}")
+        raise FabricError(str(path), f"cannot be read: {_reason(oiio)}")
     side = source.spec().width
     size = min(side, most)
     begin = (side - size) // 2 // 64 * 64
@@ -223,5 +288,5 @@ def read_middle(path: str | os.PathLike[str], most: int) -> NDArray[np.float32]:
         pixels = source.read_scanlines(begin, end, 0, 0, channels, oiio.FLOAT)
         pixels = pixels if pixels is None else pixels[:, begin:end]
     if pixels is None:
-        raise FabricError(str(path), f"cannot be read: {source.geterror()}")
+        raise FabricError(str(path), f"cannot be read: {_reason(source)}")
     return np.asarray(pixels, np.float32).reshape(size, size, -1)

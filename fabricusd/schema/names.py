@@ -1,0 +1,26 @@
+"""Names of prims."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container
+
+from pxr import Sdf
+
+
+def prim_name(text: str) -> str:
+    """The nearest valid prim name: letters, digits and _ of any script, no digit first."""
+    name = re.sub(r"\W+", "_", text.strip()) or "Fabric"
+    # Not all that Python takes for a letter is one to USD.
+    ascii_name = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    spellings = (name, f"_{name}", ascii_name, f"_{ascii_name}")
+    return next(spelling for spelling in spellings if Sdf.Path.IsValidIdentifier(spelling))
+
+
+def free_name(name: str, taken: Container[str]) -> str:
+    """`name`, with a number after it where it is `taken`."""
+    candidate, count = name, 1
+    while candidate in taken:
+        count += 1
+        candidate = f"{name}_{count}"
+    return candidate
