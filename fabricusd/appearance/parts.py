@@ -24,7 +24,7 @@ from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import NativeLowering
 
 
-class _PartLibrary(JITCodeLibrary):
+class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Code that is only ever linked into that of callers, neither optimised nor generated."""
 
     def finalize(self) -> None:
@@ -36,7 +36,7 @@ class _PartLibrary(JITCodeLibrary):
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _PartLowering(NativeLowering):
+class _PartLowering(NativeLowering):  # type: ignore[misc]
     """numba's lowering, into a `_PartLibrary` where another function is waiting for this one."""
 
     _name = "part_lowering"
@@ -57,7 +57,7 @@ class _PartLowering(NativeLowering):
         return True
 
 
-class PartCompiler(Compiler):
+class PartCompiler(Compiler):  # type: ignore[misc]
     """numba's compiler, for a function that usually is part of a kernel."""
 
     def define_pipelines(self) -> list[PassManager]:

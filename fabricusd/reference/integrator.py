@@ -96,7 +96,7 @@ class Tracer:
         if max_bounces < 0:
             raise FabricError("max bounces", f"is {max_bounces}; it must be at least 0")
         fabrics = any(isinstance(surface, FabricSurface) for surface in scene.materials)
-        self._ahead = CompileAhead() if fabrics else None
+        ahead = CompileAhead() if fabrics else None
         self.tables = build_tables(scene)
         self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
         self.lights, self.dome = build_lights(scene.lights, self.tables.centre)
@@ -114,6 +114,8 @@ class Tracer:
         self.opacity = np.where(
             self.surfaces.table[:, OPACITY_MAP] >= 0, -1.0, self.surfaces.table[:, OPACITY]
         ).astype(np.float32)
+        if ahead is not None:
+            ahead.wait()
         for k, surface in enumerate(scene.materials):
             if isinstance(surface, FabricSurface):
                 fabric = surface.binding.fabric
@@ -188,8 +190,6 @@ class Tracer:
             )  # fmt: skip
             if self.shines:
                 add_emission(hits, self.surfaces, wave.hits, wave.tags, wave.film)
-            if step == 0 and self._ahead is not None:
-                self._ahead.wait()
             for queue in np.flatnonzero(counts):
                 start, end = int(ends[queue] - counts[queue]), int(ends[queue])
                 self._shade(wave, int(queue), start, end)
