@@ -62,6 +62,16 @@ def index(begin, k):
     return np.uintp(begin) + np.uintp(k)
 
 
+@njit(**INLINE)
+def whole(n):
+    """`n`, an index or a count below 2^32 that is not negative, so that LLVM knows it is not.
+
+    At the head of a kernel for what its loops run to, and for indices read from memory: what numba
+    asks of a signed index is then settled while compiling.
+    """
+    return np.int64(np.uint32(n))
+
+
 _LOG2_HIGH, _LOG2_LOW = 0.693359375, -2.12194440e-4
 _HALF_PI_HIGH, _HALF_PI_MIDDLE, _HALF_PI_LOW = 1.5703125, 4.83751297e-4, 7.54978942e-8
 

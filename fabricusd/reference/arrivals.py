@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.footprint import level_weights, pick_level
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, PART
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, PART, whole
 from fabricusd.reference.embree import (
     DX,
     GEOMETRY,
@@ -84,6 +84,7 @@ def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, do
     keyed by `(3 material + level) 2 + back`.
     """
     counts[:] = 0
+    count = whole(count)
     block = np.empty(_ROWS * BLOCK, np.float32)
     counters = np.empty(2 * BLOCK, np.uint32)
     for start in range(0, count, BLOCK):
@@ -103,9 +104,9 @@ def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, do
 
 @njit(**PART)
 def _load(start, size, rays, lanes, lane_tags, block):
-    whole = rays.view(np.uint32)
+    bits = rays.view(np.uint32)
     for x in range(0, size, LANES):
-        packet, bits = rays[(start + x) >> 4], whole[(start + x) >> 4]
+        packet, names = rays[(start + x) >> 4], bits[(start + x) >> 4]
         for row in range(3):
             for lane in range(LANES):
                 block[O_X + row * BLOCK + x + lane] = packet[OX + row, lane]
@@ -114,7 +115,7 @@ def _load(start, size, rays, lanes, lane_tags, block):
             for lane in range(LANES):
                 block[_NORMAL + row * BLOCK + x + lane] = packet[NGX + row, lane]
         for lane in range(LANES):
-            missed = bits[GEOMETRY, lane] == MISS
+            missed = names[GEOMETRY, lane] == MISS
             block[REACH + x + lane] = FAR if missed else packet[TFAR, lane]
     before, depth = lanes[LANE_PDF][start:], lane_tags[1][start:]
     for x in range(size):
@@ -132,7 +133,7 @@ def _add_seen(start, size, estimator, lane_tags, lanes, film, block):
         depth = lane_tags[1, k]
         if red + green + blue <= R(0) or (depth > 0 and estimator == LIGHT_ONLY):
             continue
-        path = lane_tags[0, k]
+        path = whole(lane_tags[0, k])
         row = DIRECT if depth <= 1 else INDIRECT
         film[row, path] += red * lanes[LANE_BETA, k]
         film[row + 1, path] += green * lanes[LANE_BETA + 1, k]
@@ -154,10 +155,10 @@ def _turn(size, block):
 def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
                  path_pixel, path_sample, counters, block):  # fmt: skip
     """What `auto` needs of each ray that met a fabric; zeros for the others."""
-    whole = rays.view(np.uint32)
+    bits = rays.view(np.uint32)
     for x in range(size):
         k = start + x
-        path = lane_tags[0, k]
+        path = whole(lane_tags[0, k])
         counters[x], counters[BLOCK + x] = path_pixel[path], path_sample[path]
         for row in range(4):
             block[_LIMITS + row * BLOCK + x] = R(0)
@@ -168,8 +169,8 @@ def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits,
         block[_WIDTH + x] = R(0)
         if block[REACH + x] >= ENDLESS:
             continue
-        triangle = whole[k >> 4, PRIMITIVE, k & 15]
-        record, material = records[triangle], triangle_material[triangle]
+        triangle = bits[k >> 4, PRIMITIVE, k & 15]
+        record, material = records[triangle], whole(triangle_material[triangle])
         for row in range(4):
             block[_LIMITS + row * BLOCK + x] = limits[material, row]
         for row in range(2):
@@ -211,14 +212,14 @@ def _choose_levels(numbers, place, size, counters, block):
 @njit(**PART)
 def _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, limits, keys,
                counts, block):  # fmt: skip
-    whole = rays.view(np.uint32)
+    bits = rays.view(np.uint32)
     for x in range(size):
         k = start + x
         # A path at its last depth still sees lights; emission of surfaces is left to `prepare`.
         if block[REACH + x] >= ENDLESS or lane_tags[1, k] > max_depth:
             keys[k] = -1
             continue
-        material = triangle_material[whole[k >> 4, PRIMITIVE, k & 15]]
+        material = whole(triangle_material[bits[k >> 4, PRIMITIVE, k & 15]])
         queue = FAR_LEVEL
         if limits[material, 0] > R(0):
             queue = int(block[_LEVEL + x]) if level == AUTO_LEVEL else level
@@ -229,7 +230,7 @@ def _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material
 
 @njit(**INLINE)
 def _advance(offsets, key):
-    place = offsets[key]
+    place = whole(offsets[key])
     offsets[key] = place + 1
     return place
 
@@ -241,6 +242,6 @@ def sort_lanes(count, keys, offsets, order):
     offsets : (queues,) int64 - where each queue starts; advanced to where it ends.
     order : (count,) int32
     """
-    for k in range(count):
+    for k in range(whole(count)):
         if keys[k] >= 0:
-            order[_advance(offsets, keys[k])] = k
+            order[_advance(offsets, whole(keys[k]))] = k

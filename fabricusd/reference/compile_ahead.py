@@ -129,8 +129,9 @@ def _cloth() -> tuple[Any, SurfaceTables]:
 def _prepare() -> None:
     _, wave, tables, lights, dome = _sample()
     prepare(
-        0, 0, 0, wave.rays, wave.lanes, wave.lane_tags, wave.keys, wave.order, tables.records,
-        lights, dome, R(0), wave.path_pixel, wave.path_sample, new_numbers(0), wave.hits, wave.tags,
+        0, 0, np.zeros(6, np.int64), wave.rays, wave.lanes, wave.lane_tags, wave.keys, wave.order,
+        tables.records, lights, dome, R(0), wave.path_pixel, wave.path_sample, new_numbers(0),
+        wave.hits, wave.tags,
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, PART
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, PART, whole
 from fabricusd.reference.arrivals import LIGHT_ONLY, MIS, UNIFORM
 from fabricusd.reference.embree import DX, GEOMETRY, MISS, OX, TFAR, TNEAR
 from fabricusd.reference.wave import (
@@ -89,6 +89,7 @@ def depart(step, estimator, count, max_depth, hits, tags, film, shadow_rays, sha
     """
     block = np.empty(_ROWS * BLOCK, np.float32)
     result[:] = 0
+    count = whole(count)
     for start in range(0, count, BLOCK):
         size = min(BLOCK, count - start)
         _load(start, size, hits, block)
@@ -231,10 +232,10 @@ def _write_ray(k, start, along, reach, rays, block):
 
 @njit(**PART)
 def _write_shadows(start, size, tags, film, rays, shadow, shadow_path, result, block):
-    k = result[0]
+    k = whole(result[0])
     for x in range(size):
         h = start + x
-        path, depth = tags[PATH, h], tags[DEPTH, h]
+        path, depth = whole(tags[PATH, h]), tags[DEPTH, h]
         if depth == 0 and block[GO_PDF * BLOCK + x] >= R(0):
             film[ALPHA, path] = R(1)
         total = block[_SUM * BLOCK + x]
@@ -255,7 +256,7 @@ def _write_shadows(start, size, tags, film, rays, shadow, shadow_path, result, b
 
 @njit(**PART)
 def _write_next(start, size, deepest, tags, rays, lanes, lane_tags, result, block):
-    k = result[1]
+    k = whole(result[1])
     for x in range(size):
         h = start + x
         alive, depth = block[_ALIVE * BLOCK + x], tags[DEPTH, h]
@@ -278,6 +279,7 @@ def _write_next(start, size, deepest, tags, rays, lanes, lane_tags, result, bloc
 @njit(**INLINE)
 def _fill_up(count, rays):
     """Lanes after the last ray of its packet are not traced."""
+    count = whole(count)
     for k in range(count, ((count + 15) >> 4) << 4):
         rays[k >> 4, TNEAR, k & 15] = R(0)
         rays[k >> 4, TFAR, k & 15] = R(-1)
@@ -289,7 +291,7 @@ def record_first(count, eye, view, hits, tags, uv, film):
     for h in range(count):
         if tags[DEPTH, h] != 0 or hits[GO_PDF, h] < R(0):
             continue
-        path = tags[PATH, h]
+        path = whole(tags[PATH, h])
         distance = R(0)
         for row in range(3):
             film[ALBEDO + row, path] = hits[WEIGHT + row, h] if hits[GO_PDF, h] > R(0) else R(0)

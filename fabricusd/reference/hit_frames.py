@@ -35,10 +35,7 @@ NUMBERS = MADE + (SIDE + 1) * BLOCK
 CHOSEN = NUMBERS + 8 * BLOCK
 """Where the light starts: the rows of `Wave.hits` from WI to LIGHT_PDF, in their order."""
 
-DRAWN = CHOSEN + 11 * BLOCK
-"""Where what `light_sampling` works with starts."""
-
-BLOCK_ROWS = RECORD + 5 + SIDE + 1 + 8 + 11 + 13
+BLOCK_ROWS = RECORD + 5 + SIDE + 1 + 8 + 11
 
 
 @njit(**PART)

@@ -170,7 +170,7 @@ class Tracer:
         counts = np.zeros(QUEUES * len(self.shaders), np.int64)
         result = np.zeros(3, np.int64)
         for step in range(self.max_bounces + 2 + MOST_LAYERS):
-            self.accelerator.intersect(wave.rays, (count + 15) // 16)
+            self.accelerator.intersect(wave.rays, (count + 15) // 16, coherent=step == 0)
             counters[0] += count
             arrive(
                 step, self.max_bounces, self.estimator, count, wave.rays, wave.lanes,
@@ -184,7 +184,7 @@ class Tracer:
                 break
             sort_lanes(count, wave.keys, ends - counts, wave.order)
             prepare(
-                step, self.estimator, hits, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
+                step, self.estimator, ends, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
                 wave.order, self.tables.records, self.lights, self.dome, self.epsilon,
                 wave.path_pixel, wave.path_sample, self.numbers, wave.hits, wave.tags,
             )  # fmt: skip

@@ -1,7 +1,7 @@
 """A light for each hit of a block, and a direction to it: by area, by solid angle, by brightness.
 
-Hits that chose the same light are brought together, so that its kind and numbers are constants of a
-loop that LLVM vectorises. Each `pdf` is per solid angle and holds the chance of choosing the light:
+Hits that chose the same light lie together, so that its kind and numbers are constants of a loop
+that LLVM vectorises. Each `pdf` is per solid angle and holds the chance of choosing the light:
 0 where the light does not shine on the hit, *minus* the chance for a light without extent, whose
 radiance is an irradiance and which no ray hits.
 """
@@ -13,9 +13,9 @@ import math
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, PART, cos, sin
+from fabricusd.appearance.real import INLINE, PART, cos, sin, whole
 from fabricusd.reference.dome import DENSITY, choose_cell, direction_in
-from fabricusd.reference.hit_frames import BLOCK, CHOSEN, DRAWN, MADE, NUMBERS
+from fabricusd.reference.hit_frames import BLOCK, CHOSEN, MADE, NUMBERS
 from fabricusd.reference.lights import AREA, CHANCE, KIND, RED, SIZE, P, X, Y, Z
 from fabricusd.reference.scene import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE
 from fabricusd.reference.wave import FRONT, N, U, V
@@ -27,53 +27,36 @@ FAR = R(1e30)
 # Rows of a block from CHOSEN on, in the order of `Wave.hits` from WI on.
 _WI, _TO, _DISTANCE, _LIGHT, _PDF = (CHOSEN + row * BLOCK for row in (0, 3, 6, 7, 10))
 
-# Rows from DRAWN on, side by side for the hits of one light: place, two numbers, then direction,
-# distance, pdf, and a dome's radiance.
-_PX, _PY, _PZ, _U0, _U1, _DX, _DY, _DZ, _REACH, _CHANCE, _RED, _GREEN, _BLUE = (
-    DRAWN + row * BLOCK for row in range(13)
-)
-
-
-@njit(**INLINE)
-def choose_light(table, u):
-    """Index of the light that a uniform number chooses."""
-    last = table.shape[0] - 1
-    for k in range(last):
-        u = u - table[k, CHANCE]
-        if u < R(0):
-            return k
-    return last
+_DX, _DY, _DZ = (_TO + row * BLOCK for row in range(3))
+_RED, _GREEN, _BLUE = (_LIGHT + row * BLOCK for row in range(3))
+_PX, _PY, _PZ = (MADE + (FRONT + row) * BLOCK for row in range(3))
+_U0, _U1 = NUMBERS + 5 * BLOCK, NUMBERS + 6 * BLOCK
 
 
 @njit(**PART)
-def sample_lights(lights, dome, count, choice, where, block):
-    """Rows WI to LIGHT_PDF of `count` hits, by three of their numbers.
-
-    choice, where : (BLOCK,) int32 - scratch
-    """
+def choose_lights(lights, count, left, choice):
+    """Index of the light that each of `count` uniform numbers `left` chooses, which it uses up."""
     for x in range(count):
-        choice[x] = choose_light(lights, block[NUMBERS + 4 * BLOCK + x])
-    for j in range(lights.shape[0]):
-        # Not the constant 0, for which numba would compile `_sample` once more.
-        found = np.int64(0)
+        choice[x] = 0
+    for j in range(lights.shape[0] - 1):
+        chance = lights[j, CHANCE]
         for x in range(count):
-            where[found] = x
-            found += 1 if choice[x] == j else 0
-        if found == 0:
-            continue
-        for y in range(found):
-            x = where[y]
-            for row in range(3):
-                block[_PX + row * BLOCK + y] = block[MADE + (FRONT + row) * BLOCK + x]
-            block[_U0 + y] = block[NUMBERS + 5 * BLOCK + x]
-            block[_U1 + y] = block[NUMBERS + 6 * BLOCK + x]
-        _sample(lights[j], dome, found, block)
-        for y in range(found):
-            x = where[y]
-            for row in range(3):
-                block[_TO + row * BLOCK + x] = block[_DX + row * BLOCK + y]
-                block[_LIGHT + row * BLOCK + x] = block[_RED + row * BLOCK + y]
-            block[_DISTANCE + x], block[_PDF + x] = block[_REACH + y], block[_CHANCE + y]
+            left[x] -= chance
+            choice[x] += 0 if left[x] < R(0) else 1
+
+
+@njit(**PART)
+def sample_lights(lights, dome, ends, count, block):
+    """Rows WI to LIGHT_PDF of `count` hits, by two of their numbers.
+
+    ends : (lights,) int32 - where the hits of each light end; they lie one light after the other
+    """
+    begin = np.int64(0)
+    for j in range(lights.shape[0]):
+        end = whole(ends[j])
+        if end > begin:
+            _sample(lights[j], dome, begin, end, block)
+        begin = end
     _turn(count, block)
 
 
@@ -122,43 +105,43 @@ def sample_evenly(count, block):
 
 
 @njit(**PART)
-def _sample(light, dome, count, block):
+def _sample(light, dome, begin, end, block):
     """Directions to one light."""
     kind = int(light[KIND])
     if kind == DOME:
-        _sample_dome(light, dome, count, block)
+        _sample_dome(light, dome, begin, end, block)
         return
-    for y in range(count):
+    for y in range(whole(begin), whole(end)):
         block[_RED + y], block[_GREEN + y] = light[RED], light[RED + 1]
         block[_BLUE + y] = light[RED + 2]
     if kind == DISTANT:
-        _sample_distant(light, count, block)
+        _sample_distant(light, begin, end, block)
     elif kind == SPHERE:
-        _sample_sphere(light, count, block)
+        _sample_sphere(light, begin, end, block)
     elif kind == CYLINDER:
-        _sample_cylinder(light, count, block)
+        _sample_cylinder(light, begin, end, block)
     elif kind == DISK:
-        _sample_disk(light, count, block)
+        _sample_disk(light, begin, end, block)
     elif kind == RECT:
-        _sample_rect(light, count, block)
+        _sample_rect(light, begin, end, block)
 
 
 @njit(**INLINE)
 def _keep(block, y, dx, dy, dz, distance, pdf):
     block[_DX + y], block[_DY + y], block[_DZ + y] = dx, dy, dz
-    block[_REACH + y], block[_CHANCE + y] = distance, pdf
+    block[_DISTANCE + y], block[_PDF + y] = distance, pdf
 
 
 @njit(**PART)
-def _sample_dome(light, dome, count, block):
+def _sample_dome(light, dome, begin, end, block):
     chance = light[CHANCE]
-    for y in range(count):
+    for y in range(whole(begin), whole(end)):
         j, down, i, along = choose_cell(dome, block[_U0 + y], block[_U1 + y])
         cell = dome.cells[j * dome.size[1] + i]
         block[_RED + y], block[_GREEN + y], block[_BLUE + y] = cell[0], cell[1], cell[2]
-        block[_REACH + y], block[_CHANCE + y] = FAR, cell[DENSITY] * chance
+        block[_DISTANCE + y], block[_PDF + y] = FAR, cell[DENSITY] * chance
         block[_DX + y], block[_DY + y], block[_DZ + y] = R(j), down, R(i) + along
-    for y in range(count):
+    for y in range(whole(begin), whole(end)):
         dx, dy, dz = direction_in(dome, block[_DX + y], block[_DY + y], block[_DZ + y])
         block[_DX + y], block[_DY + y], block[_DZ + y] = dx, dy, dz
 
@@ -179,24 +162,24 @@ def _cone(ax, ay, az, one_minus_cos, u0, u1):
 
 
 @njit(**PART)
-def _sample_distant(light, count, block):
+def _sample_distant(light, begin, end, block):
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
     chance, wide = light[CHANCE], light[AREA]
     if wide <= R(0):
-        for y in range(count):
+        for y in range(whole(begin), whole(end)):
             _keep(block, y, zx, zy, zz, FAR, -chance)
         return
     pdf = chance / (R(2) * _PI * wide)
-    for y in range(count):
+    for y in range(whole(begin), whole(end)):
         dx, dy, dz = _cone(zx, zy, zz, wide, block[_U0 + y], block[_U1 + y])
         _keep(block, y, dx, dy, dz, FAR, pdf)
 
 
 @njit(**PART)
-def _sample_sphere(light, count, block):
+def _sample_sphere(light, begin, end, block):
     cx, cy, cz = light[P], light[P + 1], light[P + 2]
     chance, radius2 = light[CHANCE], light[SIZE] * light[SIZE]
-    for y in range(count):
+    for y in range(whole(begin), whole(end)):
         ax, ay, az = cx - block[_PX + y], cy - block[_PY + y], cz - block[_PZ + y]
         square = ax * ax + ay * ay + az * az
         outside = square > radius2
@@ -239,23 +222,23 @@ def _keep_flat(light, block, y, a, b):
 
 
 @njit(**PART)
-def _sample_rect(light, count, block):
-    for y in range(count):
+def _sample_rect(light, begin, end, block):
+    for y in range(whole(begin), whole(end)):
         a, b = R(2) * block[_U0 + y] - R(1), R(2) * block[_U1 + y] - R(1)
         _keep_flat(light, block, y, a, b)
 
 
 @njit(**PART)
-def _sample_disk(light, count, block):
-    for y in range(count):
+def _sample_disk(light, begin, end, block):
+    for y in range(whole(begin), whole(end)):
         r, phi = math.sqrt(block[_U0 + y]), R(2) * _PI * block[_U1 + y]
         _keep_flat(light, block, y, r * cos(R, phi), r * sin(R, phi))
 
 
 @njit(**PART)
-def _sample_cylinder(light, count, block):
+def _sample_cylinder(light, begin, end, block):
     r = light[SIZE]
-    for y in range(count):
+    for y in range(whole(begin), whole(end)):
         a, phi = R(2) * block[_U0 + y] - R(1), R(2) * _PI * block[_U1 + y]
         c, s = cos(R, phi), sin(R, phi)
         nx = c * light[Y] + s * light[Z]

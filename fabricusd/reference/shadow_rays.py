@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import LEAN
+from fabricusd.appearance.real import LEAN, whole
 from fabricusd.reference.embree import (
     DX,
     DY,
@@ -32,11 +32,11 @@ FAR = R(1e30)
 @njit(**LEAN)
 def settle(count, shadow_rays, shadow, shadow_path, film, aovs):
     """Add what unblocked shadow rays bring."""
-    for k in range(count):
-        path = shadow_path[k]
-        row = DIRECT
-        if path < 0:
-            path, row = -path - 1, INDIRECT
+    for k in range(whole(count)):
+        signed = shadow_path[k]
+        path, row = whole(signed if signed >= 0 else -1 - signed), DIRECT
+        if signed < 0:
+            row = INDIRECT
         if shadow_rays[k >> 4, TFAR, k & 15] < R(0):
             continue
         if aovs and row == DIRECT:

@@ -12,7 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
+from numba.extending import intrinsic
 
 from fabricusd.appearance.real import INLINE
 from fabricusd.reference.counter import pcg4d, unit_float
@@ -61,14 +62,12 @@ _THIRD = directions(2, 1, (1, 3))
 _FOURTH = directions(3, 1, (1, 3, 1))
 
 
-@njit(**INLINE)
-def reverse_bits(x):
-    """The uint32 with its bits in the other order."""
-    x = _U((x >> _U(16)) | (x << _U(16)))
-    x = _U(((x & _U(0xFF00FF00)) >> _U(8)) | ((x & _U(0x00FF00FF)) << _U(8)))
-    x = _U(((x & _U(0xF0F0F0F0)) >> _U(4)) | ((x & _U(0x0F0F0F0F)) << _U(4)))
-    x = _U(((x & _U(0xCCCCCCCC)) >> _U(2)) | ((x & _U(0x33333333)) << _U(2)))
-    return _U(((x & _U(0xAAAAAAAA)) >> _U(1)) | ((x & _U(0x55555555)) << _U(1)))
+@intrinsic  # type: ignore[untyped-decorator]
+def reverse_bits(_, x):
+    """The uint32 with its bits in the other order, by the one instruction where there is one."""
+    return types.uint32(
+        types.uint32
+    ), lambda context, builder, signature, arguments: builder.bitreverse(arguments[0])
 
 
 @njit(**INLINE)
@@ -107,12 +106,27 @@ def sobol_reversed(index):
 
 
 @njit(**INLINE)
-def four_numbers(numbers, pixel, sample, place):
-    """Four float32 in [0, 1), even over the samples of a pixel at one `place` of its paths."""
+def _place_in_sequence(numbers, pixel, sample, place):
+    """Which point of the sequence, and the four coordinates' scramblings."""
     s0, s1, s2, s3 = pcg4d(pixel, place, numbers.seed, sample & numbers.independent)
     order = _U((s0 ^ (s2 >> _U(7))) * _U(0x9E3779B9) + s3)
     # What is above INDEX_BITS would be one constant more in the scrambling.
     index = reverse_bits(scrambled(reverse_bits(sample), order)) & _U((1 << INDEX_BITS) - 1)
+    return index, s0, s1, s2, s3
+
+
+@njit(**INLINE)
+def third_number(numbers, pixel, sample, place):
+    """The third of `four_numbers` alone."""
+    index, _, _, seed, _ = _place_in_sequence(numbers, pixel, sample, place)
+    _, _, c, _ = sobol_reversed(index)
+    return unit_float(reverse_bits(scrambled(c, seed)))
+
+
+@njit(**INLINE)
+def four_numbers(numbers, pixel, sample, place):
+    """Four float32 in [0, 1), even over the samples of a pixel at one `place` of its paths."""
+    index, s0, s1, s2, s3 = _place_in_sequence(numbers, pixel, sample, place)
     a, b, c, d = sobol_reversed(index)
     return (
         unit_float(reverse_bits(scrambled(a, s0))),

@@ -78,11 +78,12 @@ def nearest(points, tri, origin, direction, near):
     return found
 
 
+@pytest.mark.parametrize("coherent", [False, True])
 @pytest.mark.parametrize("near", [0.0, 0.7])
-def test_the_nearest_hit_is_that_of_the_formula(accelerate, near):
+def test_the_nearest_hit_is_that_of_the_formula(accelerate, near, coherent):
     points, tri = soup()
     packets, origin, direction = rays(333, near)
-    accelerate(points, tri).intersect(packets, len(packets))
+    accelerate(points, tri).intersect(packets, len(packets), coherent=coherent)
     whole = packets.view(np.uint32)
     hits = 0
     for k, (t, triangle, u, v) in enumerate(nearest(points, tri, origin, direction, near)):
