@@ -12,16 +12,14 @@ from __future__ import annotations
 import ctypes
 from typing import Any
 
-# Before the modules that overload indexing: numba asks in the order of import, and arrays, which
-# nearly every index here is of, would otherwise come after seven kinds of strings and lists. That
-# order is a fifth of all the time it takes to compile.
-import numba.core.typing.arraydecl  # noqa: F401
 from numba import _dynfunc, njit
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import NativeLowering
+
+import fabricusd.appearance.numba_start  # noqa: F401
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]

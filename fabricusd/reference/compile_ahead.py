@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fabricusd.appearance.numba_start import load_without_blas
 from fabricusd.appearance.surface_sampling import SamplingTables
 from fabricusd.appearance.surface_shares import sampling_tables
 from fabricusd.appearance.surface_tables import SurfaceTables, surface_tables
@@ -83,6 +84,13 @@ class CompileAhead:
         self.wait()
 
 
+@cache
+def compile_ahead() -> CompileAhead:
+    """Start the processes, once; for `wait` before the first kernel is called."""
+    load_without_blas()
+    return CompileAhead()
+
+
 def _compiled() -> bool:
     """Whether numba has the cloth's kernel on disk."""
     return any(Path(shade_far.stats.cache_path).glob("far_shading.shade_far*.nbi"))
@@ -90,7 +98,9 @@ def _compiled() -> bool:
 
 def compile_kernels(claims: str) -> None:
     """Compile every kernel that is not claimed yet by a file of its name in folder `claims`."""
+    # Most of what a compiler makes lives until the end.
     gc.disable()
+    load_without_blas()
     for task in TASKS:
         try:
             os.close(os.open(os.path.join(claims, task.__name__), os.O_CREAT | os.O_EXCL))

@@ -16,7 +16,7 @@ from fabricusd.errors import FabricError
 from fabricusd.reference import arrivals
 from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, arrive, sort_lanes
 from fabricusd.reference.camera import Lens, camera_rays
-from fabricusd.reference.compile_ahead import CompileAhead
+from fabricusd.reference.compile_ahead import compile_ahead
 from fabricusd.reference.departures import depart, record_first
 from fabricusd.reference.embree import (
     DX,
@@ -95,8 +95,7 @@ class Tracer:
             raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
         if max_bounces < 0:
             raise FabricError("max bounces", f"is {max_bounces}; it must be at least 0")
-        fabrics = any(isinstance(surface, FabricSurface) for surface in scene.materials)
-        ahead = CompileAhead() if fabrics else None
+        compile_ahead().wait()
         self.tables = build_tables(scene)
         self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
         self.lights, self.dome = build_lights(scene.lights, self.tables.centre)
@@ -114,8 +113,6 @@ class Tracer:
         self.opacity = np.where(
             self.surfaces.table[:, OPACITY_MAP] >= 0, -1.0, self.surfaces.table[:, OPACITY]
         ).astype(np.float32)
-        if ahead is not None:
-            ahead.wait()
         for k, surface in enumerate(scene.materials):
             if isinstance(surface, FabricSurface):
                 fabric = surface.binding.fabric
