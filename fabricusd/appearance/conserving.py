@@ -27,7 +27,7 @@ from fabricusd.appearance.coverage import WARP, WEFT, coverage
 from fabricusd.appearance.curve import is_pile
 from fabricusd.appearance.frame import to_thread
 from fabricusd.appearance.quadrature import POINTS, Rule, count_nodes, curve_nodes
-from fabricusd.appearance.real import INLINE, LEAN, cos, sin
+from fabricusd.appearance.real import INLINE, PART, cos, sin
 from fabricusd.appearance.thread_table import pack_threads
 from fabricusd.appearance.thread_terms import (
     ALBEDO_B,
@@ -144,7 +144,7 @@ def projected(R, tables, x, y, z):
     return total
 
 
-@njit(**LEAN)
+@njit(**PART)
 def visible(R, tables, x, y, z):
     """G1(w)/|N.w|: what of each facet that faces w is seen; 0 at the horizon or without facets."""
     up = abs(z)
@@ -154,7 +154,7 @@ def visible(R, tables, x, y, z):
     return R(1) / max(up, projected(R, tables, x, y, z) / tables.covered)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def facet_terms(R, tables, thread_set, thread, c, s, ix, iy, iz, ox, oy, oz):
     """`f_s mu(wi) mu(wo)` as (surface, volume without A), tangent angle by cosine and sine."""
     ta, tb, tn = to_thread(R, thread_set, c, s, ix, iy, iz)
@@ -166,7 +166,7 @@ def facet_terms(R, tables, thread_set, thread, c, s, ix, iy, iz, ox, oy, oz):
     return surface * seen, volume * seen
 
 
-@njit(**LEAN)
+@njit(**PART)
 def conserving_single(R, tables, ix, iy, iz, ox, oy, oz):
     """(r, g, b) of single scattering: radiance per unit `L_i dwi` from the whole repeat."""
     red, green, blue = R(0), R(0), R(0)
@@ -191,7 +191,7 @@ def conserving_single(R, tables, ix, iy, iz, ox, oy, oz):
     return red, green, blue
 
 
-@njit(**LEAN)
+@njit(**PART)
 def conserving_point_single(R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):
     """`conserving_single` of the bit of thread under a point; its mean over the repeat is that.
 

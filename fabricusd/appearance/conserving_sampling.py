@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.coverage import WARP
 from fabricusd.appearance.frame import from_thread, to_thread
-from fabricusd.appearance.real import INLINE, LEAN, atan2, cos, sin
+from fabricusd.appearance.real import INLINE, PART, atan2, cos, sin
 from fabricusd.appearance.sampling_lobes import (
     ISOTROPIC,
     STEEPEST,
@@ -102,7 +102,7 @@ def _mixed(densities, surface, volume, isotropic):  # type: ignore[no-untyped-de
     return surface * densities[0] + volume * densities[1] + isotropic * densities[2]
 
 
-@njit(**LEAN)
+@njit(**PART)
 def conserving_density(R, sampling, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """pdf(wi) [1/sr] of `conserving_direction`, over the whole sphere; 0 at the horizon."""
     if iz == R(0) or oz == R(0):
@@ -142,7 +142,7 @@ def _even_direction(R, opaque, u0, u1, u2):  # type: ignore[no-untyped-def]
     return x, y, z
 
 
-@njit(**LEAN)
+@njit(**PART)
 def conserving_direction(R, sampling, ox, oy, oz, u0, u1, u2):  # type: ignore[no-untyped-def]
     """wi (x, y, z) for any viewer and three numbers in [0, 1)."""
     flip = R(-1) if oz < R(0) else R(1)
@@ -195,7 +195,7 @@ def _lobe_direction(R, below, lobe, width, c, s, psi0, tangent, thread_set, ox, 
     return from_thread(R, thread_set, c, s, t, b, n)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def conserving_point_density(R, tables, sampling, thread_set, thread, psi0,
                              ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]  # fmt: skip
     """pdf(wi) [1/sr] of `conserving_point_direction`, over the whole sphere."""
@@ -227,7 +227,7 @@ def conserving_point_density(R, tables, sampling, thread_set, thread, psi0,
     )
 
 
-@njit(**LEAN)
+@njit(**PART)
 def conserving_point_direction(R, tables, sampling, thread_set, thread, psi0,
                                ox, oy, oz, u0, u1, u2):  # type: ignore[no-untyped-def]  # fmt: skip
     """wi (x, y, z) at levels `weave` and `thread`; a gap is sampled uniformly."""

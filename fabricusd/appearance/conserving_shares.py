@@ -19,7 +19,7 @@ from fabricusd.appearance.conserving_sampling import (
     stretch_densities,
 )
 from fabricusd.appearance.multiple import conserving_point_value, conserving_value
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN
+from fabricusd.appearance.real import INLINE, KERNEL, PART
 from fabricusd.appearance.share_fit import (
     AZIMUTHS,
     DRAWS,
@@ -116,7 +116,7 @@ def _draw_far(R, tables, stretches, possible, found):  # type: ignore[no-untyped
                     )
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _describe_far(R, tables, stretches, ix, iy, iz, ox, oy, oz, found):  # type: ignore[no-untyped-def]
     _note(R, tables.opaque, conserving_value(R, tables, ix, iy, iz, ox, oy, oz), found, ix, iy, iz)
     first = LOBES if iz > R(0) else LOBES + 3 * stretches.shape[0]
@@ -150,7 +150,7 @@ def _draw_points(R, tables, stretch, possible, found):  # type: ignore[no-untype
                     )  # fmt: skip
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _describe_point(R, tables, thread_set, thread, c, s, psi0, ix, iy, iz, ox, oy, oz, found):  # type: ignore[no-untyped-def]
     value = conserving_point_value(R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz)
     _note(R, tables.opaque, value, found, ix, iy, iz)

@@ -32,7 +32,7 @@ from fabricusd.appearance.blocks import (
     prepare,
 )
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, index
+from fabricusd.appearance.real import INLINE, KERNEL, PART, index
 from fabricusd.appearance.segment import along_set, cell_lobes, seen_along, segment
 from fabricusd.appearance.surface_tables import NODE_COS, NODE_HALF, NODE_SIN, NODE_WEIGHT
 from fabricusd.appearance.thread_terms import (
@@ -82,7 +82,7 @@ def node_terms(R, tables, k, a_i, b_i, iz, a_o, b_o, oz):
     return surface, volume
 
 
-@njit(**LEAN)
+@njit(**PART)
 def far_value(R, tables, ix, iy, iz, ox, oy, oz):
     """(r, g, b) of level `far` for one pair of directions, published models."""
     none = R(0)
@@ -140,7 +140,7 @@ def far_values(R, tables, wi, wo, out, begin, end):
         divide(R, out, start, size, block)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _add_node(R, tables, k, size, block):
     """Node k's share of `Q` and of the value, for a block, by the loop that its kind needs."""
     thread = tables.node_thread[k]

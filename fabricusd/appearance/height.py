@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.curve import peak
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.real import INLINE, LEAN
+from fabricusd.appearance.real import INLINE, PART
 from fabricusd.appearance.weave import crown_on, lookup, rise_on, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -41,7 +41,7 @@ def crown_of(R, cloth, rounded, which, thread, w):
     return cloth.half_thickness[which, thread]
 
 
-@njit(**LEAN)
+@njit(**PART)
 def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first):
     """Slope of the steepest line from a point at height `h` [m] to the height field, at least `k`.
 
@@ -186,7 +186,7 @@ def _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t):
     return (length * rise_on(np.float64, cloth, thread, p, at) + crown - h) / t
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _summit(cloth, thread, p, half, h, length, s, s_t, w, w_t, t0, t1, k):
     """Where a round thread stands highest above the line of slope `k`, by golden section.
 

@@ -20,7 +20,7 @@ from fabricusd.appearance.coverage import GAP
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.height import crown_of, steepest
 from fabricusd.appearance.horizon_lookup import horizon_at
-from fabricusd.appearance.real import KERNEL, LEAN
+from fabricusd.appearance.real import KERNEL, PART
 from fabricusd.appearance.weave import find, height_on
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -217,7 +217,7 @@ def _describe_texels(cloth, cells, shape, psi0, sets, area):
                     k += 1
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _texel_centre(cloth, i, j, slot, along, across):
     """Weave coordinates of a place on a slot's thread, and whether that thread is seen at all."""
     top = int(cloth.grid[i % cloth.grid.shape[0], j % cloth.grid.shape[1]])

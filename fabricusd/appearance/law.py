@@ -31,7 +31,7 @@ from fabricusd.appearance.multiple import (
     multiple_share,
 )
 from fabricusd.appearance.quadrature import Rule
-from fabricusd.appearance.real import LEAN, cos, sin
+from fabricusd.appearance.real import PART, cos, sin
 from fabricusd.appearance.share_fit import AZIMUTHS, ELEVATIONS
 from fabricusd.appearance.stretches import STRETCH_COLUMNS
 from fabricusd.appearance.surface_sampling import (
@@ -98,7 +98,7 @@ def surface_law(
     return SurfaceLaw(kind, published, lobes, conserving, both)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def law_value(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """(r, g, b) at a level.
 
@@ -126,7 +126,7 @@ def law_value(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz
     return red, green, blue
 
 
-@njit(**LEAN)
+@njit(**PART)
 def conserving_level_value(
     R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz
 ):  # type: ignore[no-untyped-def]
@@ -153,7 +153,7 @@ def conserving_level_value(
     )
 
 
-@njit(**LEAN)
+@njit(**PART)
 def law_density(R, law, level, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """pdf(wi) [1/sr] of `law_direction`; 0 where it never goes."""
     p, q = R(0), R(0)
@@ -178,7 +178,7 @@ def law_density(R, law, level, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz)
     return q if law.kind != PUBLISHED_ONLY else p
 
 
-@njit(**LEAN)
+@njit(**PART)
 def law_direction(R, law, level, thread_set, thread, psi0, ox, oy, oz, u0, u1, u2):  # type: ignore[no-untyped-def]
     """wi (x, y, z) for a viewer and three numbers in [0, 1); check `law_density` of it above 0."""
     published = law.kind == PUBLISHED_ONLY

@@ -34,7 +34,7 @@ from fabricusd.appearance.blocks import (
 )
 from fabricusd.appearance.far import normalization
 from fabricusd.appearance.frame import WARP, WEFT, cos_inclination, unit_azimuth
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, cos, index, sin
+from fabricusd.appearance.real import INLINE, KERNEL, PART, cos, index, sin
 from fabricusd.appearance.segment import across, along_set, seen_along, segment
 from fabricusd.appearance.thread_terms import (
     ALBEDO_B,
@@ -57,7 +57,7 @@ POINT_ROWS = 26 + _COLUMNS
 _NO_MODEL = -1.0
 
 
-@njit(**LEAN)
+@njit(**PART)
 def point_value(R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz):
     """(r, g, b) on `thread` of `thread_set` at tangent angle psi0 [rad], published models.
 
@@ -122,7 +122,7 @@ def point_values(R, tables, across_too, sets, threads, psi0, w, wi, wo, out, beg
         )  # fmt: skip
 
 
-@njit(**LEAN)
+@njit(**PART)
 def point_block(
     R, tables, across_too, sets, threads, psi0, w, first, wi, wo, out, start, size, block
 ):

@@ -41,7 +41,7 @@ from fabricusd.appearance.coverage import WARP, WEFT, coverage
 from fabricusd.appearance.curve import is_pile
 from fabricusd.appearance.frame import from_thread, to_thread
 from fabricusd.appearance.quadrature import Rule
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, acos, asin, atan2
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, PART, acos, asin, atan2
 from fabricusd.appearance.thread_sampling import density, sample_direction
 from fabricusd.appearance.thread_table import surface_albedo
 from fabricusd.appearance.thread_terms import (
@@ -167,7 +167,7 @@ def _measure(R, tables, draws, out):
         out[0, row, column], out[1, row, column] = reflected, transmitted
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _shares(R, tables, draws, x, y, z):
     """(rho_R, rho_T) from above, z > 0: facets drawn by what they see, then a thread's sampler."""
     reflected, transmitted = 0.0, 0.0
@@ -255,7 +255,7 @@ def _cubic(R, a, b, c, d, t):
     )
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _across_columns(R, lost, row, column, t):
     """The table along azimuth in a row that may lie beyond the pole or the horizon."""
     rows, columns = lost.shape
@@ -274,7 +274,7 @@ def _across_columns(R, lost, row, column, t):
     )
 
 
-@njit(**LEAN)
+@njit(**PART)
 def lost_share(R, lost, x, y, z):
     """m(w) >= 0, by cubic interpolation between rows and azimuths; m(-w) = m(w)."""
     if z < R(0):
@@ -300,7 +300,7 @@ def lost_share(R, lost, x, y, z):
     )
 
 
-@njit(**LEAN)
+@njit(**PART)
 def multiple_share(R, tables, ix, iy, iz, ox, oy, oz):
     """f_ms |N.wi| per unit `tables.strength`: what all channels share of the term."""
     if tables.lost.shape[0] == 0 or iz == R(0) or oz == R(0):
@@ -310,7 +310,7 @@ def multiple_share(R, tables, ix, iy, iz, ox, oy, oz):
     return m * abs(iz) * (R(1) - tables.forward if same else tables.forward)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def conserving_value(R, tables, ix, iy, iz, ox, oy, oz):
     """(r, g, b) of the whole repeat, radiance per unit `L_i dwi`, both sides of the cloth."""
     red, green, blue = conserving_single(R, tables, ix, iy, iz, ox, oy, oz)
@@ -322,7 +322,7 @@ def conserving_value(R, tables, ix, iy, iz, ox, oy, oz):
     )
 
 
-@njit(**LEAN)
+@njit(**PART)
 def conserving_point_value(R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):
     """(r, g, b) of the bit of thread under a point; its mean over the repeat is the above.
 

@@ -14,7 +14,7 @@ from fabricusd.appearance.blocks import BLOCK
 from fabricusd.appearance.coverage import GAP
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.horizon_lookup import split_table
-from fabricusd.appearance.real import INLINE, LEAN, index
+from fabricusd.appearance.real import INLINE, PART, index
 from fabricusd.appearance.weave import angle_on, cell_of, place_on, whole_threads, wrap
 
 CELL_I, CELL_J, END, PICK = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
@@ -37,7 +37,7 @@ _UPPER_PLACE, _UPPER_CELLS, _LOWER_PLACE, _LOWER_CELLS = (row * BLOCK for row in
 REAL_ROWS = 12
 
 
-@njit(**LEAN)
+@njit(**PART)
 def look_up_block(R, cloth, table, uv, begin, size, ints, reals):
     """`weave.find` of `size` places uv (n, 2) float64 from `begin` on, and their cells of `table`.
 

@@ -13,8 +13,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import jit, njit, types
 from numba.extending import overload, register_jitable
+
+from fabricusd.appearance.parts import PartCompiler
 
 # NaN and infinity must stay what they are, since callers count them; the rest may be reordered.
 # numpy's error model: a division by zero is an infinity, not an exception that stops vectorising.
@@ -28,9 +30,25 @@ KERNEL: dict[str, Any] = {
 # For kernels that allocate no array: numba then does not count references. In a function that hands
 # a compiled fabric on to another, counting its arrays cost five times the work itself.
 LEAN: dict[str, Any] = {**KERNEL, "_nrt": False}
-INLINE: dict[str, Any] = {**LEAN, "forceinline": True, "cache": False}
+# For functions that only kernels call, and for those of them that are to be compiled in place.
+PART: dict[str, Any] = {**LEAN, "cache": False, "pipeline_class": PartCompiler}
+INLINE: dict[str, Any] = {**PART, "forceinline": True}
+
+
+def as_part(kernel: Any) -> Any:
+    """`kernel` once more, for other kernels to call."""
+    return jit(**{**kernel.targetoptions, "cache": False, "pipeline_class": PartCompiler})(
+        kernel.py_func
+    )
+
+
 # Only fused multiply-add here: reordering would undo the two-part reductions below.
-_EXACT: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "forceinline": True}
+_EXACT: dict[str, Any] = {
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "forceinline": True,
+    "pipeline_class": PartCompiler,
+}
 _inner = register_jitable(**_EXACT)
 
 

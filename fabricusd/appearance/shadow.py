@@ -55,7 +55,7 @@ from fabricusd.appearance.place_blocks import (
     X,
     look_up_block,
 )
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, index
+from fabricusd.appearance.real import INLINE, KERNEL, PART, index
 from fabricusd.appearance.texel_blocks import choose_texels, mix_texels
 from fabricusd.appearance.weave import find, height_on, wrap
 from fabricusd.errors import FabricError
@@ -246,7 +246,7 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
     return R(0) if found > slope else R(1)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _to_crest(cloth, shadow, u, v, most):
     """Distance on the cloth [m] to the nearest of the highest points, at most `most`."""
     end, pick = np.floor(u), np.floor(v)
@@ -262,7 +262,7 @@ def _to_crest(cloth, shadow, u, v, most):
     return best
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
     """The smaller of `best` and the distance [m] to the highest points in one cell."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
@@ -306,7 +306,7 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
     return best
 
 
-@njit(**LEAN)
+@njit(**PART)
 def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
     """`lit` by the horizon table at a block of places that `look_up_block` has found, into LIT.
 
@@ -326,7 +326,7 @@ def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
         reals[LIT + k] = g if sound else R(np.nan)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def mean_block(R, shadow, wi, begin, size, ints, reals):
     """Divide the row LIT by the mean of `g`, in loops as those of `texel_blocks`."""
     for k in range(size):
@@ -345,7 +345,7 @@ def mean_block(R, shadow, wi, begin, size, ints, reals):
         )
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _one_by_one(R, cloth, shadow, shaded, uv, begin, wi, out):
     """`shade`, or else `lit`, at as many places from `begin` on as `out` holds."""
     for k in range(out.size):

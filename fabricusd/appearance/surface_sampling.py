@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.coverage import WARP
 from fabricusd.appearance.frame import from_thread, to_thread
-from fabricusd.appearance.real import INLINE, LEAN, atan2, cos, sin
+from fabricusd.appearance.real import INLINE, PART, atan2, cos, sin
 from fabricusd.appearance.sampling_lobes import (
     ISOTROPIC,
     STEEPEST,
@@ -114,7 +114,7 @@ def stretch_direction(R, lobe, c, s, psi0, tangent, surface_width, volume_width,
     return from_thread(R, thread_set, c, s, t, b, n)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def far_density(R, sampling, ix, iy, iz, ox, oy, oz):
     """pdf(wi) [1/sr] of `far_direction`; 0 at or below the cloth."""
     if iz <= R(0) or oz <= R(0):
@@ -143,7 +143,7 @@ def uniform_direction(R, u1, u2):
     return flat * cos(R, phi), flat * sin(R, phi), u1
 
 
-@njit(**LEAN)
+@njit(**PART)
 def far_direction(R, sampling, ox, oy, oz, u0, u1, u2):
     """wi (x, y, z) for a viewer above the cloth and three numbers in [0, 1)."""
     left = u0 - R(UNIFORM)
@@ -176,7 +176,7 @@ def _point_shares(R, sampling, thread_set, thread, psi0, ox, oy, oz):
     )
 
 
-@njit(**LEAN)
+@njit(**PART)
 def point_density(R, tables, sampling, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):
     """pdf(wi) [1/sr] of `point_direction`; 0 at or below the cloth."""
     if iz <= R(0) or oz <= R(0):
@@ -195,7 +195,7 @@ def point_density(R, tables, sampling, thread_set, thread, psi0, ix, iy, iz, ox,
     return p + surface * on_surface + volume * on_volume + isotropic * on_isotropic
 
 
-@njit(**LEAN)
+@njit(**PART)
 def point_direction(R, tables, sampling, thread_set, thread, psi0, ox, oy, oz, u0, u1, u2):
     """wi (x, y, z) at levels `weave` and `thread`, for a viewer above the cloth.
 

@@ -13,7 +13,7 @@ from numba import njit
 
 from fabricusd.appearance.far import far_value
 from fabricusd.appearance.levels import point_value
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN
+from fabricusd.appearance.real import INLINE, KERNEL, PART
 from fabricusd.appearance.share_fit import (
     AZIMUTHS,
     DRAWS,
@@ -108,7 +108,7 @@ def _draw_far(R, tables, stretches, found):
                 _describe_far(R, tables, stretches, ix, iy, iz, ox, oy, oz, found[view, k])
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _describe_far(R, tables, stretches, ix, iy, iz, ox, oy, oz, found):
     found[VALUE] = _grey(R, far_value(R, tables, ix, iy, iz, ox, oy, oz))
     found[EVEN] = even_density(R)

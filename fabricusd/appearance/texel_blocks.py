@@ -24,10 +24,10 @@ from fabricusd.appearance.place_blocks import (
     X,
     Y,
 )
-from fabricusd.appearance.real import LEAN, index
+from fabricusd.appearance.real import PART, index
 
 
-@njit(**LEAN)
+@njit(**PART)
 def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
     """Where in the flat table each of a block of places reads, and the three shares it mixes.
 
@@ -65,7 +65,7 @@ def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
         reals[SHARES + 2 * BLOCK + k] = turn - R(first)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def mix_texels(R, texels, columns, azimuths, size, ints, reals):
     """The horizon's sine at a block of places, from the flat table, into the row LIT."""
     step = np.uintp(columns * azimuths)

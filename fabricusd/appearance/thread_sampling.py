@@ -19,7 +19,7 @@ from numba import njit
 
 from fabricusd.appearance.frame import cos_inclination, unit_azimuth
 from fabricusd.appearance.lobes import fresnel
-from fabricusd.appearance.real import INLINE, LEAN, asin, atan2, cos, erf, erfinv, exp, sin
+from fabricusd.appearance.real import INLINE, PART, asin, atan2, cos, erf, erfinv, exp, sin
 from fabricusd.appearance.thread_terms import (
     BRIGHTNESS,
     CONSERVING,
@@ -109,7 +109,7 @@ def sample_cut_normal(R, mean, deviation, u):
     return min(max(theta, R(-_HALF_PI)), R(_HALF_PI))
 
 
-@njit(**LEAN)
+@njit(**PART)
 def density(R, row, ix, iy, iz, ox, oy, oz):
     """pdf(wi) [1/sr] of `sample_direction`, over the whole sphere."""
     cos_i, cos_o, cos_half = pair_angles(R, iy, iz, oy, oz)
@@ -124,7 +124,7 @@ def density(R, row, ix, iy, iz, ox, oy, oz):
     return p / max(cos_i, R(COS_MINIMUM)) + R(0.25 / math.pi) * isotropic
 
 
-@njit(**LEAN)
+@njit(**PART)
 def sample_direction(R, row, ox, oy, oz, u0, u1, u2):
     """wi in the thread frame for three numbers in [0, 1): lobe, inclination, azimuth."""
     cos_o = cos_inclination(R, oy, oz)

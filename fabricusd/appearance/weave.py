@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.coverage import GAP, coverage
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, index
+from fabricusd.appearance.real import INLINE, KERNEL, PART, index
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave
 
@@ -218,7 +218,7 @@ def find(R, cloth, u, v):
     return thread_at(R, cloth, i, j, end, pick, x, y)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def split_block(R, cloth, uv, begin, cells, x, y):
     """`split` of as many places from `begin` on as cells (4, b) int32, x and y (b,) hold.
 

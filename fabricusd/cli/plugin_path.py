@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 import fabricusd
 
-EPILOG = 'example:\n  PXR_PLUGINPATH_NAME="$(fabricusd plugin-path)" usdview garment.usda'
+EPILOG = """example:
+  PXR_PLUGINPATH_NAME="$(fabricusd plugin-path)" usdview garment.usda
+  PXR_PLUGINPATH_NAME="$(fabricusd plugin-path --validators)" python check_assets.py"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """No arguments of its own."""
+    """Whether the rules are wanted too."""
+    parser.add_argument(
+        "--validators",
+        action="store_true",
+        help="also the rules' folder, for programs whose Python has fabricusd",
+    )
 
 
-def run(_options: argparse.Namespace) -> int:
-    """Print the folder."""
+def run(options: argparse.Namespace) -> int:
+    """Print the folder, or both."""
     # Not by way of fabricusd.schema: that would load USD to print a path.
-    print(Path(fabricusd.__file__).resolve().parent / "schema" / "plugin")
+    folder = Path(fabricusd.__file__).resolve().parent / "schema" / "plugin"
+    folders = [folder, folder / "validators"] if options.validators else [folder]
+    print(os.pathsep.join(map(str, folders)))
     return 0

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.footprint import level_weights, pick_level
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, whole
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, PART, whole
 from fabricusd.reference.embree import (
     DX,
     GEOMETRY,
@@ -102,7 +102,7 @@ def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, do
                    keys, counts, block)  # fmt: skip
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _load(start, size, rays, lanes, lane_tags, block):
     bits = rays.view(np.uint32)
     for x in range(0, size, LANES):
@@ -124,7 +124,7 @@ def _load(start, size, rays, lanes, lane_tags, block):
         block[FIRST + x] = R(1) if depth[x] == 0 else R(0)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _add_seen(start, size, estimator, lane_tags, lanes, film, block):
     """Add what the rays saw of lights to their paths."""
     for x in range(size):
@@ -140,7 +140,7 @@ def _add_seen(start, size, estimator, lane_tags, lanes, film, block):
         film[row + 2, path] += blue * lanes[LANE_BETA + 2, k]
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _turn(size, block):
     """Cosine of each ray with the normal of what it met, which is not a unit vector."""
     for x in range(size):
@@ -151,7 +151,7 @@ def _turn(size, block):
         )
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
                  path_pixel, path_sample, counters, block):  # fmt: skip
     """What `auto` needs of each ray that met a fabric; zeros for the others."""
@@ -180,7 +180,7 @@ def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits,
         block[_WIDTH + x] = lanes[LANE_WIDTH, k] + block[REACH + x] * lanes[LANE_SPREAD, k]
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _choose_levels(numbers, place, size, counters, block):
     """A level for each ray's cone, by a uniform number."""
     for x in range(size):
@@ -209,7 +209,7 @@ def _choose_levels(numbers, place, size, counters, block):
         block[_LEVEL + x] = R(level)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, limits, keys,
                counts, block):  # fmt: skip
     bits = rays.view(np.uint32)

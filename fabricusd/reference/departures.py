@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, whole
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, PART, whole
 from fabricusd.reference.arrivals import LIGHT_ONLY, MIS, UNIFORM
 from fabricusd.reference.embree import DX, GEOMETRY, MISS, OX, TFAR, TNEAR
 from fabricusd.reference.wave import (
@@ -108,7 +108,7 @@ def depart(step, estimator, count, max_depth, hits, tags, film, shadow_rays, sha
     _fill_up(result[1], next_rays)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _load(start, size, hits, block):
     for row in range(CORNERS):
         source = hits[row][start:]
@@ -127,7 +127,7 @@ def _put(block, at, a, b, c):
     block[at], block[at + BLOCK], block[at + 2 * BLOCK] = a, b, c
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _towards_lights(mis, size, block):
     """Shadow rays, and what they bring where nothing is in their way."""
     for x in range(size):
@@ -158,7 +158,7 @@ def _towards_lights(mis, size, block):
         block[_REACH * BLOCK + x] = reach if reach >= FAR else reach * R(0.9999)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _go_uniformly(size, block):
     """The estimator that knows no sampler goes where its light was drawn, over the sphere."""
     for x in range(size):
@@ -173,7 +173,7 @@ def _go_uniformly(size, block):
         block[GO_PDF * BLOCK + x] = pdf
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _onwards(step, mis, size, block):
     """The paths' next rays: as the surface drew them, or straight on behind it."""
     # The first ray from a surface is half of its direct light: to end it costs more noise than it
@@ -233,7 +233,7 @@ def _write_ray(k, start, along, reach, rays, block):
     rays.view(np.uint32)[p, GEOMETRY, lane] = MISS
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _write_shadows(start, size, tags, film, rays, shadow, shadow_path, result, block):
     k = whole(result[0])
     for x in range(size):
@@ -257,7 +257,7 @@ def _write_shadows(start, size, tags, film, rays, shadow, shadow_path, result, b
     result[0] = k
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _write_next(start, size, deepest, tags, rays, lanes, lane_tags, result, block):
     k = whole(result[1])
     for x in range(size):

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.coverage import WARP
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, atan2, cos, sin
+from fabricusd.appearance.real import INLINE, KERNEL, PART, atan2, cos, sin
 from fabricusd.appearance.sampling_lobes import (
     ISOTROPIC,
     STEEPEST,
@@ -101,7 +101,7 @@ def _corner(block, x):
     return int(block[_ELEVATION + x]), column, following, block[_UP + x], block[_ROUND + x]
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _read_shares(R, shares, size, block, mixed):
     """The shares of all lobes, `share_at`: read lobe by lobe where they lie side by side, and then
     laid out hit by hit."""
@@ -135,7 +135,7 @@ def _choose(R, shares, count, u0, block, x):
     return k
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _draw(R, size, block):
     """Directions from the lobes chosen, in the surface frame."""
     for x in range(size):
@@ -213,7 +213,7 @@ def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first, n):
         _store(R, start, size, block, go, p_light, p_go, first)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _add_stretch(R, row, shares, size, block):
     """A stretch's part of both densities."""
     warp = R(1) if int(row[SET]) == WARP else R(0)
@@ -278,7 +278,7 @@ def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, 
         _store(R, start, size, block, go, p_light, p_go, first)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _turn(R, size, block):
     """Cosine, sine and tangent of each hit's tangent angle."""
     for x in range(size):
@@ -286,7 +286,7 @@ def _turn(R, size, block):
         block[_COS + x], block[_SIN + x], block[_TAN + x] = c, s, s / c
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _add_points(R, size, block):
     """Both densities at each hit's own stretch."""
     for x in range(size):

@@ -9,30 +9,12 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.far import far_values
-from fabricusd.appearance.real import KERNEL, LEAN
+from fabricusd.appearance.real import KERNEL, LEAN, as_part
 from fabricusd.reference.fabric_sampling import BLOCK, sample_far
 from fabricusd.reference.wave import CHANCE, F_PDF, GO, GO_PDF, KEEP, THREAD, WEIGHT, WI, WO, F
 
 STRAIGHT = np.float32(-1)
 """In GO_PDF: the path goes straight on."""
-
-
-@njit(**KERNEL)
-def shade_far(R, tables, sampling, gap, hits, first, last):
-    """Rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP and THREAD of hits `first` to before `last`."""
-    wo, wi = np.empty((3, BLOCK), np.float32), np.empty((3, BLOCK), np.float32)
-    go, towards = np.empty((3, BLOCK), np.float32), np.empty((3, BLOCK), np.float32)
-    onwards = np.empty((3, BLOCK), np.float32)
-    for start in range(first, last, BLOCK):
-        size = min(BLOCK, last - start)
-        gather(hits, start, size, wo, wi)
-        sample_far(
-            R, sampling, wo, wi, hits[CHANCE], hits[CHANCE + 1], hits[CHANCE + 2], go,
-            hits[F_PDF], hits[GO_PDF], start, size,
-        )  # fmt: skip
-        far_values(R, tables, wi, wo, towards, 0, size)
-        far_values(R, tables, go, wo, onwards, 0, size)
-        finish_far(R, hits, start, size, gap, go, towards, onwards)
 
 
 @njit(**LEAN)
@@ -72,3 +54,26 @@ def finish_far(R, hits, first, count, gap, go, towards, onwards):
         straight = chances[k] >= keep
         chances[k] = chances[k] if straight else chances[k] / keep
         go_pdf[k] = STRAIGHT if straight else go_pdf[k] * keep
+
+
+_gather, _sample_far, _far_values, _finish_far = (
+    as_part(kernel) for kernel in (gather, sample_far, far_values, finish_far)
+)
+
+
+@njit(**KERNEL)
+def shade_far(R, tables, sampling, gap, hits, first, last):
+    """Rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP and THREAD of hits `first` to before `last`."""
+    wo, wi = np.empty((3, BLOCK), np.float32), np.empty((3, BLOCK), np.float32)
+    go, towards = np.empty((3, BLOCK), np.float32), np.empty((3, BLOCK), np.float32)
+    onwards = np.empty((3, BLOCK), np.float32)
+    for start in range(first, last, BLOCK):
+        size = min(BLOCK, last - start)
+        _gather(hits, start, size, wo, wi)
+        _sample_far(
+            R, sampling, wo, wi, hits[CHANCE], hits[CHANCE + 1], hits[CHANCE + 2], go,
+            hits[F_PDF], hits[GO_PDF], start, size,
+        )  # fmt: skip
+        _far_values(R, tables, wi, wo, towards, 0, size)
+        _far_values(R, tables, go, wo, onwards, 0, size)
+        _finish_far(R, hits, start, size, gap, go, towards, onwards)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, LEAN
+from fabricusd.appearance.real import INLINE, PART
 from fabricusd.reference.sobol import four_numbers
 from fabricusd.reference.triangles import D1, D2, E1, E2, HAND, P0, RATE, RECORD, ST
 from fabricusd.reference.triangles import N as NORMALS
@@ -38,7 +38,7 @@ CHOSEN = NUMBERS + 8 * BLOCK
 BLOCK_ROWS = RECORD + 5 + SIDE + 1 + 8 + 11
 
 
-@njit(**LEAN)
+@njit(**PART)
 def make_numbers(numbers, count, place, counters, block):
     """Eight uniform numbers a hit, by its path's pixel and sample.
 
@@ -68,7 +68,7 @@ def _make(block, at, a, b, c):
     block[at], block[at + BLOCK], block[at + 2 * BLOCK] = a, b, c
 
 
-@njit(**LEAN)
+@njit(**PART)
 def make_frames(count, epsilon, block):
     """Rows FRONT to SIDE of `count` hits; FOOTPRINT comes in as the cone's width [m]."""
     for x in range(count):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, whole
+from fabricusd.appearance.real import INLINE, KERNEL, LEAN, PART, whole
 from fabricusd.reference.arrivals import NUMBERS_PER_STEP, SURFACE_ONLY, UNIFORM
 from fabricusd.reference.embree import DX, HIT_U, HIT_V, PRIMITIVE, TFAR
 from fabricusd.reference.hit_frames import (
@@ -92,7 +92,7 @@ def prepare(step, estimator, queue_ends, rays, lanes, lane_tags, keys, order, re
             start += size
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _begin(start, size, order, lane_tags, path_pixel, path_sample, lane_of, counters):
     """A block's lanes and their paths' counters, in the upper halves of both."""
     for x in range(size):
@@ -102,7 +102,7 @@ def _begin(start, size, order, lane_tags, path_pixel, path_sample, lane_of, coun
         counters[2 * BLOCK + x], counters[3 * BLOCK + x] = path_pixel[path], path_sample[path]
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _choose(lights, numbers, place, size, counters, uniform, choice):
     """A light for each lane, by the number that `make_numbers` makes once more for the hit."""
     if lights.shape[0] > 1:
@@ -114,7 +114,7 @@ def _choose(lights, numbers, place, size, counters, uniform, choice):
     choose_lights(lights, size, uniform, choice)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _group(size, choice, ends, lane_of, counters):
     """Bring the lanes of each light together, in the lower halves; `ends` is where they end."""
     for j in range(ends.shape[0]):
@@ -157,7 +157,7 @@ def _take(k, h, x, rays, lanes, lane_tags, keys, records, block, hits, tags):
     block[MADE + FOOTPRINT * BLOCK + x] = width
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _bring(start, size, block, hits):
     """Bring the block's frames, numbers and lights to the hits."""
     _bring_rows(MADE, 0, SIDE + 1, start, size, block, hits)

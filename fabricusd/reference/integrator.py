@@ -16,7 +16,7 @@ from fabricusd.errors import FabricError
 from fabricusd.reference import arrivals
 from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, arrive, sort_lanes
 from fabricusd.reference.camera import Lens, camera_rays
-from fabricusd.reference.compile_ahead import CompileAhead
+from fabricusd.reference.compile_ahead import compile_ahead
 from fabricusd.reference.departures import depart, record_first
 from fabricusd.reference.embree import (
     DX,
@@ -95,8 +95,7 @@ class Tracer:
             raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
         if max_bounces < 0:
             raise FabricError("max bounces", f"is {max_bounces}; it must be at least 0")
-        fabrics = any(isinstance(surface, FabricSurface) for surface in scene.materials)
-        self._ahead = CompileAhead() if fabrics else None
+        compile_ahead().wait()
         self.tables = build_tables(scene)
         self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
         self.lights, self.dome = build_lights(scene.lights, self.tables.centre)
@@ -188,8 +187,6 @@ class Tracer:
             )  # fmt: skip
             if self.shines:
                 add_emission(hits, self.surfaces, wave.hits, wave.tags, wave.film)
-            if step == 0 and self._ahead is not None:
-                self._ahead.wait()
             for queue in np.flatnonzero(counts):
                 start, end = int(ends[queue] - counts[queue]), int(ends[queue])
                 self._shade(wave, int(queue), start, end)

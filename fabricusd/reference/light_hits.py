@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, LEAN
+from fabricusd.appearance.real import INLINE, PART
 from fabricusd.reference.dome import DENSITY, cell_at, place_of, smooth_radiance
 from fabricusd.reference.lights import AREA, CHANCE, KIND, RED, SIZE, VISIBLE, P, X, Y, Z
 from fabricusd.reference.scene import CYLINDER, DISK, DISTANT, DOME, SPHERE
@@ -31,7 +31,7 @@ ENDLESS = R(1e29)
 """Length from which on a ray has met nothing."""
 
 
-@njit(**LEAN)
+@njit(**PART)
 def meet_lights(lights, dome, all_first, size, block):
     """Rows SEEN_R to SEEN_B of `size` rays: radiance of all lights that they pass, each weighted
     by the power heuristic against light sampling.
@@ -82,7 +82,7 @@ def _towards(light, block, x):
     return light[P] - block[O_X + x], light[P + 1] - block[O_Y + x], light[P + 2] - block[O_Z + x]
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _meet_dome(light, dome, size, block):
     if dome.cells.shape[0] == 1:
         pdf = dome.cells[0, DENSITY] * light[CHANCE]
@@ -113,7 +113,7 @@ def _meet_dome(light, dome, size, block):
         block[SEEN_B + x] += weight * blue
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _meet_distant(light, size, block):
     if light[AREA] <= R(0):
         return
@@ -126,7 +126,7 @@ def _meet_distant(light, size, block):
         _add(light, block, x, pdf if inside and block[REACH + x] >= ENDLESS else R(0))
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _meet_sphere(light, size, block):
     radius2 = light[SIZE] * light[SIZE]
     for x in range(size):
@@ -151,7 +151,7 @@ def _add_area(light, block, x, met, t, cosine):
     _add(light, block, x, pdf if seen else R(0))
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _meet_flat(light, disk, size, block):
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
     xx, xy, xz = light[X], light[X + 1], light[X + 2]
@@ -170,7 +170,7 @@ def _meet_flat(light, disk, size, block):
         _add_area(light, block, x, met, t, cosine)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _meet_cylinder(light, size, block):
     """The outside of a cylinder; its ends are open."""
     xx, xy, xz = light[X], light[X + 1], light[X + 2]

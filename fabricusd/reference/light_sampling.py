@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, LEAN, cos, sin, whole
+from fabricusd.appearance.real import INLINE, PART, cos, sin, whole
 from fabricusd.reference.dome import DENSITY, choose_cell, direction_in
 from fabricusd.reference.hit_frames import BLOCK, CHOSEN, MADE, NUMBERS
 from fabricusd.reference.lights import AREA, CHANCE, KIND, RED, SIZE, P, X, Y, Z
@@ -33,7 +33,7 @@ _PX, _PY, _PZ = (MADE + (FRONT + row) * BLOCK for row in range(3))
 _U0, _U1 = NUMBERS + 5 * BLOCK, NUMBERS + 6 * BLOCK
 
 
-@njit(**LEAN)
+@njit(**PART)
 def choose_lights(lights, count, left, choice):
     """Index of the light that each of `count` uniform numbers `left` chooses, which it uses up."""
     for x in range(count):
@@ -45,7 +45,7 @@ def choose_lights(lights, count, left, choice):
             choice[x] += 0 if left[x] < R(0) else 1
 
 
-@njit(**LEAN)
+@njit(**PART)
 def sample_lights(lights, dome, ends, count, block):
     """Rows WI to LIGHT_PDF of `count` hits, by two of their numbers.
 
@@ -82,7 +82,7 @@ def _turn(count, block):
         block[_LIGHT + 2 * BLOCK + x] *= inverse
 
 
-@njit(**LEAN)
+@njit(**PART)
 def no_lights(count, block):
     """The same rows where no light is sampled."""
     for row in range(11):
@@ -92,7 +92,7 @@ def no_lights(count, block):
         block[_WI + 2 * BLOCK + x], block[_DISTANCE + x] = R(1), FAR
 
 
-@njit(**LEAN)
+@njit(**PART)
 def sample_evenly(count, block):
     """Directions uniform over the sphere instead, for the estimator that knows no lights."""
     no_lights(count, block)
@@ -104,7 +104,7 @@ def sample_evenly(count, block):
         block[_WI + 2 * BLOCK + x] = z
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample(light, dome, begin, end, block):
     """Directions to one light."""
     kind = int(light[KIND])
@@ -132,7 +132,7 @@ def _keep(block, y, dx, dy, dz, distance, pdf):
     block[_DISTANCE + y], block[_PDF + y] = distance, pdf
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample_dome(light, dome, begin, end, block):
     chance = light[CHANCE]
     for y in range(whole(begin), whole(end)):
@@ -161,7 +161,7 @@ def _cone(ax, ay, az, one_minus_cos, u0, u1):
     return x, y, -a * sign * ax - b * ay + c * az
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample_distant(light, begin, end, block):
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
     chance, wide = light[CHANCE], light[AREA]
@@ -175,7 +175,7 @@ def _sample_distant(light, begin, end, block):
         _keep(block, y, dx, dy, dz, FAR, pdf)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample_sphere(light, begin, end, block):
     cx, cy, cz = light[P], light[P + 1], light[P + 2]
     chance, radius2 = light[CHANCE], light[SIZE] * light[SIZE]
@@ -221,21 +221,21 @@ def _keep_flat(light, block, y, a, b):
     )  # fmt: skip
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample_rect(light, begin, end, block):
     for y in range(whole(begin), whole(end)):
         a, b = R(2) * block[_U0 + y] - R(1), R(2) * block[_U1 + y] - R(1)
         _keep_flat(light, block, y, a, b)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample_disk(light, begin, end, block):
     for y in range(whole(begin), whole(end)):
         r, phi = math.sqrt(block[_U0 + y]), R(2) * _PI * block[_U1 + y]
         _keep_flat(light, block, y, r * cos(R, phi), r * sin(R, phi))
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _sample_cylinder(light, begin, end, block):
     r = light[SIZE]
     for y in range(whole(begin), whole(end)):

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.real import INLINE, KERNEL, LEAN, cos, sin
+from fabricusd.appearance.real import INLINE, KERNEL, PART, cos, sin
 from fabricusd.reference.scene import PreviewSurface, Scene, Texture
 from fabricusd.reference.wave import (
     CHANCE,
@@ -101,7 +101,7 @@ def _wrapped(i, n, mode):
     return i if 0 <= i < n else -1
 
 
-@njit(**LEAN)
+@njit(**PART)
 def texture_at(surfaces, index, u, v):
     """Bilinear lookup: (r, g, b); v grows upwards from the bottom row."""
     m = surfaces.maps[index]
@@ -249,7 +249,7 @@ def shade_preview(surfaces, hits, tags, first, last):
             thread[x] = R(-1)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _look_up(surfaces, material, hits, start, size, block):
     """The surface's properties at each hit of a block."""
     row = surfaces.table[material]
@@ -275,7 +275,7 @@ def _look_up(surfaces, material, hits, start, size, block):
         block[_OPACITY + x] = opacity_at(surfaces, material, u, v)
 
 
-@njit(**LEAN)
+@njit(**PART)
 def _shade(f0, size, block):
     """The values of a block: one loop without branches, which LLVM vectorises."""
     for x in range(size):

@@ -76,9 +76,10 @@ def generate() -> dict[str, str]:
         "Root": ".",
         "Type": "python",
     }
-    # USD tells plugins apart by their folder, so the two cannot share one.
+    # USD tells plugins apart by their folder, so the two cannot share one; see `plugin.VALIDATORS`
+    # for why only one is included.
     return {
-        "plugInfo.json": _json({"Includes": ["*/"]}),
+        "plugInfo.json": _json({"Includes": ["fabricusd/"]}),
         "fabricusd/generatedSchema.usda": schema,
         "fabricusd/plugInfo.json": _json({"Plugins": [plugin]}),
         "validators/plugInfo.json": _json({"Plugins": [python_plugin]}),

@@ -16,10 +16,14 @@ from fabricusd.errors import FabricError
 FOLDER = Path(__file__).resolve().parent / "plugin"
 """What PXR_PLUGINPATH_NAME must contain for other tools to find the schema."""
 
+VALIDATORS = FOLDER / "validators"
+"""The plugin of the rules. Not part of `FOLDER`: in a program whose Python has no fabricusd, USD
+would fail to import it, and with it every validation there."""
+
 
 def register() -> None:
     """Make the schema and the validators known to this process; again does nothing."""
-    Plug.Registry().RegisterPlugins(str(FOLDER))
+    Plug.Registry().RegisterPlugins([str(FOLDER), str(VALIDATORS)])
 
 
 def require_schema() -> None:

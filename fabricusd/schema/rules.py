@@ -9,58 +9,28 @@ framework (`fabricusd.schema.validators`) run the same table. A rule sees one pr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
-from fabricusd.errors import FabricError, one_line
+from fabricusd.errors import FabricError
 from fabricusd.fabric import describe_limits, within_limits
 from fabricusd.schema import attributes, weave_rows
 from fabricusd.schema.attributes import Attribute
+from fabricusd.schema.rule_table import (
+    BINDING,
+    FABRIC,
+    RULES,
+    THREAD,
+    Fault,
+    Rule,
+    applies,
+    rule,
+    run,
+)
 
-Fault = tuple[str, str]
-RuleFunction = Callable[[Usd.Prim], Iterable[Fault]]
-
-FABRIC, THREAD, BINDING = "FabricusdFabric", "FabricusdFabricThread", "FabricusdBindingAPI"
-
-
-@dataclass(frozen=True)
-class Rule:
-    """One rule: its name, its severity, the schema types of the prims it looks at; () for all."""
-
-    name: str
-    severity: str
-    schema_types: tuple[str, ...]
-    doc: str
-    function: RuleFunction
-
-
-RULES: list[Rule] = []
-
-
-def rule(*schema_types: str, severity: str = "error") -> Callable[[RuleFunction], RuleFunction]:
-    """Register a function as the rule whose name is the function's in CamelCase."""
-
-    def register(function: RuleFunction) -> RuleFunction:
-        name = "".join(word.capitalize() for word in function.__name__.split("_"))
-        doc = " ".join((function.__doc__ or "").split())
-        RULES.append(Rule(name, severity, schema_types, doc, function))
-        return function
-
-    return register
-
-
-def applies(checked: Rule, prim: Usd.Prim) -> bool:
-    """Whether `prim` is of a type that the rule looks at."""
-    type_name = f"Fabricusd{prim.GetTypeName()}"
-    if not checked.schema_types or type_name in checked.schema_types:
-        return True
-    return BINDING in checked.schema_types and (
-        prim.HasAPI("FabricBindingAPI") or prim.HasRelationship("fabric:binding")
-    )
-
+__all__ = ["RULES", "Rule", "applies", "run", "thread_prims"]
 
 # ---- any of the three ---------------------------------------------------------------------------
 
@@ -410,14 +380,3 @@ def binding_api_applied(prim: Usd.Prim) -> Iterator[Fault]:
     bound = relationship and (relationship.GetTargets() or not relationship.HasAuthoredTargets())
     if bound and not prim.HasAPI("FabricBindingAPI"):
         yield "fabric:binding", "is authored, but FabricBindingAPI is not in the prim's apiSchemas"
-
-
-def run(checked: Rule, prim: Usd.Prim) -> list[Fault]:
-    """The faults that one rule finds on one prim, with values that cannot be read as faults."""
-    try:
-        return list(checked.function(prim))
-    except Tf.ErrorException as error:
-        return [("", f"cannot be read: {one_line(str(error), 300)}; it must be whole")]
-    except TypeError:
-        # Of a wrong type in a layer, or of a damaged .usdc in which type and value disagree.
-        return [("", "holds a value of a wrong type; each must be of the schema's type")]

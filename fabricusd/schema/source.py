@@ -16,6 +16,12 @@ from fabricusd.schema.plugin import require_schema
 
 PRESETS = Path(__file__).resolve().parent / "presets"
 
+PARSER_WORDS = {
+    r"parse error matching \S.*? at '": "does not parse at '",
+    r"Error parsing \w+ value: Failed .*?\(at sub-part .*?\) at ": "no value of its type: ",
+}
+"""What USD's text parser says in its own terms, as patterns, and in plain ones."""
+
 
 def preset_names() -> list[str]:
     """Names of the fabrics that come with the package."""
@@ -99,8 +105,12 @@ def usd_errors(where: str, doing: str = "parsed as USD") -> Iterator[None]:
 
 def _usd_words(error: Tf.ErrorException) -> str:
     """What is wrong, without names of USD's source code; UnicodeDecodeError where it is no text."""
-    words = error.args[0].commentary if error.args else str(error)
-    return one_line(re.sub(r"parse error matching \S.*? at '", "does not parse at '", words), 300)
+    told = [one.commentary for one in error.args] or [str(error)]
+    # Of a value that does not parse USD says twice, and the second time where.
+    words = next((each for each in told if re.search(r":[0-9]+:[0-9]+: ", each)), told[0])
+    for riddle, plain in PARSER_WORDS.items():
+        words = re.sub(riddle, plain, words)
+    return one_line(words, 300)
 
 
 def _line_of_byte(file: str) -> str:

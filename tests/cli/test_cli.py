@@ -242,6 +242,9 @@ def test_list_rules_prints_each_with_its_meaning(capsys):
 def test_plugin_path_is_a_folder_with_a_plug_info(capsys):
     _, out, _ = run(capsys, "plugin-path")
     assert (Path(out.strip()) / "plugInfo.json").is_file()
+    _, both, _ = run(capsys, "plugin-path", "--validators")
+    assert both.startswith(out.strip() + os.pathsep)
+    assert all((Path(p) / "plugInfo.json").is_file() for p in both.strip().split(os.pathsep))
 
 
 def test_demo_authors_checks_and_prints_every_preset(capsys, tmp_path):

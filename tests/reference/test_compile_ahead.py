@@ -1,29 +1,56 @@
-"""What the second process compiles on a machine's first picture is what the picture needs."""
+"""What is compiled ahead of a machine's first picture is what the picture needs."""
 
 from __future__ import annotations
 
+import sys
+
+from numba.core.dispatcher import Dispatcher
+
 from fabricusd.fabric import Binding
-from fabricusd.reference.compile_ahead import compile_shading
-from fabricusd.reference.departures import depart
-from fabricusd.reference.far_shading import shade_far
-from fabricusd.reference.preview_surface import shade_preview
-from fabricusd.reference.scene import DISTANT, FabricSurface, Light, PreviewSurface, Scene
+from fabricusd.reference.compile_ahead import TASKS, compile_kernels
+from fabricusd.reference.scene import FabricSurface, PreviewSurface, Scene
 from fabricusd.schema import load
 from tests.reference.scenes import above, grid, render_scene
 
 
-def test_the_kernels_compiled_ahead_are_those_that_a_picture_calls():
-    compile_shading()
-    kernels = (shade_far, shade_preview, depart)
-    before = [kernel.signatures for kernel in kernels]
+def signatures():
+    """Of every compiled function: for which arguments it has been compiled, or read from disk."""
+    return {
+        f"{name}.{key}": list(value.signatures)
+        for name, module in list(sys.modules.items())
+        for key, value in vars(module).items()
+        if name.startswith("fabricusd.") and isinstance(value, Dispatcher)
+    }
+
+
+def test_a_picture_compiles_nothing_that_was_not_compiled_ahead():
+    for task in TASKS:
+        task()
     scene = Scene(
         meshes=[grid(), grid(material=1, size=2.0)],
         materials=[
             FabricSurface(binding=Binding(fabric=load("linen_plain"), metres_per_uv=1.0)),
             PreviewSurface(),
         ],
-        lights=[Light(path="sun", kind=DISTANT, radiance=(1.0, 1.0, 1.0))],
         camera=above(width=4.0),
     )
+    before = signatures()
     render_scene(scene, width=8, height=8, spp=1, level="far")
-    assert [kernel.signatures for kernel in kernels] == before
+    assert signatures() == before
+
+
+def test_processes_share_the_kernels_out_by_claims(tmp_path, monkeypatch):
+    done = []
+
+    def first():
+        done.append("first")
+
+    def second():
+        done.append("second")
+
+    monkeypatch.setattr("fabricusd.reference.compile_ahead.TASKS", (first, second))
+    monkeypatch.setattr("gc.disable", lambda: None)
+    (tmp_path / "first").touch()
+    compile_kernels(str(tmp_path))
+    compile_kernels(str(tmp_path))
+    assert done == ["second"]

@@ -7,6 +7,7 @@ import math
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from pxr import Sdf, Usd
@@ -14,6 +15,7 @@ from pxr import Sdf, Usd
 from fabricusd.fabric import MODELS, Binding, Fabric, Thread, ThreadSet
 from fabricusd.schema import PLUGIN_PATH, attributes, load, save
 from fabricusd.schema.generate import generate
+from fabricusd.schema.plugin import VALIDATORS
 
 TYPES = ("Fabric", "FabricThread")
 DEFINITIONS = [*TYPES, "FabricBindingAPI"]
@@ -35,12 +37,15 @@ def own_properties() -> list[tuple[str, str]]:
     ]
 
 
-def plain_usd(script: str, *arguments: str, plugin: bool) -> dict:
-    """Run a script in a process that has usd-core and knows nothing of fabricusd."""
+def plain_usd(script: str, *arguments: str, plugin: bool, rules: bool = False) -> dict:
+    """Run a script that has usd-core and, without `rules`, no fabricusd on its path."""
     environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH",)}
     environment.pop("PXR_PLUGINPATH_NAME", None)
-    if plugin:
-        environment["PXR_PLUGINPATH_NAME"] = str(PLUGIN_PATH)
+    folders = [str(PLUGIN_PATH)] * plugin + [str(VALIDATORS)] * rules
+    if folders:
+        environment["PXR_PLUGINPATH_NAME"] = os.pathsep.join(folders)
+    if rules:
+        environment["PYTHONPATH"] = str(PLUGIN_PATH.parents[2])
     done = subprocess.run(
         [sys.executable, "-c", script, *arguments],
         capture_output=True, text=True, env=environment, cwd="/", check=True,
@@ -84,6 +89,26 @@ def test_without_the_plugin_it_still_opens_and_nothing_is_lost(tmp_path):
     again = tmp_path / "again.usda"
     again.write_text(seen["authored"])
     assert load(again) == load("velvet")
+
+
+VALIDATE = """
+import json, sys
+from pxr import Usd, UsdValidation
+stage = Usd.Stage.Open(sys.argv[1])
+validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+errors = UsdValidation.ValidationContext(validators).Validate(stage)
+print(json.dumps([error.GetName() for error in errors]))
+"""
+NEGATIVE = Path(__file__).parent / "bad" / "number_in_range.usda"
+
+
+def test_the_plugin_path_leaves_validation_elsewhere_as_it_is():
+    alone = "import sys; sys.modules['fabricusd'] = None" + VALIDATE
+    assert "NumberInRange" not in plain_usd(alone, str(NEGATIVE), plugin=True)
+
+
+def test_the_rules_run_in_a_program_that_never_heard_of_them():
+    assert "NumberInRange" in plain_usd(VALIDATE, str(NEGATIVE), plugin=True, rules=True)
 
 
 def test_a_schema_registered_too_late_is_reported():

@@ -1,0 +1,62 @@
+"""The table of rules: what one is, how it is registered, how it is run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from pxr import Tf, Usd
+
+from fabricusd.errors import one_line
+
+Fault = tuple[str, str]
+RuleFunction = Callable[[Usd.Prim], Iterable[Fault]]
+
+FABRIC, THREAD, BINDING = "FabricusdFabric", "FabricusdFabricThread", "FabricusdBindingAPI"
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One rule: its name, its severity, the schema types of the prims it looks at; () for all."""
+
+    name: str
+    severity: str
+    schema_types: tuple[str, ...]
+    doc: str
+    function: RuleFunction
+
+
+RULES: list[Rule] = []
+
+
+def rule(*schema_types: str, severity: str = "error") -> Callable[[RuleFunction], RuleFunction]:
+    """Register a function as the rule whose name is the function's in CamelCase."""
+
+    def register(function: RuleFunction) -> RuleFunction:
+        name = "".join(word.capitalize() for word in function.__name__.split("_"))
+        doc = " ".join((function.__doc__ or "").split())
+        RULES.append(Rule(name, severity, schema_types, doc, function))
+        return function
+
+    return register
+
+
+def applies(checked: Rule, prim: Usd.Prim) -> bool:
+    """Whether `prim` is of a type that the rule looks at."""
+    type_name = f"Fabricusd{prim.GetTypeName()}"
+    if not checked.schema_types or type_name in checked.schema_types:
+        return True
+    return BINDING in checked.schema_types and (
+        prim.HasAPI("FabricBindingAPI") or prim.HasRelationship("fabric:binding")
+    )
+
+
+def run(checked: Rule, prim: Usd.Prim) -> list[Fault]:
+    """The faults that one rule finds on one prim, with values that cannot be read as faults."""
+    try:
+        return list(checked.function(prim))
+    except Tf.ErrorException as error:
+        return [("", f"cannot be read: {one_line(str(error), 300)}; it must be whole")]
+    except TypeError:
+        # Of a wrong type in a layer, or of a damaged .usdc in which type and value disagree.
+        return [("", "holds a value of a wrong type; each must be of the schema's type")]
