@@ -30,6 +30,8 @@ def run(scene: Path, size: int, spp: int, kernels: Path) -> tuple[float, float]:
         "--width", str(size), "--height", str(size), "--spp", str(spp), "-q",
     ]  # fmt: skip
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(kernels), "PYTHONPATH": str(ROOT)}
+    # An installer compiles modules too.
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     begun = time.perf_counter()
     subprocess.run(command, check=True, env=environment)

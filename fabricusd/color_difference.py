@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
 def lab(color: ArrayLike) -> NDArray[np.float64]:
     """(..., 3) CIE L*a*b* of linear Rec. 709, clipped to what a display shows, 0 to 1."""
-    import colour
-
+    colour = _colour()
     space = colour.RGB_COLOURSPACES["ITU-R BT.709"]
     shown = np.clip(np.asarray(color, np.float64), 0.0, 1.0)
     found = colour.XYZ_to_Lab(colour.RGB_to_XYZ(shown, space), space.whitepoint)
@@ -21,6 +23,13 @@ def delta_e_2000(color: ArrayLike, reference: ArrayLike) -> NDArray[np.float64]:
 
     Colours are clipped to what a display shows, 0 to 1.
     """
-    import colour
-
+    colour = _colour()
     return np.asarray(colour.difference.delta_E_CIE2000(lab(color), lab(reference)), np.float64)
+
+
+def _colour() -> Any:
+    """colour-science, without its warning that it cannot plot where matplotlib is not installed."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import colour
+    return colour

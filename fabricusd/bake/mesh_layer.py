@@ -11,7 +11,8 @@ from pxr import Sdf, Usd, UsdGeom, Vt
 
 from fabricusd.bake.garment import Garment
 from fabricusd.bake.tangents import corner_tangents
-from fabricusd.files import whole_file
+from fabricusd.schema import export
+from fabricusd.schema.names import prim_name
 
 
 def write_mesh_layer(path: str | os.PathLike[str], garment: Garment, up_axis: str) -> None:
@@ -19,33 +20,31 @@ def write_mesh_layer(path: str | os.PathLike[str], garment: Garment, up_axis: st
 
     Tangents are of MikkTSpace's convention, the fourth number the bitangent's sign.
     """
-    with whole_file(path) as temporary:
-        layer = Sdf.Layer.CreateAnonymous(".usdc")
-        stage = Usd.Stage.Open(layer)
-        UsdGeom.SetStageUpAxis(stage, up_axis)
-        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-        name = garment.name if not garment.name[0].isdigit() else f"_{garment.name}"
-        mesh = UsdGeom.Mesh.Define(stage, "/" + name.replace("-", "_"))
-        stage.SetDefaultPrim(mesh.GetPrim())
-        mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(garment.points.astype(np.float32)))
-        count = len(garment.triangles)
-        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(count, 3, np.int32)))
-        indices = np.ascontiguousarray(garment.triangles, np.int32).ravel()
-        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(indices))
-        mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-        mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(mesh.GetPointsAttr().Get()))
-        primvars = UsdGeom.PrimvarsAPI(mesh)
-        types = Sdf.ValueTypeNames
-        _primvar(primvars, "st", types.TexCoord2fArray, Vt.Vec2fArray, garment.uv)
-        _primvar(primvars, "normals", types.Normal3fArray, Vt.Vec3fArray, garment.normals)
-        tangents = corner_tangents(garment)
-        _primvar(primvars, "tangents", types.Float4Array, Vt.Vec4fArray, tangents)
-        for k, lay in enumerate(garment.lays if len(garment.lays) > 1 else ()):
-            faces = Vt.IntArray.FromNumpy(np.flatnonzero(garment.lay == k).astype(np.int32))
-            UsdGeom.Subset.CreateGeomSubset(
-                mesh, f"lay_{k}", UsdGeom.Tokens.face, faces, "materialBind", "partition"
-            ).GetPrim().SetDocumentation(lay.fabric.name)
-        layer.Export(str(temporary))
+    layer = Sdf.Layer.CreateAnonymous(".usdc")
+    stage = Usd.Stage.Open(layer)
+    UsdGeom.SetStageUpAxis(stage, up_axis)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    mesh = UsdGeom.Mesh.Define(stage, f"/{prim_name(garment.name)}")
+    stage.SetDefaultPrim(mesh.GetPrim())
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(garment.points.astype(np.float32)))
+    count = len(garment.triangles)
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(count, 3, np.int32)))
+    indices = np.ascontiguousarray(garment.triangles, np.int32).ravel()
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(indices))
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(mesh.GetPointsAttr().Get()))
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    types = Sdf.ValueTypeNames
+    _primvar(primvars, "st", types.TexCoord2fArray, Vt.Vec2fArray, garment.uv)
+    _primvar(primvars, "normals", types.Normal3fArray, Vt.Vec3fArray, garment.normals)
+    tangents = corner_tangents(garment)
+    _primvar(primvars, "tangents", types.Float4Array, Vt.Vec4fArray, tangents)
+    for k, lay in enumerate(garment.lays if len(garment.lays) > 1 else ()):
+        faces = Vt.IntArray.FromNumpy(np.flatnonzero(garment.lay == k).astype(np.int32))
+        UsdGeom.Subset.CreateGeomSubset(
+            mesh, f"lay_{k}", UsdGeom.Tokens.face, faces, "materialBind", "partition"
+        ).GetPrim().SetDocumentation(lay.fabric.name)
+    export(layer, path)
 
 
 def _primvar(primvars: Any, name: str, kind: Any, array: Any, corners: NDArray[Any]) -> None:

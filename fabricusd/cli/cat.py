@@ -7,10 +7,11 @@ import json
 import os
 import shutil
 import sys
+from collections.abc import Sequence
 
 from fabricusd.cli.stdout import can_show, write_utf8
 
-EPILOG = """FILE is a USD file, FILE:/PRIM, a WIF draft, or a preset
+EPILOG = """FILE is a USD file, FILE:/PRIM, a WIF draft, an image of a weave, or a preset
 
 example:
   fabricusd cat silk_crepe_de_chine
@@ -46,13 +47,13 @@ def run(options: argparse.Namespace) -> int:
         write_utf8(flattened(source))
         return 0
     fabric, notes = load_any(source)
-    for note in notes:
-        if not options.quiet:
-            print(f"fabricusd: {source}: {note}", file=sys.stderr)
+    _tell(source, notes, options)
     if options.wif:
         from fabricusd.schema.weaves import from_fabric, wif_text
 
-        write_utf8(wif_text(from_fabric(fabric)))
+        draft = from_fabric(fabric)
+        write_utf8(wif_text(draft))
+        _tell(source, draft.warnings, options)
         return 0
     from fabricusd.schema.describe import as_dict, in_words
 
@@ -72,3 +73,9 @@ def run(options: argparse.Namespace) -> int:
         print()
         print(draw(fabric, width=size.columns, height=lines, color=color, ascii_only=plain))
     return 0
+
+
+def _tell(source: str, notes: Sequence[str], options: argparse.Namespace) -> None:
+    for note in notes:
+        if not options.quiet:
+            print(f"fabricusd: {source}: {note}", file=sys.stderr)

@@ -35,7 +35,7 @@ class _Parser(argparse.ArgumentParser):
     """Complains in one line."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: {message}; see '{self.prog} --help'\n")
+        self.exit(2, f"{self.prog}: {one_line(message, 400)}; see '{self.prog} --help'\n")
 
 
 def build_parser(command: str | None) -> argparse.ArgumentParser:
@@ -71,7 +71,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the console entry point."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     command = next((word for word in given if word in COMMANDS), None)
-    options = build_parser(command).parse_args(given)
+    options, unknown = build_parser(command).parse_known_args(given)
+    if unknown:
+        # argparse would point at the help that lists the commands.
+        _Parser(prog=f"fabricusd {command}").error(f"unrecognized arguments: {' '.join(unknown)}")
     ready_stdout()
     try:
         status: int = options.run(options)

@@ -24,8 +24,9 @@ from fabricusd.preview.graph import Graph, Value
 from fabricusd.preview.paths import asset_path
 from fabricusd.preview.wearers import Dressed, NewUV, Wearer
 from fabricusd.preview.write_usd import write_material
-from fabricusd.schema import write_binding, write_fabric
+from fabricusd.schema import export, write_binding, write_fabric
 from fabricusd.schema.names import prim_name
+from fabricusd.schema.source import usd_errors
 
 VARIANT_SET = "fabricLook"
 VARIANTS = ("baked", "procedural", "off")
@@ -102,7 +103,7 @@ def _new_layer(
 
     The layer is in `path`'s folder from the start, so relative paths resolve while it is made.
     """
-    with whole_file(path) as temporary:
+    with usd_errors(str(path), "written"), whole_file(path) as temporary:
         layer = Sdf.Layer.CreateNew(str(temporary))
         stage = Usd.Stage.Open(layer)
         UsdGeom.SetStageUpAxis(stage, up_axis)
@@ -202,8 +203,7 @@ def _write_uv(path: Path, uv: Sequence[NewUV]) -> None:
         primvar.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(one.values)))
         if one.indices is not None:
             primvar.SetIndices(Vt.IntArray.FromNumpy(np.ascontiguousarray(one.indices)))
-    with whole_file(path) as temporary:
-        layer.Export(str(temporary))
+    export(layer, path)
 
 
 def _uv_prim(number: int) -> str:

@@ -83,7 +83,8 @@ def recipes(
         textures = texture_inputs(maps, path, made)
         of_threads = textures if fitted is maps else texture_inputs(fitted, path, made)
         for number, lay in enumerate(maps.lays):
-            name = prim_name(maps.name if len(maps.lays) == 1 else f"{maps.name}_{number}")
+            one = maps.name if len(maps.lays) == 1 else f"{maps.name}_{number}"
+            name = prim_name(one, ascii_only=True)
             looks = found_looks[number]
             means, of_means = mean_inputs(maps, number), mean_inputs(fitted, number)
             cover = means["opacity"].value

@@ -13,12 +13,19 @@ register()
 from fabricusd.schema.check import Finding, check  # noqa: E402
 from fabricusd.schema.read import load, read_binding, read_fabric  # noqa: E402
 from fabricusd.schema.source import find_fabric, open_stage, preset_names  # noqa: E402
-from fabricusd.schema.write import save, save_all, write_binding, write_fabric  # noqa: E402
+from fabricusd.schema.write import (  # noqa: E402
+    export,
+    save,
+    save_all,
+    write_binding,
+    write_fabric,
+)
 
 __all__ = [
     "PLUGIN_PATH",
     "Finding",
     "check",
+    "export",
     "find_fabric",
     "load",
     "open_stage",

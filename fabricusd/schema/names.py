@@ -8,12 +8,17 @@ from collections.abc import Container
 from pxr import Sdf
 
 
-def prim_name(text: str) -> str:
-    """The nearest valid prim name: letters, digits and _ of any script, no digit first."""
+def prim_name(text: str, *, ascii_only: bool = False) -> str:
+    """The nearest valid prim name: letters, digits and _ of any script, no digit first.
+
+    ascii_only : for names that go into MaterialX too, which has no other letters
+    """
     name = re.sub(r"\W+", "_", text.strip()) or "Fabric"
     # Not all that Python takes for a letter is one to USD.
     ascii_name = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    spellings = (name, f"_{name}", ascii_name, f"_{ascii_name}")
+    spellings: tuple[str, ...] = (ascii_name, f"_{ascii_name}")
+    if not ascii_only:
+        spellings = (name, f"_{name}", *spellings)
     return next(spelling for spelling in spellings if Sdf.Path.IsValidIdentifier(spelling))
 
 

@@ -33,7 +33,12 @@ def save_all(
     target = os.fspath(path)
     if not target.lower().endswith(EXTENSIONS):
         raise FabricError(target, f"has another suffix than {', '.join(EXTENSIONS)}")
-    layer = _layer(fabrics)
+    export(_layer(fabrics), target, clobber=clobber)
+
+
+def export(layer: Sdf.Layer, path: str | os.PathLike[str], *, clobber: bool = True) -> None:
+    """Write any layer to `path`, whole or not at all; FabricError where it cannot be."""
+    target = os.fspath(path)
     with usd_errors(target, "written"), whole_file(target, clobber=clobber) as temporary:
         if not layer.Export(str(temporary)):
             raise FabricError(target, "cannot be written")

@@ -104,6 +104,11 @@ def test_a_fabric_goes_out_as_wif_and_comes_back(capsys, tmp_path):
     assert run(capsys, "cat", str(tmp_path / "again.wif"), "-q")[0] == 0
 
 
+def test_an_unknown_option_points_at_the_help_of_its_command(capsys):
+    _, _, err = run(capsys, "cat", "velvet", "--js\non")
+    assert err == ("fabricusd cat: unrecognized arguments: --js on; see 'fabricusd cat --help'\n")
+
+
 def test_dry_run_writes_nothing(capsys, tmp_path):
     path = tmp_path / "a.usda"
     status, out, err = run(capsys, "new", "--preset", "velvet", "-o", str(path), "-n")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pxr import Sdf, Usd, UsdGeom
 from strategies import fabrics
 
-from fabricusd.fabric import Binding, Fabric
+from fabricusd.fabric import Binding, Fabric, Thread
 from fabricusd.schema import (
     load,
     preset_names,
@@ -49,6 +49,38 @@ def test_a_prim_read_and_written_again_is_the_same_text(fabric):
     prim = write_fabric(first, "/Cloth", fabric)
     write_fabric(second, "/Cloth", read_fabric(prim))
     assert second.GetRootLayer().ExportToString() == first.GetRootLayer().ExportToString()
+
+
+OTHER_VALUES = {
+    "fabric:warp:threads": [1], "fabric:weft:threads": [1, 0],
+    "fabric:warp:density": 7.0, "fabric:weft:density": 9.0,
+    "fabric:warp:coverage": 0.25, "fabric:weft:coverage": 0.5,
+    "fabric:weave:rows": ["110", "011"], "fabric:weave:name": "odd",
+    "fabric:model": "conserving", "fabric:opaque": True, "fabric:maskingWidth": 12.5,
+    "thread:albedo": (0.1, 0.2, 0.3), "thread:color": (0.3, 0.2, 0.1), "thread:ior": 1.7,
+    "thread:isotropic": 0.9, "thread:gammaSurface": 3.0, "thread:gammaVolume": 6.0,
+    "thread:surfaceGain": 0.125, "thread:model": "thesis", "thread:thickness": 0.75,
+    "thread:curve:positions": [0.0, 0.0, 1.0], "thread:curve:angles": [-10.0, 20.0, 30.0],
+}  # fmt: skip
+
+
+def test_every_property_of_the_schema_is_written_and_read():
+    stage = Usd.Stage.CreateInMemory()
+    fabric = Fabric(threads={"A": Thread(), "B": Thread()}, opaque=True, back=Fabric(name="Back"))
+    fabric = replace(fabric, weave=replace(fabric.weave, name="plain"))
+    prim = write_fabric(stage, "/Cloth", fabric)
+    for one in (prim, prim.GetChild("A")):
+        schema = set(one.GetPrimDefinition().GetPropertyNames())
+        assert set(one.GetAuthoredPropertyNames()) == schema
+        assert schema - {"fabric:threads", "fabric:back"} <= set(OTHER_VALUES)
+    prim.GetAttribute("fabric:opaque").Set(False)
+    thread = prim.GetChild("A")
+    thread.GetAttribute("thread:curve:positions").Set([0.0, 0.5, 1.0])
+    thread.GetAttribute("thread:curve:angles").Set([0.0, 0.0, 0.0])
+    for name, value in OTHER_VALUES.items():
+        before = read_fabric(prim)
+        (prim if name.startswith("fabric:") else thread).GetAttribute(name).Set(value)
+        assert read_fabric(prim) != before, f"{name} is not read"
 
 
 @pytest.mark.parametrize("suffix", [".usda", ".usdc", ".usd"])
@@ -171,6 +203,7 @@ def test_a_back_called_as_its_front_is_written_under_another_name():
 )  # fmt: skip
 def test_a_prims_name_is_the_nearest_to_the_text(text, name):
     assert prim_name(text) == name
+    assert prim_name(text, ascii_only=True).isascii()
 
 
 def test_sublayers_payloads_and_variants_are_read_as_composed(tmp_path):
