@@ -37,6 +37,8 @@ from fabricusd.appearance.stretches import (
     nearest_stretch,
 )
 from fabricusd.appearance.surface_sampling import (
+    narrow_direction,
+    narrower,
     share_at,
     uniform_direction,
     view_corner,
@@ -196,11 +198,12 @@ def _lobe_direction(R, below, lobe, width, c, s, psi0, tangent, thread_set, ox, 
 
 
 @njit(**PART)
-def conserving_point_density(R, tables, sampling, thread_set, thread, psi0,
+def conserving_point_density(R, tables, sampling, across_too, thread_set, thread, psi0, w,
                              ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]  # fmt: skip
     """pdf(wi) [1/sr] of `conserving_point_direction`, over the whole sphere."""
     if iz == R(0) or oz == R(0):
         return R(0)
+    narrow = across_too and oz > R(0) and iz > R(0)
     if oz < R(0):
         ix, iy, iz, ox, oy, oz = -ix, -iy, -iz, -ox, -oy, -oz
     even = even_density(R, sampling.opaque, iz)
@@ -215,12 +218,14 @@ def conserving_point_density(R, tables, sampling, thread_set, thread, psi0,
     p = R(UNIFORM) * even
     p += share_at(R, sampling.point_shares, corner, k + 6 + side) * abs(iz) * R(1 / math.pi)
     k += 3 * side
-    found = stretch_densities(
+    on_surface, on_volume, isotropic = stretch_densities(
         R, c, s, psi0, s / c, R(2) * row[GAMMA_SURFACE], R(2) * row[GAMMA_VOLUME], thread_set,
         ix, iy, iz, ox, oy, oz,
     )  # fmt: skip
+    if narrow:
+        on_surface *= narrower(R, row[GAMMA_SURFACE], c, s, thread_set, w, ix, iy, iz, ox, oy, oz)
     return p + _mixed(
-        found,
+        (on_surface, on_volume, isotropic),
         share_at(R, sampling.point_shares, corner, k + SURFACE),
         share_at(R, sampling.point_shares, corner, k + VOLUME),
         share_at(R, sampling.point_shares, corner, k + ISOTROPIC),
@@ -228,9 +233,12 @@ def conserving_point_density(R, tables, sampling, thread_set, thread, psi0,
 
 
 @njit(**PART)
-def conserving_point_direction(R, tables, sampling, thread_set, thread, psi0,
+def conserving_point_direction(R, tables, sampling, across_too, thread_set, thread, psi0, w,
                                ox, oy, oz, u0, u1, u2):  # type: ignore[no-untyped-def]  # fmt: skip
-    """wi (x, y, z) at levels `weave` and `thread`; a gap is sampled uniformly."""
+    """wi (x, y, z) at level `weave`, or `thread` if `across_too`; a gap is sampled uniformly.
+
+    The place across the thread narrows the lobe of viewers and light on the front.
+    """
     flip = R(-1) if oz < R(0) else R(1)
     ox, oy, oz = flip * ox, flip * oy, flip * oz
     if thread_set > WARP:
@@ -253,6 +261,11 @@ def conserving_point_direction(R, tables, sampling, thread_set, thread, psi0,
     if sampling.opaque != 0 and k == POINT_LOBES - 1:
         # Rounding alone leads here: below opaque cloth the shares are 0.
         k = 6
+    if across_too and flip > R(0) and k == SURFACE:
+        return narrow_direction(
+            R, tables.threads[thread, GAMMA_SURFACE], c, s, psi0, thread_set, w,
+            ox, oy, oz, u1, u2,
+        )  # fmt: skip
     x, y, z = point_lobe_direction(
         R, tables.threads[thread], k, c, s, psi0, thread_set, ox, oy, oz, u1, u2
     )

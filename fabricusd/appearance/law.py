@@ -154,7 +154,7 @@ def conserving_level_value(
 
 
 @njit(**PART)
-def law_density(R, law, level, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
+def law_density(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """pdf(wi) [1/sr] of `law_direction`; 0 where it never goes."""
     p, q = R(0), R(0)
     if law.kind != CONSERVING_ONLY:
@@ -162,15 +162,16 @@ def law_density(R, law, level, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz)
             p = far_density(R, law.lobes, ix, iy, iz, ox, oy, oz)
         else:
             p = point_density(
-                R, law.published, law.lobes, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz
-            )
+                R, law.published, law.lobes, level == THREAD, thread_set, thread, psi0, w,
+                ix, iy, iz, ox, oy, oz,
+            )  # fmt: skip
     if law.kind != PUBLISHED_ONLY:
         if level == FAR:
             q = conserving_density(R, law.conserving_lobes, ix, iy, iz, ox, oy, oz)
         else:
             q = conserving_point_density(
-                R, law.conserving, law.conserving_lobes, thread_set, thread, psi0,
-                ix, iy, iz, ox, oy, oz,
+                R, law.conserving, law.conserving_lobes, level == THREAD, thread_set, thread,
+                psi0, w, ix, iy, iz, ox, oy, oz,
             )  # fmt: skip
     # A viewer below the cloth sees no published model: all directions are the other's.
     if law.kind == MIXED and oz > R(0):
@@ -179,7 +180,7 @@ def law_density(R, law, level, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz)
 
 
 @njit(**PART)
-def law_direction(R, law, level, thread_set, thread, psi0, ox, oy, oz, u0, u1, u2):  # type: ignore[no-untyped-def]
+def law_direction(R, law, level, thread_set, thread, psi0, w, ox, oy, oz, u0, u1, u2):  # type: ignore[no-untyped-def]
     """wi (x, y, z) for a viewer and three numbers in [0, 1); check `law_density` of it above 0."""
     published = law.kind == PUBLISHED_ONLY
     if law.kind == MIXED and oz > R(0):
@@ -189,11 +190,12 @@ def law_direction(R, law, level, thread_set, thread, psi0, ox, oy, oz, u0, u1, u
         if level == FAR:
             return far_direction(R, law.lobes, ox, oy, oz, u0, u1, u2)
         return point_direction(
-            R, law.published, law.lobes, thread_set, thread, psi0, ox, oy, oz, u0, u1, u2
-        )
+            R, law.published, law.lobes, level == THREAD, thread_set, thread, psi0, w,
+            ox, oy, oz, u0, u1, u2,
+        )  # fmt: skip
     if level == FAR:
         return conserving_direction(R, law.conserving_lobes, ox, oy, oz, u0, u1, u2)
     return conserving_point_direction(
-        R, law.conserving, law.conserving_lobes, thread_set, thread, psi0,
+        R, law.conserving, law.conserving_lobes, level == THREAD, thread_set, thread, psi0, w,
         ox, oy, oz, u0, u1, u2,
     )  # fmt: skip

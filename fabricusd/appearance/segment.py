@@ -129,6 +129,12 @@ def mean_gaussian(R, width, half_precision, norm, x, reach):
 
 
 @njit(**INLINE)
+def across_deviation(R, gamma_surface):
+    """Deviation of the surface term across the thread, in halves of the width."""
+    return max(gamma_surface, R(ACROSS_MINIMUM))
+
+
+@njit(**INLINE)
 def across(R, row, w, sin_phi_i, cos_phi_i, sin_phi_o, cos_phi_o):
     """Factors on the surface and the volume term at `w` in [-1, 1] across the thread.
 
@@ -138,7 +144,7 @@ def across(R, row, w, sin_phi_i, cos_phi_i, sin_phi_o, cos_phi_o):
     y, x = sin_phi_i + sin_phi_o, cos_phi_i + cos_phi_o
     edge = R(1) if y > R(0) else (R(-1) if y < R(0) else R(0))
     h = edge if x < R(0) else y / max(math.sqrt(x * x + y * y), R(1e-6))
-    beta = max(row[GAMMA_SURFACE], R(ACROSS_MINIMUM))
+    beta = across_deviation(R, row[GAMMA_SURFACE])
     scale = R(math.sqrt(0.5)) / beta
     ends = erf(R, (R(1) - h) * scale) + erf(R, (R(1) + h) * scale)
     z = beta * R(math.sqrt(2.0 * math.pi) / 4.0) * ends

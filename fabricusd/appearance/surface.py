@@ -166,7 +166,7 @@ def sample(
     i = np.empty_like(o)
     real: Any = np.float64
     turned = np.ascontiguousarray(numbers.T)
-    _draw(real, *law, LEVELS.index(level), hit.set, hit.thread, hit.angle, o, turned, i)
+    _draw(real, *law, LEVELS.index(level), hit.set, hit.thread, hit.angle, hit.across, o, turned, i)
     f = _evaluate(law, level, hit, i, o)
     if level != "far" and shadow != "none":
         f *= _lit(fabric, shadow, level, places, i)
@@ -177,7 +177,9 @@ def sample(
 def _density(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats) -> Floats:
     real: Any = np.float64
     out = np.empty(wi.shape[1])
-    _densities(real, *law, LEVELS.index(level), hit.set, hit.thread, hit.angle, wi, wo, out)
+    _densities(
+        real, *law, LEVELS.index(level), hit.set, hit.thread, hit.angle, hit.across, wi, wo, out
+    )
     return out
 
 
@@ -361,38 +363,40 @@ def _add_conserving(R, tables, level, sets, threads, psi0, w, wi, wo, out):  # t
 
 
 @njit(**KERNEL, parallel=True)
-def _densities(R, kind, a, b, c, d, level, sets, threads, psi0, wi, wo, out):  # type: ignore[no-untyped-def]
+def _densities(R, kind, a, b, c, d, level, sets, threads, psi0, w, wi, wo, out):  # type: ignore[no-untyped-def]
     n = out.size
     for chunk in prange((n + BLOCK - 1) // BLOCK):
         first, last = chunk * BLOCK, min(n, (chunk + 1) * BLOCK)
-        _chunk_densities(R, kind, a, b, c, d, level, sets, threads, psi0, wi, wo, out, first, last)
+        _chunk_densities(
+            R, kind, a, b, c, d, level, sets, threads, psi0, w, wi, wo, out, first, last
+        )
 
 
 @njit(**KERNEL)
-def _chunk_densities(R, kind, a, b, c, d, level, sets, threads, psi0, wi, wo, out, first, last):  # type: ignore[no-untyped-def]
+def _chunk_densities(R, kind, a, b, c, d, level, sets, threads, psi0, w, wi, wo, out, first, last):  # type: ignore[no-untyped-def]
     law = SurfaceLaw(kind, a, b, c, d)
     for k in range(first, last):
         x = k if level != FAR else 0
         out[k] = law_density(
-            R, law, level, sets[x], threads[x], psi0[x],
+            R, law, level, sets[x], threads[x], psi0[x], w[x],
             wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k],
         )  # fmt: skip
 
 
 @njit(**KERNEL, parallel=True)
-def _draw(R, kind, a, b, c, d, level, sets, threads, psi0, wo, u, wi):  # type: ignore[no-untyped-def]
+def _draw(R, kind, a, b, c, d, level, sets, threads, psi0, w, wo, u, wi):  # type: ignore[no-untyped-def]
     n = wi.shape[1]
     for chunk in prange((n + BLOCK - 1) // BLOCK):
         first, last = chunk * BLOCK, min(n, (chunk + 1) * BLOCK)
-        _chunk_draw(R, kind, a, b, c, d, level, sets, threads, psi0, wo, u, wi, first, last)
+        _chunk_draw(R, kind, a, b, c, d, level, sets, threads, psi0, w, wo, u, wi, first, last)
 
 
 @njit(**KERNEL)
-def _chunk_draw(R, kind, a, b, c, d, level, sets, threads, psi0, wo, u, wi, first, last):  # type: ignore[no-untyped-def]
+def _chunk_draw(R, kind, a, b, c, d, level, sets, threads, psi0, w, wo, u, wi, first, last):  # type: ignore[no-untyped-def]
     law = SurfaceLaw(kind, a, b, c, d)
     for k in range(first, last):
         x = k if level != FAR else 0
         wi[0, k], wi[1, k], wi[2, k] = law_direction(
-            R, law, level, sets[x], threads[x], psi0[x],
+            R, law, level, sets[x], threads[x], psi0[x], w[x],
             wo[0, k], wo[1, k], wo[2, k], u[0, k], u[1, k], u[2, k],
         )  # fmt: skip

@@ -22,9 +22,13 @@ from fabricusd.appearance.sampling_lobes import (
     STEEPEST,
     SURFACE,
     VOLUME,
+    azimuth_seen,
+    density_across,
     lobe_densities,
+    sample_across,
     sample_lobe,
 )
+from fabricusd.appearance.segment import across_deviation
 from fabricusd.appearance.share_fit import AZIMUTHS, ELEVATIONS
 from fabricusd.appearance.stretches import (
     COS,
@@ -168,6 +172,25 @@ def far_direction(R, sampling, ox, oy, oz, u0, u1, u2):
 
 
 @njit(**INLINE)
+def narrower(R, gamma, c, s, thread_set, w, ix, iy, iz, ox, oy, oz):
+    """The surface lobe's density at the place w across its thread over that of the whole width."""
+    t, b, n = to_thread(R, thread_set, c, s, ix, iy, iz)
+    _, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
+    phi_o, beta = azimuth_seen(R, b_o, n_o), across_deviation(R, gamma)
+    return density_across(R, s / c, phi_o, w, beta, t, b, max(n, R(1e-12)))
+
+
+@njit(**INLINE)
+def narrow_direction(R, gamma, c, s, psi0, thread_set, w, ox, oy, oz, u1, u2):
+    """A direction of the surface lobe at the place w across its thread."""
+    t_o, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
+    theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
+    phi_o, beta = azimuth_seen(R, b_o, n_o), across_deviation(R, gamma)
+    t, b, n = sample_across(R, psi0, s / c, R(2) * gamma, theta_o, phi_o, w, beta, u1, u2)
+    return from_thread(R, thread_set, c, s, t, b, n)
+
+
+@njit(**INLINE)
 def _point_shares(R, sampling, thread_set, thread, psi0, ox, oy, oz):
     """(surface, volume, isotropic) shares at one tangent angle: those of the stretch it is in."""
     y = 3 * nearest_stretch(R, sampling.stretches, thread_set, thread, psi0)
@@ -180,7 +203,8 @@ def _point_shares(R, sampling, thread_set, thread, psi0, ox, oy, oz):
 
 
 @njit(**PART)
-def point_density(R, tables, sampling, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):
+def point_density(R, tables, sampling, across_too, thread_set, thread, psi0, w,
+                  ix, iy, iz, ox, oy, oz):  # fmt: skip
     """pdf(wi) [1/sr] of `point_direction`; 0 at or below the cloth."""
     if iz <= R(0) or oz <= R(0):
         return R(0)
@@ -195,12 +219,15 @@ def point_density(R, tables, sampling, thread_set, thread, psi0, ix, iy, iz, ox,
         R, c, s, psi0, s / c, R(2) * row[GAMMA_SURFACE], R(2) * row[GAMMA_VOLUME], thread_set,
         ix, iy, iz, ox, oy, oz,
     )  # fmt: skip
+    if across_too:
+        on_surface *= narrower(R, row[GAMMA_SURFACE], c, s, thread_set, w, ix, iy, iz, ox, oy, oz)
     return p + surface * on_surface + volume * on_volume + isotropic * on_isotropic
 
 
 @njit(**PART)
-def point_direction(R, tables, sampling, thread_set, thread, psi0, ox, oy, oz, u0, u1, u2):
-    """wi (x, y, z) at levels `weave` and `thread`, for a viewer above the cloth.
+def point_direction(R, tables, sampling, across_too, thread_set, thread, psi0, w,
+                    ox, oy, oz, u0, u1, u2):  # fmt: skip
+    """wi (x, y, z) for a viewer above the cloth, at level `weave`, or `thread` if `across_too`.
 
     A gap, whose value is 0 everywhere, is sampled uniformly.
     """
@@ -214,6 +241,10 @@ def point_direction(R, tables, sampling, thread_set, thread, psi0, ox, oy, oz, u
     lobe = ISOTROPIC
     if left < surface + volume:
         lobe = SURFACE if left < surface else VOLUME
+    if across_too and lobe == SURFACE:
+        return narrow_direction(
+            R, row[GAMMA_SURFACE], c, s, psi0, thread_set, w, ox, oy, oz, u1, u2
+        )
     return stretch_direction(
         R, lobe, c, s, psi0, s / c, R(2) * row[GAMMA_SURFACE], R(2) * row[GAMMA_VOLUME], thread_set,
         ox, oy, oz, u1, u2,

@@ -20,9 +20,13 @@ from fabricusd.appearance.sampling_lobes import (
     STEEPEST,
     SURFACE,
     VOLUME,
+    azimuth_seen,
+    density_across,
     lobe_densities,
+    sample_across,
     sample_lobe,
 )
+from fabricusd.appearance.segment import across_deviation
 from fabricusd.appearance.share_fit import AZIMUTHS
 from fabricusd.appearance.stretches import (
     COS,
@@ -46,12 +50,13 @@ _EVEN = 3
 """In place of a lobe: uniform over the hemisphere."""
 
 # Rows of a block: the viewer, the light, the drawn direction; the stretch of thread it is drawn
-# from; two uniform numbers; both densities; three shares; where the view lies on their grid; after
-# that the shares of all lobes.
+# from; two uniform numbers; both densities; three shares; where the view lies on their grid; the
+# place across the thread and what that makes of both surface densities; after that the shares of
+# all lobes.
 (_OX, _OY, _OZ, _IX, _IY, _IZ, _GX, _GY, _GZ, _WARP, _PSI0, _COS, _SIN, _TAN, _ON_SURFACE,
  _ON_VOLUME, _LOBE, _U1, _U2, _P_LIGHT, _P_GO, _A, _B, _D, _ELEVATION, _AZIMUTH, _UP, _ROUND,
- _SHARES) = (
-    row * BLOCK for row in range(29)
+ _W, _NARROW_LIGHT, _NARROW_GO, _SHARES) = (
+    row * BLOCK for row in range(32)
 )  # fmt: skip
 
 
@@ -237,11 +242,11 @@ def _add_stretch(R, row, shares, size, block):
 
 
 @njit(**KERNEL)
-def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, go, p_light, p_go,
-                  first, n):  # fmt: skip
+def sample_points(R, tables, sampling, across_too, sets, threads, psi0, w, wo, wi, u0, u1, u2, go,
+                  p_light, p_go, first, n):  # fmt: skip
     """As `sample_far` with `point_direction` and `point_density`, at the threads found.
 
-    sets, threads, psi0 : (n,) what lies under each hit; a gap is sampled uniformly
+    sets, threads, psi0, w : (n,) what lies under each hit; a gap is sampled uniformly
     """
     count = sampling.stretches.shape[0]
     block = np.empty(_SHARES, wo.dtype)
@@ -259,7 +264,7 @@ def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, 
                 angle = min(max(psi0[start + x], R(-STEEPEST)), R(STEEPEST))
             row = tables.threads[thread]
             block[_WARP + x] = R(1) if thread_set == WARP else R(0)
-            block[_PSI0 + x] = angle
+            block[_PSI0 + x], block[_W + x] = angle, w[start + x]
             block[_ON_SURFACE + x] = R(2) * row[GAMMA_SURFACE]
             block[_ON_VOLUME + x] = R(2) * row[GAMMA_VOLUME]
             a = b = d = R(0)
@@ -274,6 +279,12 @@ def sample_points(R, tables, sampling, sets, threads, psi0, wo, wi, u0, u1, u2, 
             block[_LOBE + x] = R(_EVEN) if k < 0 else R(k)
         _turn(R, size, block)
         _draw(R, size, block)
+        if across_too:
+            _draw_across(R, size, block)
+        for x in range(size):
+            block[_NARROW_LIGHT + x] = block[_NARROW_GO + x] = R(1)
+        if across_too:
+            _narrow(R, size, block)
         _add_points(R, size, block)
         _store(R, start, size, block, go, p_light, p_go, first)
 
@@ -284,6 +295,42 @@ def _turn(R, size, block):
     for x in range(size):
         c, s = cos(R, block[_PSI0 + x]), sin(R, block[_PSI0 + x])
         block[_COS + x], block[_SIN + x], block[_TAN + x] = c, s, s / c
+
+
+@njit(**PART)
+def _draw_across(R, size, block):
+    """Directions from the surface lobe at level `thread`, in place of those that `_draw` made."""
+    for x in range(size):
+        warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
+        t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
+        theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
+        width = block[_ON_SURFACE + x]
+        t, b, n = sample_across(
+            R, block[_PSI0 + x], block[_TAN + x], width, theta_o, azimuth_seen(R, b_o, n_o),
+            block[_W + x], across_deviation(R, R(0.5) * width), block[_U1 + x], block[_U2 + x],
+        )  # fmt: skip
+        along, z = c * t + s * n, c * n - s * t
+        ours = block[_LOBE + x] == R(SURFACE)
+        gx, gy = warp * -b + (R(1) - warp) * along, warp * along + (R(1) - warp) * b
+        block[_GX + x] = gx if ours else block[_GX + x]
+        block[_GY + x] = gy if ours else block[_GY + x]
+        block[_GZ + x] = z if ours else block[_GZ + x]
+
+
+@njit(**PART)
+def _narrow(R, size, block):
+    """What the place across the thread makes of both surface densities."""
+    for x in range(size):
+        warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
+        _, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
+        phi_o, w = azimuth_seen(R, b_o, n_o), block[_W + x]
+        beta, tangent = across_deviation(R, R(0.5) * block[_ON_SURFACE + x]), block[_TAN + x]
+        t, b, n = _into(R, warp, c, s, block[_IX + x], block[_IY + x], block[_IZ + x])
+        block[_NARROW_LIGHT + x] = density_across(
+            R, tangent, phi_o, w, beta, t, b, max(n, R(1e-12))
+        )
+        t, b, n = _into(R, warp, c, s, block[_GX + x], block[_GY + x], block[_GZ + x])
+        block[_NARROW_GO + x] = density_across(R, tangent, phi_o, w, beta, t, b, max(n, R(1e-12)))
 
 
 @njit(**PART)
@@ -300,9 +347,9 @@ def _add_points(R, size, block):
         even = R(UNIFORM / (2 * math.pi)) if a + b + d > R(0) else R(1 / (2 * math.pi))
         block[_P_LIGHT + x] = even + _lobes_at(
             R, warp, angle, c, s, tangent, surface, volume, theta_o,
-            block[_IX + x], block[_IY + x], block[_IZ + x], a, b, d,
+            block[_IX + x], block[_IY + x], block[_IZ + x], a * block[_NARROW_LIGHT + x], b, d,
         )  # fmt: skip
         block[_P_GO + x] = even + _lobes_at(
             R, warp, angle, c, s, tangent, surface, volume, theta_o,
-            block[_GX + x], block[_GY + x], block[_GZ + x], a, b, d,
+            block[_GX + x], block[_GY + x], block[_GZ + x], a * block[_NARROW_GO + x], b, d,
         )  # fmt: skip

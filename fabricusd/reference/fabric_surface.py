@@ -157,7 +157,8 @@ class FabricShader:
         _look_up(R, cloth, v_sign, hits, first, *found)
         if law.kind == PUBLISHED_ONLY:
             sample_points(
-                R, law.published, law.lobes, sets, threads, psi0, wo, wi,
+                R, law.published, law.lobes, level == THREAD_LEVEL, sets, threads, psi0, across,
+                wo, wi,
                 *hits[CHANCE : CHANCE + 3], go, hits[F_PDF], hits[GO_PDF], first,
                 count,
             )  # fmt: skip
@@ -180,13 +181,13 @@ def _by_law(R, law, level, hits, first, wo, wi, go, towards, onwards, sets, thre
         which, thread, angle, w = int(sets[k]), int(threads[k]), psi0[k], across[k]
         ox, oy, oz = wo[0, k], wo[1, k], wo[2, k]
         x, y, z = law_direction(
-            R, law, level, which, thread, angle, ox, oy, oz,
+            R, law, level, which, thread, angle, w, ox, oy, oz,
             hits[CHANCE, h], hits[CHANCE + 1, h], hits[CHANCE + 2, h],
         )  # fmt: skip
         go[0, k], go[1, k], go[2, k] = x, y, z
         # One call of each function, for both directions: they are large, and compiled in place.
         for turn in range(2):
-            pdf = law_density(R, law, level, which, thread, angle, x, y, z, ox, oy, oz)
+            pdf = law_density(R, law, level, which, thread, angle, w, x, y, z, ox, oy, oz)
             red, green, blue = law_value(
                 R, law, level, which, thread, angle, w, x, y, z, ox, oy, oz
             )

@@ -50,8 +50,9 @@ def test_the_far_sampler_draws_the_same_directions_with_the_same_densities(prese
         assert p_light[5 + k] == pytest.approx(expected, rel=2e-3, abs=1e-5)
 
 
+@pytest.mark.parametrize("across_too", [False, True])
 @pytest.mark.parametrize("preset", PRESETS)
-def test_the_sampler_at_a_point_does_too_and_gaps_are_uniform(preset):
+def test_the_sampler_at_a_point_does_too_and_gaps_are_uniform(preset, across_too):
     fabric = load(preset)
     tables = surface_tables(fabric, precision=R)
     sampling = sampling_tables(fabric, tables)
@@ -59,11 +60,13 @@ def test_the_sampler_at_a_point_does_too_and_gaps_are_uniform(preset):
     hit = lookup(fabric, np.random.default_rng(1).uniform(0, 40, (700, 2)))
     psi0 = hit.angle.astype(R)
     go, p_light, p_go = np.empty_like(wo), np.empty(700, R), np.empty(700, R)
+    w = hit.across.astype(R)
     sample_points(
-        R, tables, sampling, hit.set, hit.thread, psi0, wo, wi, *u, go, p_light, p_go, 0, 700
-    )
+        R, tables, sampling, across_too, hit.set, hit.thread, psi0, w, wo, wi, *u, go, p_light,
+        p_go, 0, 700,
+    )  # fmt: skip
     for k in range(700):
-        at = (int(hit.set[k]), int(hit.thread[k]), psi0[k])
+        at = (across_too, int(hit.set[k]), int(hit.thread[k]), psi0[k], w[k])
         one = point_direction(R, tables, sampling, *at, *wo[:, k], *u[:, k])
         assert go[:, k] == pytest.approx(one, abs=2e-5)
         for direction, density in ((go, p_go), (wi, p_light)):
