@@ -92,6 +92,13 @@ _NARROWEST = 2e-3
 
 
 @njit(**INLINE)
+def _share_across(R, beta, tangent):
+    """How much of the surface lobe goes by the place across; the rest keeps its cosine, which is
+    the better of the two where the highlight is wide, and on pile."""
+    return min(max(R(1.1) - R(2) * beta, R(0.25)), R(0.9)) / math.sqrt(R(1) + tangent * tangent)
+
+
+@njit(**INLINE)
 def _across_range(R, t, cos_theta, tangent, phi_o):
     """Sines (low, high) of the azimuths half way between the viewer and light above the cloth."""
     edge = min(max(t * tangent / max(cos_theta, R(1e-9)), R(0)), R(1))
@@ -118,7 +125,8 @@ def density_across(R, tangent, phi_o, w, beta, t, b, n):
     p = cut_normal(R, sin(R, phi_h), min(max(w, low), high), beta, low, high)
     edge = min(max(t * tangent * inverse, R(0)), R(1))
     sin_m = math.sqrt(max((R(1) - edge) * (R(1) + edge), R(1e-12)))
-    return p * cos(R, phi_h) * sin_m / (n * inverse)
+    share = _share_across(R, beta, tangent)
+    return R(1) - share + share * p * cos(R, phi_h) * sin_m / (n * inverse)
 
 
 @njit(**INLINE)
@@ -128,10 +136,17 @@ def sample_across(R, psi0, tangent, deviation, theta_o, phi_o, w, beta, u1, u2):
     mean = min(max(-theta_o, low), high)
     theta = sample_cut_normal(R, u1, mean, deviation, low, high)
     t, cos_theta = sin(R, theta), max(cos(R, theta), R(0))
+    share = _share_across(R, beta, tangent)
+    edge = min(max(t * tangent / max(cos_theta, R(1e-6)), R(0)), R(1))
+    u = (u2 - share) / (R(1) - share)
+    sin_phi = (R(2) * u - R(1)) * math.sqrt((R(1) - edge) * (R(1) + edge))
     low, high = _across_range(R, t, cos_theta, tangent, phi_o)
-    h = sample_cut_normal(R, u2, min(max(w, low), high), beta, low, high)
+    h = sample_cut_normal(R, min(u2 / share, R(1)), min(max(w, low), high), beta, low, high)
     phi = R(2) * asin(R, h) - phi_o
-    return t, cos_theta * sin(R, phi), cos_theta * cos(R, phi)
+    narrow = u2 < share
+    b = sin(R, phi) if narrow else sin_phi
+    n = cos(R, phi) if narrow else math.sqrt((R(1) - sin_phi) * (R(1) + sin_phi))
+    return t, cos_theta * b, cos_theta * n
 
 
 @njit(**INLINE)
