@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from fabricusd.appearance.far import far_value
+from fabricusd.appearance.far import far_values
 from fabricusd.appearance.levels import point_value
 from fabricusd.appearance.real import INLINE, KERNEL, PART
 from fabricusd.appearance.share_fit import (
@@ -62,9 +63,7 @@ def sampling_tables(fabric: Fabric, tables: SurfaceTables) -> SamplingTables:
     kept = _in_single_precision(tables)
     stretches = rows.astype(single)
     lobes = np.arange(3 * len(rows))
-    found = noted(len(lobes), len(lobes))
-    _draw_far(single, kept, stretches, found)
-    shares = best_shares(found, lobes, UNIFORM, LEAST_SHARE)
+    shares = best_shares(_far_directions(kept, stretches), lobes, UNIFORM, LEAST_SHARE)
     at_points = np.zeros((VIEWS, len(rows), 3))
     for y, stretch in enumerate(stretches):
         found = noted(3, 3)
@@ -74,6 +73,19 @@ def sampling_tables(fabric: Fabric, tables: SurfaceTables) -> SamplingTables:
     return SamplingTables(
         rows.astype(R), shares.reshape(shape).astype(R), at_points.reshape(shape).astype(R)
     )
+
+
+def _far_directions(tables: SurfaceTables, stretches: NDArray[np.float32]) -> NDArray[np.float32]:
+    """`noted` directions of every lobe at every view, at level `far`."""
+    lobes = 3 * len(stretches)
+    found = noted(lobes, lobes)
+    wi, wo, values = np.zeros((3, 3, found.shape[0] * found.shape[1]), np.float32)
+    _draw_far(np.float32, stretches, wi, wo, found)
+    # By the law's loop over directions, which takes a fifth of what calls one by one would.
+    far_values(np.float32, tables, wi, wo, values, 0, wi.shape[1])
+    grey = values.mean(axis=0).reshape(found.shape[:2])
+    found[:, :, VALUE] = np.where(found[:, :, EVEN] > 0, grey, 0.0)
+    return found
 
 
 def _in_single_precision(tables: SurfaceTables) -> SurfaceTables:
@@ -93,11 +105,17 @@ def _grey(R, value):
 
 
 @njit(**KERNEL)
-def _draw_far(R, tables, stretches, found):
-    """Directions of every lobe at every view: found (views, draws, lobes + 2)."""
+def _draw_far(R, stretches, wi, wo, found):
+    """Directions of every lobe at every view, and the densities of all lobes there.
+
+    wi, wo : (3, views draws) - directions to the light and to the viewer; zeros where that to the
+    light is below the cloth. found : (views, draws, lobes + 2), all but VALUE
+    """
     for view in range(found.shape[0]):
         ox, oy, oz = grid_view(R, view)
         for k in range(found.shape[1]):
+            n = view * found.shape[1] + k
+            wo[0, n], wo[1, n], wo[2, n] = ox, oy, oz
             u1, u2 = stratum(R, k % DRAWS)
             row = stretches[k // (3 * DRAWS)]
             ix, iy, iz = stretch_direction(
@@ -105,12 +123,12 @@ def _draw_far(R, tables, stretches, found):
                 row[VOLUME_WIDTH], int(row[SET]), ox, oy, oz, u1, u2,
             )  # fmt: skip
             if iz > R(1e-6):
-                _describe_far(R, tables, stretches, ix, iy, iz, ox, oy, oz, found[view, k])
+                wi[0, n], wi[1, n], wi[2, n] = ix, iy, iz
+                _describe_far(R, stretches, ix, iy, iz, ox, oy, oz, found[view, k])
 
 
 @njit(**PART)
-def _describe_far(R, tables, stretches, ix, iy, iz, ox, oy, oz, found):
-    found[VALUE] = _grey(R, far_value(R, tables, ix, iy, iz, ox, oy, oz))
+def _describe_far(R, stretches, ix, iy, iz, ox, oy, oz, found):
     found[EVEN] = even_density(R)
     for y in range(stretches.shape[0]):
         row = stretches[y]
