@@ -62,7 +62,7 @@ def best_shares(
     shares = level
     for _ in range(ADAPTATIONS):
         p = uniform * even + (1.0 - uniform) * (lobes @ shares[:, :, None])[:, :, 0]
-        over = np.divide(weight, p * p, out=np.zeros_like(weight), where=weight > 0)
+        over = weight / np.maximum(p * p, np.float32(1e-30))
         part = shares * (over[:, None, :] @ lobes)[:, 0, :]
         total = part.sum(axis=1, keepdims=True)
         shares = np.where(total > 0, part / np.where(total > 0, total, 1.0), level)

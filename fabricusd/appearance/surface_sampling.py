@@ -96,11 +96,14 @@ def stretch_densities(R, c, s, psi0, tangent, surface_width, volume_width, threa
                       ix, iy, iz, ox, oy, oz):  # fmt: skip
     """Densities [1/sr] of the three lobes at one tangent angle, both directions above the cloth."""
     t, b, n = to_thread(R, thread_set, c, s, ix, iy, iz)
-    if n <= R(0):
-        return R(0), R(0), R(0)
     t_o, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
     theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-    return lobe_densities(R, psi0, tangent, surface_width, volume_width, theta_o, t, b, n)
+    surface, volume, isotropic = lobe_densities(
+        R, psi0, tangent, surface_width, volume_width, theta_o, t, b, max(n, R(1e-12))
+    )
+    # Without a branch: loops over directions are vectorised.
+    front = R(1) if n > R(0) else R(0)
+    return front * surface, front * volume, front * isotropic
 
 
 @njit(**INLINE)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.far import far_values
 from fabricusd.appearance.levels import point_value
-from fabricusd.appearance.real import INLINE, KERNEL, PART
+from fabricusd.appearance.real import INLINE, KERNEL, whole
 from fabricusd.appearance.share_fit import (
     AZIMUTHS,
     DRAWS,
@@ -54,6 +54,10 @@ LEAST_SHARE = 0.1
 """See `share_fit.best_shares`: grazing views see narrow bright places that a few directions a lobe
 miss, and without it satin's variance doubles."""
 
+BLOCK = 256
+LOWEST = 1e-6
+"""Height of a direction up to which it counts as below the cloth."""
+
 
 def sampling_tables(fabric: Fabric, tables: SurfaceTables) -> SamplingTables:
     """Stretches of `fabric` and the shares of their lobes, measured on `tables`."""
@@ -63,29 +67,18 @@ def sampling_tables(fabric: Fabric, tables: SurfaceTables) -> SamplingTables:
     kept = _in_single_precision(tables)
     stretches = rows.astype(single)
     lobes = np.arange(3 * len(rows))
-    shares = best_shares(_far_directions(kept, stretches), lobes, UNIFORM, LEAST_SHARE)
-    at_points = np.zeros((VIEWS, len(rows), 3))
-    for y, stretch in enumerate(stretches):
-        found = noted(3, 3)
-        _draw_points(single, kept, stretch, found)
-        at_points[:, y] = best_shares(found, np.arange(3), UNIFORM, LEAST_SHARE)
+    shares = best_shares(_drawn_far(kept, stretches), lobes, UNIFORM, LEAST_SHARE)
+    # The points of all stretches at once, as views of their own.
+    found = np.zeros((len(rows), *noted(3, 3).shape), np.float32)
+    for stretch, drawn in zip(stretches, found, strict=True):
+        _draw_points(single, kept, stretch, drawn)
+    found = found.reshape(-1, *found.shape[2:])
+    at_points = best_shares(found, np.arange(3), UNIFORM, LEAST_SHARE)
+    at_points = at_points.reshape(len(rows), VIEWS, 3).swapaxes(0, 1)
     shape = (ELEVATIONS, AZIMUTHS, 3 * len(rows))
     return SamplingTables(
         rows.astype(R), shares.reshape(shape).astype(R), at_points.reshape(shape).astype(R)
     )
-
-
-def _far_directions(tables: SurfaceTables, stretches: NDArray[np.float32]) -> NDArray[np.float32]:
-    """`noted` directions of every lobe at every view, at level `far`."""
-    lobes = 3 * len(stretches)
-    found = noted(lobes, lobes)
-    wi, wo, values = np.zeros((3, 3, found.shape[0] * found.shape[1]), np.float32)
-    _draw_far(np.float32, stretches, wi, wo, found)
-    # By the law's loop over directions, which takes a fifth of what calls one by one would.
-    far_values(np.float32, tables, wi, wo, values, 0, wi.shape[1])
-    grey = values.mean(axis=0).reshape(found.shape[:2])
-    found[:, :, VALUE] = np.where(found[:, :, EVEN] > 0, grey, 0.0)
-    return found
 
 
 def _in_single_precision(tables: SurfaceTables) -> SurfaceTables:
@@ -104,38 +97,72 @@ def _grey(R, value):
     return (value[0] + value[1] + value[2]) * R(1.0 / 3.0)
 
 
-@njit(**KERNEL)
-def _draw_far(R, stretches, wi, wo, found):
-    """Directions of every lobe at every view, and the densities of all lobes there.
+def _drawn_far(tables: SurfaceTables, stretches: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Directions of every lobe at every view, as `share_fit.noted`: (views, draws, lobes + 2)."""
+    R: Any = np.float32
+    lobes = 3 * len(stretches)
+    found = noted(lobes, lobes)
+    views, draws = found.shape[:2]
+    wi, wo, value = (np.empty((3, views * draws), np.float32) for _ in range(3))
+    density = np.empty((lobes, views * draws), np.float32)
+    _draw_far(R, stretches, views, wi, wo)
+    far_values(R, tables, wi, wo, value, 0, views * draws)
+    _describe_far(R, stretches, wi, wo, density)
+    found[:, :, VALUE] = value.mean(axis=0).reshape(views, draws)
+    found[:, :, EVEN] = even_density(R)
+    found[:, :, LOBES:] = density.reshape(lobes, views, draws).transpose(1, 2, 0)
+    found[(wi[2] <= LOWEST).reshape(views, draws)] = 0.0
+    return found
 
-    wi, wo : (3, views draws) - directions to the light and to the viewer; zeros where that to the
-    light is below the cloth. found : (views, draws, lobes + 2), all but VALUE
-    """
-    for view in range(found.shape[0]):
+
+@njit(**KERNEL)
+def _draw_far(R, stretches, views, wi, wo):
+    """The directions, view by view and lobe by lobe: wi, wo (3, n)."""
+    draws = wi.shape[1] // views
+    for view in range(views):
         ox, oy, oz = grid_view(R, view)
-        for k in range(found.shape[1]):
-            n = view * found.shape[1] + k
-            wo[0, n], wo[1, n], wo[2, n] = ox, oy, oz
+        for k in range(draws):
             u1, u2 = stratum(R, k % DRAWS)
             row = stretches[k // (3 * DRAWS)]
             ix, iy, iz = stretch_direction(
                 R, k // DRAWS % 3, row[COS], row[SIN], row[PSI0], row[TAN], row[SURFACE_WIDTH],
                 row[VOLUME_WIDTH], int(row[SET]), ox, oy, oz, u1, u2,
             )  # fmt: skip
-            if iz > R(1e-6):
-                wi[0, n], wi[1, n], wi[2, n] = ix, iy, iz
-                _describe_far(R, stretches, ix, iy, iz, ox, oy, oz, found[view, k])
+            x = view * draws + k
+            wi[0, x], wi[1, x], wi[2, x] = ix, iy, iz
+            wo[0, x], wo[1, x], wo[2, x] = ox, oy, oz
 
 
-@njit(**PART)
-def _describe_far(R, stretches, ix, iy, iz, ox, oy, oz, found):
-    found[EVEN] = even_density(R)
-    for y in range(stretches.shape[0]):
-        row = stretches[y]
-        k = LOBES + 3 * y
-        found[k], found[k + 1], found[k + 2] = stretch_densities(
-            R, row[COS], row[SIN], row[PSI0], row[TAN], row[SURFACE_WIDTH], row[VOLUME_WIDTH],
-            int(row[SET]), ix, iy, iz, ox, oy, oz,
+@njit(**KERNEL)
+def _describe_far(R, stretches, wi, wo, density):
+    """Densities of all lobes, (lobes, n); a block's rows lie in one array, so that LLVM vectorises
+    the loop over it."""
+    block = np.empty(9 * BLOCK, np.float32)
+    for start in range(0, wi.shape[1], BLOCK):
+        size = min(BLOCK, wi.shape[1] - start)
+        for row in range(3):
+            light, viewer = wi[row][start:], wo[row][start:]
+            for x in range(size):
+                block[row * BLOCK + x] = light[x]
+            for x in range(size):
+                block[(3 + row) * BLOCK + x] = viewer[x]
+        for y in range(stretches.shape[0]):
+            _describe_block(R, stretches[y], size, block)
+            for row in range(3):
+                into, at = density[3 * y + row][start:], whole((6 + row) * BLOCK)
+                for x in range(size):
+                    into[x] = block[at + x]
+
+
+@njit(**INLINE)
+def _describe_block(R, row, size, block):
+    c, s, psi0, tangent, thread_set = row[COS], row[SIN], row[PSI0], row[TAN], int(row[SET])
+    surface, volume = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
+    for x in range(size):
+        block[6 * BLOCK + x], block[7 * BLOCK + x], block[8 * BLOCK + x] = stretch_densities(
+            R, c, s, psi0, tangent, surface, volume, thread_set,
+            block[x], block[BLOCK + x], block[2 * BLOCK + x],
+            block[3 * BLOCK + x], block[4 * BLOCK + x], block[5 * BLOCK + x],
         )  # fmt: skip
 
 
@@ -153,7 +180,7 @@ def _draw_points(R, tables, stretch, found):
             ix, iy, iz = stretch_direction(
                 R, k // DRAWS, c, s, psi0, tangent, surface, volume, thread_set, ox, oy, oz, u1, u2
             )
-            if iz > R(1e-6):
+            if iz > R(LOWEST):
                 here = found[view, k]
                 here[VALUE] = _grey(
                     R,

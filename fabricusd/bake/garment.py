@@ -19,6 +19,7 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.reference.scene import FabricSurface, Mesh, Scene
 from fabricusd.reference.triangles import measured_scale, smooth_normals
+from fabricusd.schema.names import free_name
 
 FIRST_TILE, LAST_TILE = 1001, 1109
 """UDIM numbers that are baked: ten columns, eleven rows but for the last row's last column."""
@@ -135,7 +136,7 @@ def garments(
         raise FabricError(
             mesh or "the scene", "wears no fabric; bind one, or name one with --fabric"
         )
-    return _with_names(list(found.values()))
+    return _with_fabric_names(_with_names(list(found.values())))
 
 
 def _shape_key(mesh: Mesh) -> str:
@@ -159,6 +160,20 @@ def _with_names(found: list[Garment]) -> list[Garment]:
         taken[name] = taken.get(name, 0) + 1
         named.append(replace(one, name=name if taken[name] == 1 else f"{name}_{taken[name]}"))
     return named
+
+
+def _with_fabric_names(found: list[Garment]) -> list[Garment]:
+    """Fabrics that differ under names that differ: files and looks find them by name."""
+    taken: dict[str, Fabric] = {}
+
+    def named(lay: Lay) -> Lay:
+        cloth = lay.fabric
+        known = next((name for name, other in taken.items() if other == cloth), None)
+        name = known or free_name(cloth.name, taken)
+        taken[name] = cloth
+        return lay if name == cloth.name else replace(lay, fabric=replace(cloth, name=name))
+
+    return [replace(one, lays=tuple(named(lay) for lay in one.lays)) for one in found]
 
 
 def garment_of(scene: Scene, mesh: Mesh) -> Garment | None:

@@ -18,7 +18,9 @@ example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Files, and how to judge and print."""
-    parser.add_argument("files", nargs="*", metavar="FILE", help="USD file, draft or preset")
+    parser.add_argument(
+        "files", nargs="*", metavar="FILE", help="USD file, FILE:/PRIM, draft or preset"
+    )
     parser.add_argument("--strict", action="store_true", help="warnings count as findings")
     parser.add_argument("--json", action="store_true", help="findings as JSON on stdout")
     parser.add_argument("--list-rules", action="store_true", help="print every rule and stop")

@@ -74,6 +74,8 @@ def run(options: argparse.Namespace) -> int:
 
         print("\n".join(preset_names()))
         return 0
+    if options.output == "-":
+        options.output = None
     fabric, notes = _fabric(options)
     fabric = _changed(fabric, options)
     _write(fabric, options)

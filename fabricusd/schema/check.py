@@ -10,7 +10,7 @@ from pxr import Usd
 
 from fabricusd.schema.anysource import is_draft, load_any
 from fabricusd.schema.rules import RULES, applies, run
-from fabricusd.schema.source import open_stage, usd_errors
+from fabricusd.schema.source import find_prim, open_stage, split_source, usd_errors
 
 
 @dataclass(frozen=True)
@@ -53,15 +53,16 @@ def check_prim(prim: Usd.Prim, file: str = "", severity: str = "") -> Iterator[F
 def check(source: str | os.PathLike[str]) -> list[Finding]:
     """Every finding in a USD file or a preset, in stage order; of a draft, what its import assumed.
 
-    FabricError where the file cannot be opened as USD, or does not compose, or is no draft.
+    `FILE:/PRIM` is that prim and what is below it. FabricError where the file cannot be opened as
+    USD, or does not compose, or is no draft, or has no such prim.
     """
     if is_draft(source):
         _, notes = load_any(source)
         return [Finding("DraftIsComplete", "warning", str(source), "", "", note) for note in notes]
     stage, file = open_stage(source)
     findings: list[Finding] = []
-    every = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
+    top = find_prim(stage, file, split_source(source)[1] or "/")
     with usd_errors(file, "checked"):
-        for prim in every:
+        for prim in Usd.PrimRange(top, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
             findings.extend(check_prim(prim, file))
     return findings

@@ -84,6 +84,7 @@ def _composed(path: str) -> Usd.Stage:
 def flattened(source: str | os.PathLike[str]) -> str:
     """The composed stage of `source` as USD text; FabricError as from `open_stage`."""
     stage, file = open_stage(source)
+    find_prim(stage, file, split_source(source)[1] or "/")
     with usd_errors(file, "flattened"):
         return str(stage.Flatten().ExportToString())
 
@@ -126,14 +127,20 @@ def _line_of_byte(file: str) -> str:
     return ""
 
 
+def find_prim(stage: Usd.Stage, file: str, prim_path: str) -> Usd.Prim:
+    """The prim at `prim_path`, of any type; FabricError where there is none."""
+    if not Sdf.Path.IsValidPathString(prim_path):
+        raise FabricError(f"{file}:{prim_path}", "is no prim path")
+    prim = stage.GetPrimAtPath(prim_path)
+    if not prim:
+        raise FabricError(f"{file}:{prim_path}", "is no prim")
+    return prim
+
+
 def find_fabric(stage: Usd.Stage, file: str, prim_path: str = "") -> Usd.Prim:
     """The Fabric prim at `prim_path`; without one the default prim, or the only one there is."""
     if prim_path:
-        if not Sdf.Path.IsValidPathString(prim_path):
-            raise FabricError(f"{file}:{prim_path}", "is no prim path")
-        prim = stage.GetPrimAtPath(prim_path)
-        if not prim:
-            raise FabricError(f"{file}:{prim_path}", "is no prim")
+        prim = find_prim(stage, file, prim_path)
         if prim.GetTypeName() != "Fabric":
             kind = prim.GetTypeName() or "an untyped prim"
             raise FabricError(f"{file}:{prim_path}", f"is {kind}; it must be a Fabric")

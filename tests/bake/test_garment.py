@@ -50,6 +50,18 @@ def test_instances_of_a_mesh_are_baked_once():
     assert found[0].copies == ("/Quad", "/Copy")
 
 
+def test_two_fabrics_of_one_name_are_told_apart():
+    scene = quad_scene(Fabric(name="Cloth"))
+    for k, opaque in enumerate((True, False), start=1):
+        binding = Binding(fabric=Fabric(name="Cloth", opaque=opaque), threads_per_uv=(8.0, 8.0))
+        scene.materials.append(FabricSurface(binding=binding))
+        mesh = quad_mesh(path=f"/Other{k}", move=3.0 * k)
+        scene.meshes.append(replace(mesh, material=np.full(2, k, np.int32)))
+    found = [one.lays[0].fabric for one in garments(scene)]
+    assert [cloth.name for cloth in found] == ["Cloth", "Cloth_2", "Cloth"]
+    assert [cloth.opaque for cloth in found] == [False, True, False]
+
+
 def test_mirrored_triangles_are_counted():
     mirrored = UNIT * (-1, 1) + [1, 0]
     assert not garments(quad_scene(Fabric()))[0].mirrored.any()

@@ -166,6 +166,8 @@ BAD = {
     "check of nothing": ["check"],
     "check of a missing file": ["check", "nowhere.usda"],
     "check of a folder": ["check", "."],
+    "check of a prim that is not there": ["check", "velvet:/Nowhere"],
+    "flatten of a prim that is not there": ["cat", "velvet:/Nowhere", "--flatten"],
     "a demo where a file is": ["demo", "-o", "taken"],
 }
 
@@ -215,6 +217,20 @@ def test_a_layer_is_printed_as_utf_8_whatever_the_output_is(tmp_path):
     )  # fmt: skip
     (tmp_path / "x.usda").write_bytes(done.stdout)
     assert load(tmp_path / "x.usda").name == "Größe"
+
+
+def test_check_of_a_prim_looks_at_nothing_above_it(capsys, tmp_path):
+    (tmp_path / "two.usda").write_text(
+        '#usda 1.0\ndef Fabric "A"\n{\ndef FabricThread "T"\n{\n}\n}\ndef Fabric "B"\n{\n}\n'
+    )
+    assert run(capsys, "check", f"{tmp_path}/two.usda:/A")[0] == 0
+    assert run(capsys, "check", f"{tmp_path}/two.usda:/B")[0] == 1
+
+
+def test_a_dash_is_standard_output(capsys):
+    assert run(capsys, "new", "--preset", "velvet", "-o", "-") == run(
+        capsys, "new", "--preset", "velvet"
+    )
 
 
 def test_a_prim_is_named_with_its_slash_or_without(capsys):

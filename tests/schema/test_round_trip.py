@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pxr import Sdf, Usd, UsdGeom
 from strategies import fabrics
@@ -187,6 +187,34 @@ def {where} "{name}" (
 """
     )
     assert_same(load(tmp_path / "shop.usda"), load("velvet"))
+
+
+ARCS = {
+    "a reference": 'def "Cloth" (references = @f.usdc@</Front>)\n{\n}',
+    "a payload": 'def "Cloth" (payload = @f.usdc@</Front>)\n{\n}',
+    "a reference to a reference": 'def "A" (references = @f.usdc@</Front>)\n{\n}\n'
+    'def "Cloth" (references = </A>)\n{\n}',
+    "an inherited class": 'class "A" (references = @f.usdc@</Front>)\n{\n}\n'
+    'def "Cloth" (inherits = </A>)\n{\n}',
+    "a specialised class": 'class "A" (references = @f.usdc@</Front>)\n{\n}\n'
+    'def "Cloth" (specializes = </A>)\n{\n}',
+    "a variant": 'def "Cloth" (\nvariants = { string v = "on" }\nprepend variantSets = "v"\n)\n'
+    '{\nvariantSet "v" = {\n"on" (references = @f.usdc@</Front>) {\n}\n}\n}',
+    "an instance": 'def "Cloth" (\ninstanceable = true\nreferences = @f.usdc@</Front>\n)\n{\n}',
+    "a sublayer with an over": '',
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("arc", ARCS)
+@settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(fabric=fabrics(back=False))
+def test_no_arc_of_composition_loses_anything(arc, fabric, tmp_path):
+    save(replace(fabric, name="Front"), tmp_path / "f.usdc")
+    head, name = '(\nsubLayers = [@f.usdc@]\n)\nover "Front"\n{\n}', "Front"
+    if ARCS[arc]:
+        head, name = ARCS[arc], "Cloth"
+    (tmp_path / "shop.usda").write_text(f"#usda 1.0\n{head}\n")
+    assert_same(load(f"{tmp_path / 'shop.usda'}:/{name}"), replace(fabric, name=name))
 
 
 def test_a_back_called_as_its_front_is_written_under_another_name():
