@@ -109,7 +109,7 @@ def _drawn_far(tables: SurfaceTables, stretches: NDArray[np.float32]) -> NDArray
     far_values(R, tables, wi, wo, value, 0, views * draws)
     _describe_far(R, stretches, wi, wo, density)
     found[:, :, VALUE] = value.mean(axis=0).reshape(views, draws)
-    found[:, :, EVEN] = even_density(R)
+    found[:, :, EVEN] = even_density.py_func(R)
     found[:, :, LOBES:] = density.reshape(lobes, views, draws).transpose(1, 2, 0)
     found[(wi[2] <= LOWEST).reshape(views, draws)] = 0.0
     return found

@@ -1,10 +1,10 @@
 """A machine's first picture: its kernels are compiled by other processes, meanwhile.
 
 numba compiles one function at a time in a process, and keeps on disk what it compiled. Where it has
-not, processes of their own go through one list of kernels, each taking the next that none has, and
-whoever wanted to render waits and finds them on disk. They compile without Python's collector of
-cycles, which costs a fifth of the time, and end with the memory that this takes. Whatever they fail
-to make is compiled by the caller.
+not, processes of their own go through one list of kernels, from one end or the other, each taking
+the next that none has, and whoever wanted to render waits and finds them on disk. They compile
+without Python's collector of cycles, which costs a fifth of the time, and end with the memory that
+this takes. Whatever they fail to make is compiled by the caller.
 """
 
 from __future__ import annotations
@@ -59,9 +59,10 @@ class CompileAhead:
         if not Path(sys.executable or "").name.startswith("python") or _compiled():
             return
         self._claims = tempfile.TemporaryDirectory(prefix="fabricusd-")
-        code = f"import {__name__} as ahead; ahead.compile_kernels({self._claims.name!r})"
         none = subprocess.DEVNULL
-        for _ in range(min(worker_count(None), _MOST_PROCESSES)):
+        for k in range(min(worker_count(None), _MOST_PROCESSES)):
+            call = f"compile_kernels({self._claims.name!r}, {k % 2 == 1})"
+            code = f"import {__name__} as ahead; ahead.{call}"
             process = subprocess.Popen(
                 [sys.executable, "-c", code], stdin=none, stdout=none, stderr=none
             )
@@ -96,12 +97,12 @@ def _compiled() -> bool:
     return any(Path(shade_far.stats.cache_path).glob("far_shading.shade_far*.nbi"))
 
 
-def compile_kernels(claims: str) -> None:
+def compile_kernels(claims: str, backwards: bool) -> None:
     """Compile every kernel that is not claimed yet by a file of its name in folder `claims`."""
     # Most of what a compiler makes lives until the end.
     gc.disable()
     load_without_blas()
-    for task in TASKS:
+    for task in TASKS[::-1] if backwards else TASKS:
         try:
             os.close(os.open(os.path.join(claims, task.__name__), os.O_CREAT | os.O_EXCL))
         except FileExistsError:
@@ -202,7 +203,7 @@ def _trace_and_settle() -> None:
 
 
 TASKS: tuple[Callable[[], None], ...] = (
-    _prepare, _shade_far, _share_lobes, _arrive, _shade_preview, _camera_rays, _depart,
-    _trace_and_settle,
+    _shade_far, _share_lobes, _shade_preview, _depart, _trace_and_settle, _camera_rays, _arrive,
+    _prepare,
 )  # fmt: skip
-"""The longest first, so that the processes end together."""
+"""Those that take longest at both ends, beside those with which they have parts in common."""

@@ -95,9 +95,10 @@ class Tracer:
             raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
         if max_bounces < 0:
             raise FabricError("max bounces", f"is {max_bounces}; it must be at least 0")
-        compile_ahead().wait()
+        ahead = compile_ahead()
         self.tables = build_tables(scene)
         self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
+        ahead.wait()
         self.lights, self.dome = build_lights(scene.lights, self.tables.centre)
         self.surfaces = build_surfaces(scene)
         shining = self.surfaces.table[:, [EMISSIVE, EMISSIVE + 1, EMISSIVE + 2]].any(axis=1)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
+from pathlib import Path
 
 from numba.core.dispatcher import Dispatcher
 
@@ -11,6 +13,8 @@ from fabricusd.reference.compile_ahead import TASKS, compile_kernels
 from fabricusd.reference.scene import FabricSurface, PreviewSurface, Scene
 from fabricusd.schema import load
 from tests.reference.scenes import above, grid, render_scene
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def signatures():
@@ -23,9 +27,8 @@ def signatures():
     }
 
 
-def test_a_picture_compiles_nothing_that_was_not_compiled_ahead():
-    for task in TASKS:
-        task()
+def picture():
+    """Cloth and a plain floor, small."""
     scene = Scene(
         meshes=[grid(), grid(material=1, size=2.0)],
         materials=[
@@ -34,9 +37,38 @@ def test_a_picture_compiles_nothing_that_was_not_compiled_ahead():
         ],
         camera=above(width=4.0),
     )
-    before = signatures()
     render_scene(scene, width=8, height=8, spp=1, level="far")
+
+
+def test_a_picture_compiles_nothing_that_was_not_compiled_ahead():
+    for task in TASKS:
+        task()
+    before = signatures()
+    picture()
     assert signatures() == before
+
+
+SECOND_START = """
+from numba.core import event
+from tests.reference.test_compile_ahead import picture
+
+class Compiled(event.Listener):
+    def on_start(self, event):
+        print(event.data["dispatcher"].py_func.__qualname__)
+
+    def on_end(self, event):
+        pass
+
+event.register("numba:compile", Compiled())
+picture()
+"""
+
+
+def test_a_second_start_compiles_nothing():
+    picture()
+    run = [sys.executable, "-c", SECOND_START]
+    done = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == ""
 
 
 def test_processes_share_the_kernels_out_by_claims(tmp_path, monkeypatch):
@@ -51,6 +83,6 @@ def test_processes_share_the_kernels_out_by_claims(tmp_path, monkeypatch):
     monkeypatch.setattr("fabricusd.reference.compile_ahead.TASKS", (first, second))
     monkeypatch.setattr("gc.disable", lambda: None)
     (tmp_path / "first").touch()
-    compile_kernels(str(tmp_path))
-    compile_kernels(str(tmp_path))
+    compile_kernels(str(tmp_path), backwards=False)
+    compile_kernels(str(tmp_path), backwards=True)
     assert done == ["second"]
