@@ -120,7 +120,7 @@ def _mesh_tables(
     along, up = np.cross(e2, area2) / square, np.cross(area2, e1) / square
     for axis in range(2):
         gradient = d1[:, axis, None] * along + d2[:, axis, None] * up
-        records[:, RATE + axis] = np.linalg.norm(gradient, axis=1)
+        records[:, RATE + axis] = _length(gradient)
     return points, tri, records, uv.astype(np.float32).reshape(-1, 6), material
 
 
@@ -141,8 +141,8 @@ def _sound_triangles(scene: Scene, mesh: Mesh) -> NDArray[np.bool_]:
     solid = np.zeros(len(tri), bool)
     for part in _parts(len(tri)):
         p = points[tri[part]]
-        longest = np.max(np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2), axis=1)
-        area2 = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+        longest = np.max(_length(p - np.roll(p, 1, axis=1)), axis=1)
+        area2 = _length(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]))
         solid[part] = area2 > 1e-10 * longest**2
     if (whole & ~solid).any():
         scene.note(mesh.path, f"has {int((whole & ~solid).sum())} triangles without area, left out")
@@ -151,10 +151,17 @@ def _sound_triangles(scene: Scene, mesh: Mesh) -> NDArray[np.bool_]:
 
 def _unit(v: NDArray[Any], instead: NDArray[Any]) -> NDArray[Any]:
     """`v` at length 1, and `instead` at length 1 where `v` has none or is not finite."""
-    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    length = _length(v)[..., None]
     good = np.isfinite(length) & (length > 1e-12)
-    other = instead / np.maximum(np.linalg.norm(instead, axis=-1, keepdims=True), 1e-30)
+    if good.all():
+        return np.asarray(v / length)
+    other = instead / np.maximum(_length(instead)[..., None], 1e-30)
     return np.where(good, v / np.where(good, length, 1.0), other)
+
+
+def _length(v: NDArray[Any]) -> NDArray[Any]:
+    """Length along the last axis, in a third of the time of `numpy.linalg.norm`."""
+    return np.asarray(np.sqrt(np.einsum("...i,...i->...", v, v)))
 
 
 def _parts(count: int) -> list[slice]:
@@ -176,7 +183,7 @@ def smooth_normals(points: NDArray[Any], tri: NDArray[Any]) -> NDArray[np.float3
         for k in range(3):
             a = corners[:, (k + 1) % 3] - corners[:, k]
             b = corners[:, (k + 2) % 3] - corners[:, k]
-            sine = np.linalg.norm(np.cross(a, b), axis=1)
+            sine = _length(np.cross(a, b))
             angle = np.arctan2(sine, np.einsum("ij,ij->i", a, b))
             _add_at(total, shared[:, k], angle[:, None] * face)
     normals = np.empty((len(tri), 3, 3), np.float32)
@@ -276,7 +283,7 @@ def _grain(
         det = d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]
         direction = (e1[part] * d2[:, 1:] - e2[part] * d1[:, 1:]) * np.sign(det)[:, None]
         face = np.cross(e1[part], e2[part])
-        steep = np.abs(face[:, :1]) < 0.7 * np.linalg.norm(face, axis=1)[:, None]
+        steep = np.abs(face[:, :1]) < 0.7 * _length(face)[:, None]
         helper = np.where(steep, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
         along[part] = _unit(direction, np.cross(np.cross(face, helper), face))
         hand[part] = np.where(det < 0, -1.0, 1.0)
@@ -289,7 +296,7 @@ def _grain(
     del key
     total = np.zeros((int(group.max(initial=0)) + 1, 3), np.float32)
     for part in _parts(len(tri)):
-        weighted = along[part] * np.linalg.norm(np.cross(e1[part], e2[part]), axis=1)[:, None]
+        weighted = along[part] * _length(np.cross(e1[part], e2[part]))[:, None]
         for k in range(3):
             _add_at(total, group[part, k], weighted)
     tangents = np.empty((len(tri), 3, 3), np.float32)
