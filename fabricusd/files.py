@@ -19,12 +19,15 @@ def whole_file(path: str | os.PathLike[str], *, clobber: bool = True) -> Iterato
     """Yield a temporary path beside `path`; rename it to `path` if the block succeeds.
 
     The temporary name keeps the suffix, since many writers choose their format by it. An existing
-    file is replaced in one step, or refused before anything is written when `clobber` is False.
+    file is replaced in one step, or refused before anything is written when `clobber` is False. A
+    link stays, and what it points to is replaced; devices and pipes are refused.
     """
-    target = Path(path)
+    target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
     # os.path answers False where pathlib raises: names too long, folders nobody may look into.
     if os.path.isdir(target):
         raise FabricError(str(target), "is a directory; it must be a file's name")
+    if os.path.exists(target) and not os.path.isfile(target):
+        raise FabricError(str(target), "is a pipe or a device; it must be a file's name")
     if not clobber and os.path.lexists(target):
         raise FabricError(str(target), "exists; it must be a new name with --no-clobber")
     if not os.path.isdir(target.parent):
