@@ -44,8 +44,12 @@ def test_a_pipe_is_refused_and_stays_one(tmp_path):
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
     target = tmp_path / "a.usda"
     target.write_text("old")
-    with pytest.raises(RuntimeError), whole_file(target) as temporary:
+
+    def half(temporary):
         temporary.write_text("half")
         raise RuntimeError
+
+    with pytest.raises(RuntimeError), whole_file(target) as temporary:
+        half(temporary)
     assert target.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["a.usda"]
