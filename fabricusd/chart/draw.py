@@ -29,6 +29,17 @@ def pyplot() -> Any:
     return matplotlib.pyplot
 
 
+def adjuster() -> Any:
+    """adjustText, which comes with matplotlib in the extra `docs`."""
+    try:
+        import adjustText
+    except ImportError:
+        raise FabricError(
+            "adjustText", "is not installed; pip install 'fabricusd[docs]' draws charts"
+        ) from None
+    return adjustText
+
+
 def draw_panel(panel: Panel, rows: Sequence[Row], stem: Path) -> list[Path]:
     """`<stem>.png` and `<stem>.svg` of a panel's rows."""
     plt = pyplot()
@@ -61,7 +72,10 @@ def _scatter(
 ) -> None:
     """Error against cost, logarithmic, a small plot a group; the front joined and named."""
     plots = figure.subplots(lines, COLUMNS, squeeze=False).ravel()
+    names = []
     for axes, group in zip(plots, groups, strict=False):
+        texts: list[Any] = []
+        names.append((axes, texts))
         mine = [row for row in rows if row.group == group]
         for front, color in ((True, "C0"), (False, "0.65")):
             some = [row for row in mine if row.on_front == front]
@@ -71,10 +85,8 @@ def _scatter(
                 fmt="o", ms=4, lw=0.8, color=color,
             )  # fmt: skip
             for row in some:
-                axes.annotate(
-                    row.method, (row.cost, max(row.error, 1e-9)), xytext=(4, 3 if front else -8),
-                    textcoords="offset points", fontsize=6, color="k" if front else "0.45",
-                )  # fmt: skip
+                place, ink = (row.cost, max(row.error, 1e-9)), "k" if front else "0.45"
+                texts.append(axes.text(*place, row.method, fontsize=6, color=ink))
         front_rows = sorted((r for r in mine if r.on_front), key=lambda r: r.cost)
         axes.step(
             [r.cost for r in front_rows], [max(r.error, 1e-9) for r in front_rows],
@@ -86,6 +98,20 @@ def _scatter(
         axes.grid(alpha=0.3)
     for axes in plots[len(groups) :]:
         axes.set_axis_off()
+    _part(figure, names)
+
+
+def _part(figure: Any, names: Sequence[tuple[Any, list[Any]]]) -> None:
+    """Move each plot's names off one another and off the points, with a line to the point."""
+    # Names have places on paper only once the plots have, which then stay where they are: the
+    # figure is drawn again for every plot.
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axes, texts in names:
+        adjuster().adjust_text(
+            texts, ax=axes, expand=(1.05, 1.3), iter_lim=60,
+            arrowprops={"arrowstyle": "-", "color": "0.7", "lw": 0.4},
+        )  # fmt: skip
 
 
 def _below(row: Row) -> float:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from fabricusd.chart.draw import draw_panel, pyplot
+from fabricusd.chart.draw import adjuster, draw_panel, pyplot
 from fabricusd.chart.page import Charts, markdown, write_csv, write_json
 from fabricusd.chart.panel import Panel, Row, measure
 from fabricusd.chart.registry import PANELS
@@ -51,6 +51,7 @@ def make_charts(
     drawn = chosen_sheets(sheets, everything=not (quick or names))
     panels = [] if sheets and not names else chosen_panels(names)
     pyplot()
+    adjuster()
     folder.mkdir(parents=True, exist_ok=True)
     begun = time.perf_counter()
     charts: dict[str, tuple[Panel, list[Row]]] = {}
