@@ -93,6 +93,11 @@ def _scatter(
             where="post", lw=0.8,
         )  # fmt: skip
         axes.set(xscale="log", yscale="log", xlabel=panel.cost, ylabel=panel.error)
+        # Numbers between powers of ten, plain and small: in scientific notation they overlap.
+        axes.xaxis.set_minor_formatter("{x:g}")
+        if axes.get_xlim()[1] > 20 * axes.get_xlim()[0]:
+            axes.xaxis.set_minor_formatter("")
+        axes.tick_params(axis="x", which="minor", labelsize=6)
         axes.set_title(group, fontsize=8)
         axes.margins(x=0.25)
         axes.grid(alpha=0.3)
