@@ -13,8 +13,8 @@ normal that is half a disk and half an ellipse, of semi-axis cos psi0. Every den
 steradian and exact.
 
 At level `thread` the surface term is a normal distribution in `h = sin phi_h` about the place `w`
-across the thread, `phi_h` half way between the azimuths of viewer and light; so is the lobe's
-azimuth there, cut to those above the cloth:
+across the thread, `phi_h` half way between the azimuths of viewer and light; so is part of the
+lobe's azimuths there (`_share_across`), cut to those above the cloth:
 
     p(phi) = p(h) cos(phi_h)/2,   phi_h = (phi + phi_o)/2
 
