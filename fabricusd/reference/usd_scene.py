@@ -102,6 +102,10 @@ class _Reader:
                 continue
             matrix = before @ as_matrix(cache.GetLocalToWorldTransform(prim))
             if prim.IsA(UsdGeom.Mesh):
+                if is_light(prim):
+                    self.scene.note(
+                        str(prim.GetPath()), "shines as a light, left out: it is a mesh alone"
+                    )
                 mesh = read_mesh(prim, self.time, matrix, self.metres, self.materials, self.scene)
                 if mesh is not None:
                     self.scene.meshes.append(mesh)
