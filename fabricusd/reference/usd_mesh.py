@@ -12,6 +12,17 @@ from fabricusd.reference.polygons import triangulate
 from fabricusd.reference.scene import Mesh, Scene
 from fabricusd.reference.usd_material import Materials, Resolved
 
+_OF_UVS = (
+    Sdf.ValueTypeNames.TexCoord2fArray,
+    Sdf.ValueTypeNames.TexCoord2dArray,
+    Sdf.ValueTypeNames.TexCoord2hArray,
+    Sdf.ValueTypeNames.Float2Array,
+)
+"""Types of primvars that are taken for UVs whatever their name."""
+
+_FARTHEST = 1e9
+"""Metres from the origin: beyond it squares of areas leave the range of 32-bit numbers."""
+
 
 def read_mesh(
     prim: Usd.Prim,
@@ -37,6 +48,8 @@ def read_mesh(
     scheme = str(mesh.GetSubdivisionSchemeAttr().Get(time) or "none")
     if scheme != "none":
         scene.note(where, f"is a subdivision surface ({scheme}), rendered at its cage")
+    if (counts < 3).any():
+        scene.note(where, f"has {int((counts < 3).sum())} faces below three corners, left out")
     faces, corners = triangulate(points, counts, indices)
     holes = np.array(mesh.GetHoleIndicesAttr().Get(time) or [], np.int64)
     if len(holes):
@@ -45,17 +58,21 @@ def read_mesh(
     left_handed = mesh.GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded
     if left_handed != (np.linalg.det(matrix[:3, :3]) < 0):
         corners = corners[:, ::-1]
-    resolved, which = _materials(prim, mesh, materials, len(counts))
+    resolved, which = _materials(prim, mesh, materials, len(counts), time, scene)
     uv, missing = _uv(prim, resolved, which[faces], faces, corners, indices, time, where, scene)
     numbers = np.array([r.index for r in resolved], np.int32)[which[faces]]
     if missing.any():
         scene.note(where, "has no UVs for its fabric; it is rendered grey")
         numbers = np.where(missing, materials.without_uv().index, numbers)
-    normals = _normals(prim, mesh, faces, corners, indices, time, matrix)
-    world = points @ matrix[:3, :3].T + matrix[:3, 3]
+    normals = _normals(prim, mesh, faces, corners, indices, time, matrix, scene)
+    world = (points @ matrix[:3, :3].T + matrix[:3, 3]) * metres
+    far = np.isfinite(world).all(axis=1) & (np.abs(world) > _FARTHEST).any(axis=1)
+    if far.any():
+        scene.note(where, f"has {int(far.sum())} points beyond {_FARTHEST:g} m, which do not count")
+        world[far] = np.nan
     return Mesh(
         path=where,
-        points=world * metres,
+        points=world,
         triangles=indices[corners],
         normals=normals,
         uv=uv,
@@ -76,7 +93,12 @@ def _problem(points: Any, counts: Any, indices: Any) -> str:
 
 
 def _materials(
-    prim: Usd.Prim, mesh: UsdGeom.Mesh, materials: Materials, faces: int
+    prim: Usd.Prim,
+    mesh: UsdGeom.Mesh,
+    materials: Materials,
+    faces: int,
+    time: Usd.TimeCode,
+    scene: Scene,
 ) -> tuple[list[Resolved], NDArray[np.int64]]:
     """The mesh's surfaces, and which of them each face has."""
     resolved = [materials.of(prim)]
@@ -85,8 +107,15 @@ def _materials(
         own = materials.of(subset.GetPrim())
         if own is None or subset.GetElementTypeAttr().Get() != UsdGeom.Tokens.face:
             continue
-        chosen = np.array(subset.GetIndicesAttr().Get() or [], np.int64)
-        which[chosen[(chosen >= 0) & (chosen < faces)]] = len(resolved)
+        named = np.array(subset.GetIndicesAttr().Get(time) or [], np.int64)
+        chosen = named[(named >= 0) & (named < faces)]
+        where = str(subset.GetPath())
+        if len(chosen) < len(named):
+            scene.note(where, f"names {len(named) - len(chosen)} faces that are none, left out")
+        if (which[chosen] > 0).any():
+            taken = int((which[chosen] > 0).sum())
+            scene.note(where, f"takes {taken} faces from another subset; the last one has them")
+        which[chosen] = len(resolved)
         resolved.append(own)
     first = resolved[0] or (materials.fallback(prim) if (which == 0).any() else resolved[-1])
     return [first, *(r for r in resolved[1:] if r is not None)], which  # type: ignore[list-item]
@@ -113,11 +142,19 @@ def _uv(
         if not mine.any():
             continue
         primvar = _uv_primvar(prim, surface, where, scene)
-        values = _at_corners(primvar, faces, corners, indices, time) if primvar else None
+        values = _at_corners(primvar, faces, corners, indices, time, 2) if primvar else None
+        if primvar and values is None:
+            scene.note(
+                where, f"has a UV set '{primvar.GetPrimvarName()}' that does not fit its faces"
+            )
         if values is None:
             missing |= mine & surface.is_fabric
             continue
         found = True
+        broken = ~np.isfinite(values[mine])
+        if broken.any():
+            count = int(broken.any(axis=(1, 2)).sum())
+            scene.note(where, f"has UVs that are not finite on {count} triangles; they count as 0")
         uv[mine] = values[mine]
     return (uv if found else None), missing
 
@@ -132,10 +169,7 @@ def _uv_primvar(
     if primvar and primvar.HasValue():
         return primvar
     for other in api.GetPrimvarsWithValues():
-        kind = other.GetTypeName()
-        if kind in (Sdf.ValueTypeNames.TexCoord2fArray, Sdf.ValueTypeNames.Float2Array) or (
-            kind == Sdf.ValueTypeNames.TexCoord2dArray
-        ):
+        if other.GetTypeName() in _OF_UVS:
             if surface.uv_set:
                 scene.note(
                     where, f"has no UV set '{name}'; '{other.GetPrimvarName()}' is taken instead"
@@ -150,14 +184,18 @@ def _at_corners(
     corners: NDArray[np.int64],
     indices: NDArray[np.int64],
     time: Usd.TimeCode,
+    width: int,
 ) -> NDArray[np.float64] | None:
-    """(m, 3, c) values of a primvar at the triangles' corners; None where its length is wrong."""
+    """(m, 3, width) values of a primvar at the triangles' corners; None where its type or its
+    length are others."""
     values = primvar.ComputeFlattened(time)
-    if values is None or not len(values):
+    try:
+        array = np.array([] if values is None else values, np.float64)
+    except (TypeError, ValueError):
         return None
-    return _spread(
-        np.array(values, np.float64), primvar.GetInterpolation(), faces, corners, indices
-    )
+    if array.ndim != 2 or array.shape[1] < width:
+        return None
+    return _spread(array[:, :width], primvar.GetInterpolation(), faces, corners, indices)
 
 
 def _spread(
@@ -184,20 +222,22 @@ def _normals(
     indices: NDArray[np.int64],
     time: Usd.TimeCode,
     matrix: NDArray[np.float64],
+    scene: Scene,
 ) -> NDArray[np.float64] | None:
     """(m, 3, 3) authored normals in world space, or None; the primvar wins over the attribute."""
     values = None
     primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals")
+    authored = mesh.GetNormalsAttr().Get(time)
     if primvar and primvar.HasValue():
-        values = _at_corners(primvar, faces, corners, indices, time)
+        values = _at_corners(primvar, faces, corners, indices, time, 3)
+    elif authored is not None and len(authored):
+        values = _spread(
+            np.array(authored, np.float64), mesh.GetNormalsInterpolation(), faces, corners, indices
+        )
     else:
-        authored = mesh.GetNormalsAttr().Get(time)
-        if authored is not None and len(authored):
-            values = _spread(
-                np.array(authored, np.float64), mesh.GetNormalsInterpolation(), faces, corners,
-                indices,
-            )  # fmt: skip
+        return None
     if values is None:
+        scene.note(str(prim.GetPath()), "has normals that do not fit its faces; it is smoothed")
         return None
     # Normals turn by the inverse transpose; rows here are normals.
     return np.asarray(values @ np.linalg.pinv(matrix[:3, :3]))
