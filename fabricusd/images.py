@@ -15,6 +15,9 @@ from fabricusd.errors import FabricError, one_line
 from fabricusd.files import readable_file, whole_file
 from fabricusd.srgb import linear_from_srgb
 
+REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+"""x and y of red, green, blue and white: the colours in which everything is rendered."""
+
 OPENIMAGEIO: str = oiio.VERSION_STRING
 """Which version of the library reads and writes."""
 
@@ -65,8 +68,12 @@ def write_exr(
     spec.channelnames = tuple(names)
     spec.attribute("compression", "zip")
     spec.attribute("oiio:ColorSpace", "lin_rec709")
+    spec.attribute("chromaticities", "float[8]", REC_709)
     for key, value in metadata.items():
-        spec.attribute(key, value if isinstance(value, int | float | str) else str(value))
+        # Its integers have 32 bits.
+        fits = not isinstance(value, int) or -(2**31) <= value < 2**31
+        kept = isinstance(value, int | float | str) and fits
+        spec.attribute(key, value if kept else str(value))
     _write(path, spec, data)
 
 

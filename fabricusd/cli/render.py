@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import os
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -31,7 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help=".exr or .png")
     parser.add_argument("--fabric", metavar="FILE[:/PRIM]", help="fabric file, draft or preset")
     parser.add_argument("--camera", metavar="PATH", help="prim path (default: the first camera)")
-    parser.add_argument("--width", type=int, default=960)
+    parser.add_argument(
+        "--width", type=int, default=960, help="the camera's horizontal aperture fills it"
+    )
     parser.add_argument("--height", type=int, default=540)
     parser.add_argument("--spp", type=int, metavar="N", help="samples a pixel (default: 64)")
     parser.add_argument(
@@ -58,12 +62,10 @@ def run(options: argparse.Namespace) -> int:
     """Render, and say what was left out."""
     from fabricusd.reference import AOVS, read_scene, render
 
-    frames = parse_frames(options.frames) if options.frames else None
+    frames = None if options.frames is None else parse_frames(options.frames)
     output = Path(options.output)
     if options.no_clobber:
-        for path in {output, output.with_suffix(".png")}:
-            if path.exists():
-                raise FabricError(str(path), "exists; it must be a new name with --no-clobber")
+        _refuse_existing(output, frames)
     fabric = None
     if options.fabric:
         from fabricusd.schema.anysource import load_any
@@ -101,6 +103,15 @@ def run(options: argparse.Namespace) -> int:
         print("fabricusd: interrupted; what was done is kept", file=sys.stderr)
         return 130
     return 1 if options.noise and result.noise > options.noise else 0
+
+
+def _refuse_existing(output: Path, frames: tuple[float, ...] | None) -> None:
+    from fabricusd.reference.render import frame_files, written_files
+
+    for _, target in frame_files(output, frames):
+        for path in written_files(target):
+            if os.path.lexists(path):
+                raise FabricError(str(path), "exists; it must be a new name with --no-clobber")
 
 
 def _choose(options: argparse.Namespace, fabric: Fabric | None) -> None:
@@ -150,14 +161,16 @@ def _progress(
 
 
 def parse_frames(text: str) -> tuple[float, ...]:
-    """`1-10`, `1-10x2`, `7`, `1,4,9-12` -> time codes."""
+    """`1-10`, `1-10x2`, `7`, `-5--1`, `1,4,9-12` -> time codes."""
+    number = r"(-?[0-9.]+)"
     codes: list[float] = []
     for part in text.split(","):
-        span, _, step = part.partition("x")
-        first, dash, last = span.strip().partition("-")
+        found = re.fullmatch(rf"{number}(?:-{number})?(?:x([0-9.]+))?", part.strip())
         try:
-            a, b = float(first), float(last if dash else first)
-            stride = float(step or 1)
+            if found is None:
+                raise ValueError
+            first, last, step = found.groups()
+            a, b, stride = float(first), float(last or first), float(step or 1)
         except ValueError:
             raise FabricError("--frames", f"is '{text}'; it must be as in 1-10 or 1-10x2") from None
         if not (stride > 0 and b >= a and (b - a) / stride < MOST_FRAMES):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ def read_mesh_file(path: Path, binding: Binding | None) -> Scene:
     import trimesh
 
     try:
-        loaded: Any = trimesh.load_scene(path, process=False)
+        loaded: Any = _load(path)
         nodes = [(name, *loaded.graph[name]) for name in loaded.graph.nodes_geometry]
     except Exception as error:
         words = " ".join(str(error).split())[:200]
@@ -30,6 +31,8 @@ def read_mesh_file(path: Path, binding: Binding | None) -> Scene:
     scene.materials.append(cloth)
     if binding is not None:
         scene.materials.append(FabricSurface(name=binding.fabric.name, binding=binding))
+    else:
+        scene.note(path.name, "is rendered grey: no fabric is named for it")
     for node, transform, geometry in nodes:
         part = loaded.geometry[geometry]
         faces = getattr(part, "faces", None)
@@ -46,15 +49,29 @@ def read_mesh_file(path: Path, binding: Binding | None) -> Scene:
                 scene.note(name, "has no UVs; it is rendered grey instead of as a fabric")
             else:
                 material = 1
+        # A transform that mirrors turns every triangle's front to its back.
+        order = [0, 2, 1] if np.linalg.det(transform[:3, :3]) < 0 else [0, 1, 2]
         scene.meshes.append(
             Mesh(
                 path=name,
                 points=trimesh.transform_points(np.asarray(part.vertices), transform),
-                triangles=np.asarray(faces),
-                uv=uv,
+                triangles=np.asarray(faces)[:, order],
+                uv=None if uv is None else uv[:, order],
                 material=np.full(len(faces), material, np.int32),
             )
         )
     if not scene.meshes:
         raise FabricError(str(path), "holds no triangles")
     return scene
+
+
+def _load(path: Path) -> Any:
+    import trimesh
+
+    if path.suffix.lower() != ".obj":
+        return trimesh.load_scene(path, process=False)
+    # Comments and names in another encoding are no reason to refuse the numbers.
+    text = path.read_bytes().decode("utf-8", "replace")
+    return trimesh.load_scene(
+        io.StringIO(text), file_type="obj", process=False, skip_materials=True
+    )

@@ -33,6 +33,8 @@ def read_scene(
     if suffix in MESH_SUFFIXES:
         from fabricusd.reference.mesh_file import read_mesh_file
 
+        if camera is not None:
+            raise FabricError(f"{path}:{camera}", f"is no camera; {suffix} files have none")
         return read_mesh_file(path, binding)
     from fabricusd.reference.usd_scene import read_usd_scene
 

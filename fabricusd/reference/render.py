@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 import time
@@ -10,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,6 +28,7 @@ from fabricusd.reference.film import AOVS, Film, require_aovs
 from fabricusd.reference.integrator import Tracer
 from fabricusd.reference.read import read_scene
 from fabricusd.reference.scene import Scene
+from fabricusd.reference.stop import Stop
 from fabricusd.reference.view_transform import view
 from fabricusd.reference.wave import Wave
 from fabricusd.reference.workers import Batches, pixels_along_z_curve, worker_count
@@ -106,7 +109,7 @@ def render(
     Raises `FabricError` for what cannot be rendered at all; what had to be left out is in the
     result's `notes`. On Ctrl-C what is done is written, and `complete` is False.
     """
-    _require_settings(width, height, spp, noise)
+    _require_settings(width, height, spp, noise, exposure, seed)
     if shadow not in METHODS:
         raise FabricError("shadow", f"is '{shadow}'; it must be one of {', '.join(METHODS)}")
     layers = tuple(dict.fromkeys(("beauty", *aovs)))
@@ -115,27 +118,36 @@ def render(
     compile_ahead()
     result: RenderResult | None = None
     paths: tuple[str, ...] = ()
-    for time_code, target in targets:
-        loaded = (
-            scene
-            if isinstance(scene, Scene)
-            else read_scene(scene, fabric=fabric, camera=camera, time_code=time_code)
-        )
-        result = render_scene(
-            loaded, width=width, height=height, spp=spp, noise=noise, max_bounces=max_bounces,
-            level=level, shadow=shadow, limits=limits, aovs=layers, seed=seed, workers=workers,
-            pixel_filter=pixel_filter, estimator=estimator, progress=progress,
-        )  # fmt: skip
-        if target is not None:
-            own = loaded.camera.exposure if loaded.camera else 0.0
-            paths += _write(target, result, exposure + own)
-        if not result.complete:
-            break
+    with Stop() as stop:
+        for time_code, target in targets:
+            loaded = (
+                scene
+                if isinstance(scene, Scene)
+                else read_scene(scene, fabric=fabric, camera=camera, time_code=time_code)
+            )
+            result = render_scene(
+                loaded, width=width, height=height, spp=spp, noise=noise, max_bounces=max_bounces,
+                level=level, shadow=shadow, limits=limits, aovs=layers, seed=seed, workers=workers,
+                pixel_filter=pixel_filter, estimator=estimator, progress=progress, stop=stop,
+            )  # fmt: skip
+            stops = exposure + (loaded.camera.exposure if loaded.camera else 0.0)
+            result.metadata.update(_asked_for(scene, time_code, stops))
+            if target is not None:
+                paths += _write(target, result, stops)
+            stop.release()
+            if stop.asked or not result.complete:
+                break
     assert result is not None
-    return replace(result, paths=paths)
+    return replace(result, paths=paths, complete=result.complete and target == targets[-1][1])
 
 
-def _require_settings(width: int, height: int, spp: int | None, noise: float | None) -> None:
+def _require_settings(
+    width: int, height: int, spp: int | None, noise: float | None, exposure: float, seed: int
+) -> None:
+    if not math.isfinite(exposure):
+        raise FabricError("exposure", f"is {exposure}; it must be a number of stops")
+    if not -(2**63) <= seed < 2**63:
+        raise FabricError("seed", f"is {seed}; it must fit into 64 bits")
     for name, value in (("width", width), ("height", height), ("spp", spp)):
         if value is not None and not 1 <= value <= 65536:
             raise FabricError(name, f"is {value}; it must be from 1 to 65536")
@@ -156,6 +168,16 @@ def _targets(
         raise FabricError(str(path), f"is in '{path.parent}', which is no directory; make it first")
     if not os.access(path.parent, os.W_OK):
         raise FabricError(str(path), f"cannot be written: '{path.parent}' is read-only")
+    targets = frame_files(path, frames)
+    for _, target in targets:
+        for file in written_files(target):
+            if file.is_dir():
+                raise FabricError(str(file), "is a directory; it must be a file's name")
+    return [*targets]
+
+
+def frame_files(path: Path, frames: tuple[float, ...] | None) -> list[tuple[float | None, Path]]:
+    """(time code, file) of each picture: `path` itself, or numbered before its suffix."""
     if not frames:
         return [(None, path)]
     return [
@@ -166,14 +188,29 @@ def _targets(
     ]
 
 
+def written_files(target: Path) -> list[Path]:
+    """All that is written for one picture: an EXR has a PNG beside it."""
+    return list(dict.fromkeys([target, target.with_suffix(".png")]))
+
+
+def _asked_for(source: Any, time_code: float | None, stops: float) -> dict[str, Any]:
+    """What a picture's metadata say of where it comes from and how its PNG was made."""
+    known: dict[str, Any] = {"fabricusd:exposure": stops}
+    if not isinstance(source, Scene):
+        known["fabricusd:scene"] = os.fspath(source)
+    if time_code is not None:
+        known["fabricusd:timeCode"] = float(time_code)
+    return known
+
+
 def _write(target: Path, result: RenderResult, exposure: float) -> tuple[str, ...]:
     """The picture's files; returns their names."""
     picture = view(result.layers["beauty"][..., :3], exposure)
-    png = target.with_suffix(".png")
+    files = written_files(target)
     if target.suffix.lower() == ".exr":
         write_exr(target, result.layers, AOVS, result.metadata)
-    write_png(png, picture)
-    return (str(target),) if target == png else (str(target), str(png))
+    write_png(files[-1], picture)
+    return tuple(str(file) for file in files)
 
 
 def render_scene(
@@ -194,12 +231,19 @@ def render_scene(
     estimator: str = "mis",
     sampler: str = "sobol",
     progress: Progress | None = None,
+    stop: Stop | None = None,
 ) -> RenderResult:
-    """As `render`, for a `Scene` in memory, without files."""
+    """As `render`, for a `Scene` in memory, without files.
+
+    stop : what asks for an end; it holds from the first sample on, and is the caller's to release
+    """
     begun = time.perf_counter()
     most = spp or (MOST_SAMPLES if noise else 64)
     if not scene.lights:
         scene.lights = default_lights(scene)
+        scene.note("the scene", "has no light; a sky and a key light are added")
+    if scene.camera is None:
+        scene.note("the scene", "has no camera; one that sees all of it from the front is taken")
     camera = scene.camera or default_camera(scene, width, height)
     tracer = Tracer(
         scene, max_bounces=max_bounces, level=level, shadow=shadow, limits=limits, seed=seed,
@@ -213,7 +257,9 @@ def render_scene(
     count = worker_count(workers)
     counters = np.zeros((count, 3), np.int64)
     built, busy = time.perf_counter(), time.process_time()
-    complete = _sample(tracer, lens, film, count, counters, most, noise, progress, built)
+    stop = stop or Stop()
+    stop.hold()
+    complete = _sample(tracer, lens, film, count, counters, most, noise, progress, built, stop)
     seconds, busy = time.perf_counter() - built, time.process_time() - busy
     rays, shadow_rays, not_finite = (int(x) for x in counters.sum(axis=0))
     if not_finite:
@@ -227,6 +273,9 @@ def render_scene(
         "fabricusd:embree": embree,
         "fabricusd:python": platform.python_version(),
         "fabricusd:numpy": np.__version__,
+        "fabricusd:numba": numba.__version__,
+        "fabricusd:estimator": estimator, "fabricusd:sampler": sampler,
+        "fabricusd:limits": str(limits),
         "fabricusd:samples": most, "fabricusd:noise": noise or 0.0,
         "fabricusd:maxBounces": max_bounces, "fabricusd:level": level, "fabricusd:shadow": shadow,
         "fabricusd:seed": seed, "fabricusd:workers": count, "fabricusd:pixelFilter": pixel_filter,
@@ -266,6 +315,7 @@ def _sample(
     noise: float | None,
     progress: Progress | None,
     begun: float,
+    stop: Stop,
 ) -> bool:
     """Passes over the picture until every pixel has `most` samples or is quiet enough."""
     order = pixels_along_z_curve(film.width, film.height)
@@ -301,7 +351,7 @@ def _sample(
                     min(part, 1.0) if noise is None else 1 - share, time.perf_counter() - begun
                 )
 
-        if not Batches(workers, task).run(len(starts), report):
+        if not Batches(workers, task, stop).run(len(starts), report):
             return False
         done += samples
         if noise is not None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
+from fabricusd.reference.stop import Stop
 
 
 def worker_count(workers: int | None) -> int:
@@ -42,14 +43,17 @@ def _spread(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
 class Batches:
     """Work on numbered batches by several workers, in any order.
 
-    The calling thread waits; on Ctrl-C no further batch is begun, those begun are finished, and
-    `run` returns False. An error in a worker stops the others likewise and is raised here.
+    The calling thread waits; on Ctrl-C, or when `stop` is asked, no further batch is begun, those
+    begun are finished, and `run` returns False. An error in a worker stops the others likewise and
+    is raised here.
     """
 
-    def __init__(self, workers: int, task: Callable[[int, int], None]) -> None:
+    def __init__(
+        self, workers: int, task: Callable[[int, int], None], stop: Stop | None = None
+    ) -> None:
         self.workers = workers
         self.task = task
-        self.stopped = False
+        self.stop = stop or Stop()
 
     def run(self, count: int, progress: Callable[[int], Any] | None = None) -> bool:
         """Call `task(worker, batch)` for every batch below `count`; False where interrupted."""
@@ -60,7 +64,7 @@ class Batches:
             while True:
                 with lock:
                     batch = state["next"]
-                    if batch >= count or state["error"] is not None or self.stopped:
+                    if batch >= count or state["error"] is not None or self.stop.asked:
                         return
                     state["next"] += 1
                 try:
@@ -87,7 +91,7 @@ class Batches:
                 if progress is not None:
                     progress(state["done"])
             except KeyboardInterrupt:
-                self.stopped = True
+                self.stop.asked = True
         if state["error"] is not None:
             raise state["error"]
-        return not self.stopped
+        return bool(state["done"] == count)

@@ -6,6 +6,7 @@ import threading
 import time
 
 import numpy as np
+import OpenEXR
 import pytest
 from pxr import Usd, UsdGeom
 
@@ -19,6 +20,7 @@ from fabricusd.reference.view_transform import srgb_decode, srgb_encode, tone_cu
 from fabricusd.reference.workers import Batches
 from fabricusd.schema import load
 from tests.reference.scenes import cloth, grid, lambert
+from tests.reference.stages import new_stage, square
 
 
 @pytest.fixture
@@ -42,6 +44,32 @@ def test_an_exr_holds_every_layer_and_all_settings(tmp_path, scene):
     assert int(metadata["fabricusd:rays"]) == r.rays
     assert metadata.get("fabricusd:notes", "") == "\n".join(r.notes)
     assert r.paths == (str(out), str(tmp_path / "x.png"))
+
+
+def test_other_readers_find_names_types_colours_and_where_a_picture_is_from(tmp_path):
+    stage = new_stage(tmp_path)
+    square(stage)
+    stage.GetRootLayer().Save()
+    out = tmp_path / "x.exr"
+    render(tmp_path / "scene.usda", out, width=6, height=4, spp=1, aovs=("depth",), frames=(2.5,),
+           exposure=1.5)  # fmt: skip
+    [part] = OpenEXR.File(str(tmp_path / "x.02.5.exr"), separate_channels=True).parts
+    names = {"R", "G", "B", "A", "depth.Z"}
+    assert set(part.channels) == names
+    assert {part.channels[name].pixels.dtype for name in names} == {np.dtype(np.float32)}
+    assert part.header["chromaticities"] == pytest.approx(
+        (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
+    )
+    assert part.header["dataWindow"][1].tolist() == [5, 3]
+    assert part.header["fabricusd:scene"] == str(tmp_path / "scene.usda")
+    assert part.header["fabricusd:timeCode"] == 2.5
+    assert part.header["fabricusd:exposure"] == 1.5
+
+
+def test_a_scene_without_light_or_camera_says_what_it_got(scene):
+    r = render(scene, width=8, height=8, spp=1)
+    assert [n for n in r.notes if "has no light; a sky and a key light are added" in n]
+    assert [n for n in r.notes if "has no camera; one that sees all of it" in n]
 
 
 def test_beauty_is_direct_plus_indirect(scene):

@@ -1,0 +1,57 @@
+"""Ctrl-C, and the signal by which other programs ask for an end, without losing a picture."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType, TracebackType
+from typing import Any
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Stop:
+    """While it is entered, signals that ask for an end raise KeyboardInterrupt, as Ctrl-C does.
+
+    Between `hold` and `release` they only set `asked`, however often they come: a picture is being
+    made or written, and whoever makes it looks at `asked`. Handlers that the caller has installed
+    are left alone, and so is every thread but the main one, which alone may have any.
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._held = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> Stop:
+        if threading.current_thread() is threading.main_thread():
+            for number in SIGNALS:
+                before = signal.getsignal(number)
+                if before in (signal.default_int_handler, signal.SIG_DFL):
+                    signal.signal(number, self._hear)
+                    self._before[number] = before
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        for number, before in self._before.items():
+            signal.signal(number, before)
+
+    def hold(self) -> None:
+        """From here on only set `asked`; raises what came before and was lost in a library."""
+        self._held = True
+        if self.asked:
+            raise KeyboardInterrupt
+
+    def release(self) -> None:
+        """From here on raise again."""
+        self._held = False
+
+    def _hear(self, number: int, frame: FrameType | None) -> None:
+        self.asked = True
+        if not self._held:
+            raise KeyboardInterrupt

@@ -1,0 +1,83 @@
+"""Ctrl-C and SIGTERM, once and often: what is done is kept, and files are whole."""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+import pytest
+
+from fabricusd.images import read_exr_layers
+from fabricusd.reference.render import render
+from fabricusd.reference.scene import Scene
+from fabricusd.reference.stop import SIGNALS, Stop
+from tests.reference.scenes import grid, lambert
+from tests.reference.stages import new_stage, square
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_signal_raises_until_it_is_held_and_is_remembered_then(number):
+    with Stop() as stop:
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(number)
+        with pytest.raises(KeyboardInterrupt):
+            stop.hold()
+        signal.raise_signal(number)
+        signal.raise_signal(number)
+        assert stop.asked
+        stop.release()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(number)
+
+
+def test_handlers_are_given_back_and_those_of_others_left_alone():
+    def other(number, frame):
+        heard.append(number)
+
+    heard: list[int] = []
+    before = signal.getsignal(signal.SIGINT)
+    kept = signal.signal(signal.SIGTERM, other)
+    try:
+        with Stop() as stop:
+            assert signal.getsignal(signal.SIGINT) != before
+            signal.raise_signal(signal.SIGTERM)
+            assert not stop.asked
+        assert heard == [signal.SIGTERM]
+        assert signal.getsignal(signal.SIGINT) == before
+    finally:
+        signal.signal(signal.SIGTERM, kept)
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_picture_is_kept_however_often_it_is_interrupted(tmp_path, number):
+    def impatient(share, seconds):
+        signal.raise_signal(number)
+        signal.raise_signal(number)
+
+    scene = Scene(meshes=[grid()], materials=[lambert(0.5)])
+    out = tmp_path / "x.exr"
+    r = render(scene, out, width=64, height=64, spp=4096, progress=impatient, aovs=("samples",))
+    assert not r.complete
+    assert 0 < r.samples < 4096
+    assert read_exr_layers(out)[1]["fabricusd:complete"] == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["x.exr", "x.png"]
+
+
+def test_an_interrupt_in_a_frames_last_moments_leaves_out_the_next_ones(tmp_path, monkeypatch):
+    stage = new_stage(tmp_path)
+    square(stage)
+    stage.GetRootLayer().Save()
+    module = sys.modules[render.__module__]
+
+    write = module.write_png
+
+    def interrupted(*given, **named):
+        signal.raise_signal(signal.SIGINT)
+        write(*given, **named)
+
+    monkeypatch.setattr(module, "write_png", interrupted)
+    r = render(
+        tmp_path / "scene.usda", tmp_path / "x.exr", width=8, height=8, spp=1, frames=(1, 2, 3)
+    )
+    assert not r.complete
+    assert [p.rsplit("/", 1)[1] for p in r.paths] == ["x.0001.exr", "x.0001.png"]
