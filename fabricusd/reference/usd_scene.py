@@ -34,6 +34,9 @@ _OF_PROTOTYPES = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
 _DETAIL = 1e-5
 """Size of a mesh over that of the scene below which 32-bit coordinates show."""
 
+_SMALLEST = 1e-6
+"""Width of a scene [m] below which its unit must be wrong; 32-bit numbers end at a thousandth."""
+
 assert fabricusd.schema.PLUGIN_PATH
 
 
@@ -140,14 +143,14 @@ class _Reader:
         walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(which)))
         for prim in walk:
             imageable = UsdGeom.Imageable(prim)
-            if imageable:
-                hidden = imageable.GetVisibilityAttr().Get(self.time) == UsdGeom.Tokens.invisible
-                if hidden or imageable.ComputePurpose() not in _PURPOSES:
-                    walk.PruneChildren()
-                    continue
-            if prim.IsA(UsdGeom.PointInstancer):
+            hidden = imageable and (
+                imageable.GetVisibilityAttr().Get(self.time) == UsdGeom.Tokens.invisible
+            )
+            if hidden or prim.IsA(UsdGeom.PointInstancer):
                 walk.PruneChildren()
-            yield prim
+            # A purpose is handed down only to those that have none of their own.
+            if not hidden and not (imageable and imageable.ComputePurpose() not in _PURPOSES):
+                yield prim
 
     def _instances(
         self, prim: Usd.Prim, world: NDArray[np.float64], inside: tuple[Sdf.Path, ...]
@@ -214,6 +217,8 @@ def _note_small_meshes(scene: Scene) -> None:
         return
     low, high = np.min([b[1] for b in boxes], axis=0), np.max([b[2] for b in boxes], axis=0)
     whole = float(np.linalg.norm(high - low))
+    if 0 < whole < _SMALLEST:
+        scene.note("the scene", f"is {whole:.3g} m wide; is metersPerUnit right?")
     for mesh, low, high in boxes:
         size = float(np.linalg.norm(high - low))
         if 0 < size < _DETAIL * whole:

@@ -74,7 +74,8 @@ def compose_stage(path: str) -> Usd.Stage:
         stage = Usd.Stage.Open(layer)
         for used in stage.GetUsedLayers():
             # The process may hold an older reading of the file; edits nobody saved are kept.
-            if not used.dirty and not used.anonymous:
+            # Reloading one may have let go of another.
+            if not used.expired and not used.dirty and not used.anonymous:
                 used.Reload()
         return stage
     finally:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 
 import numpy as np
 import pytest
@@ -285,3 +286,34 @@ def test_the_same_file_is_read_as_it_is_now(tmp_path):
     text = stage.GetRootLayer().ExportToString()
     (tmp_path / "scene.usda").write_text(text + text[text.index("def") :].replace("square", "two"))
     assert len(read_scene(path).meshes) == 2
+
+
+def test_a_purpose_of_its_own_goes_before_that_of_a_parent(tmp_path):
+    stage = new_stage(tmp_path)
+    for name in ("/proxy/square", "/proxy/final"):
+        square(stage, name)
+    UsdGeom.Xform.Define(stage, "/proxy").CreatePurposeAttr("proxy")
+    UsdGeom.Mesh(stage.GetPrimAtPath("/proxy/final")).CreatePurposeAttr("render")
+    assert [m.path for m in read(stage).meshes] == ["/proxy/final"]
+
+
+def test_layers_that_are_no_longer_used_do_not_stop_the_next_reading(tmp_path):
+    from fabricusd.reference.read import read_scene
+
+    scene = tmp_path / "scene.usda"
+    names = [f"part{k}.usda" for k in range(8)]
+    for name in names:
+        (tmp_path / name).write_text('#usda 1.0\n(\n defaultPrim="p"\n)\ndef "p" {\n}\n')
+    parts = "".join(f'def "a{k}" (references=@./{n}@) {{\n}}\n' for k, n in enumerate(names))
+    scene.write_text("#usda 1.0\n" + parts)
+    held = Usd.Stage.Open(str(scene))
+    scene.write_text('#usda 1.0\ndef "b" {\n}\n')
+    os.utime(scene, (1, 1))
+    assert read_scene(scene).meshes == []
+    assert held.GetPrimAtPath("/b")
+
+
+def test_a_scene_of_a_millionth_of_a_metre_asks_for_its_unit(tmp_path):
+    stage = new_stage(tmp_path, metres=1e-8)
+    square(stage)
+    assert any("is metersPerUnit right?" in note for note in read(stage).notes)
