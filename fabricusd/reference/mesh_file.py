@@ -68,10 +68,12 @@ def read_mesh_file(path: Path, binding: Binding | None) -> Scene:
 def _load(path: Path) -> Any:
     import trimesh
 
-    if path.suffix.lower() != ".obj":
-        return trimesh.load_scene(path, process=False)
-    # Comments and names in another encoding are no reason to refuse the numbers.
-    text = path.read_bytes().decode("utf-8", "replace")
-    return trimesh.load_scene(
-        io.StringIO(text), file_type="obj", process=False, skip_materials=True
-    )
+    if path.suffix.lower() == ".obj":
+        content = path.read_bytes()
+        try:
+            content.decode("utf-8")
+        except UnicodeDecodeError:
+            # Comments and names in another encoding are no reason to refuse the numbers.
+            text = io.StringIO(content.decode("utf-8", "replace"))
+            return trimesh.load_scene(text, file_type="obj", process=False, skip_materials=True)
+    return trimesh.load_scene(path, process=False)

@@ -21,11 +21,12 @@ a purpose."""
 
 @dataclass(frozen=True)
 class Resolved:
-    """A material's number in the scene, and the UV set that it asks for ("" for any)."""
+    """A material's number in the scene, the UV set that it asks for ("" for any), and what for."""
 
     index: int
     uv_set: str
     is_fabric: bool
+    is_textured: bool
 
 
 class Materials:
@@ -133,7 +134,9 @@ class Materials:
 
     def _add(self, surface: Any, uv_set: str) -> Resolved:
         self.scene.materials.append(surface)
-        return Resolved(len(self.scene.materials) - 1, uv_set, isinstance(surface, FabricSurface))
+        is_fabric = isinstance(surface, FabricSurface)
+        is_textured = not is_fabric and bool(surface.textures)
+        return Resolved(len(self.scene.materials) - 1, uv_set, is_fabric, is_textured)
 
     def _fabric(self, binding: Binding) -> Resolved:
         for key, known in self._known.items():

@@ -149,6 +149,8 @@ def _uv(
             )
         if values is None:
             missing |= mine & surface.is_fabric
+            if surface.is_textured:
+                scene.note(where, "has no UVs for its textures; they are read at (0, 0)")
             continue
         found = True
         broken = ~np.isfinite(values[mine])

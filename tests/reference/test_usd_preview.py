@@ -241,6 +241,12 @@ def reader_of_a_colour(stage, tmp_path):
     bind(stage)
 
 
+def no_uvs(stage, tmp_path):
+    rgba(tmp_path / "a.png")
+    square(stage, uv=False)
+    textured(stage, "diffuseColor", "rgb", "./a.png")
+
+
 def tiles_missing(stage, tmp_path):
     textured(stage, "diffuseColor", "rgb", "./lost.<UDIM>.png")
 
@@ -250,6 +256,7 @@ FAULTS = {
     "a scale of one number": (scale_is_one_number, "scale 2.0"),
     "a texture with values that are not finite": (texture_with_nan, "has 6 values"),
     "a colour from a primvar": (reader_of_a_colour, "UsdPrimvarReader_float3"),
+    "a texture without UVs": (no_uvs, "/square has no UVs for its textures"),
     "tiles that are missing": (tiles_missing, "has no tiles"),
     "a material that is nowhere": (
         lambda stage, _: UsdShade.MaterialBindingAPI.Apply(square(stage).GetPrim())
