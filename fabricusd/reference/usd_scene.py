@@ -36,14 +36,16 @@ def read_usd_scene(
     binding: Binding | None = None,
     camera: str | None = None,
     time_code: float | None = None,
+    level: int = 0,
 ) -> Scene:
     """Everything visible on the stage at `time_code`; its earliest time where that is None.
 
     binding : on meshes without a material of their own
     camera : prim path; the first camera on the stage where that is None
+    level : how often the edges of subdivision surfaces are halved; 0 for their cages
     """
     stage, notes = _open(path)
-    return _Reader(stage, notes, binding, time_code).read(path, camera)
+    return _Reader(stage, notes, binding, time_code, level).read(path, camera)
 
 
 def _open(path: Path) -> tuple[Usd.Stage, list[str]]:
@@ -67,9 +69,15 @@ def as_matrix(matrix: Any) -> NDArray[np.float64]:
 
 class _Reader:
     def __init__(
-        self, stage: Usd.Stage, notes: list[str], binding: Binding | None, time_code: float | None
+        self,
+        stage: Usd.Stage,
+        notes: list[str],
+        binding: Binding | None,
+        time_code: float | None,
+        level: int,
     ) -> None:
         self.stage = stage
+        self.level = level
         self.time = Usd.TimeCode.EarliestTime() if time_code is None else Usd.TimeCode(time_code)
         self.metres = UsdGeom.GetStageMetersPerUnit(stage)
         self.scene = Scene(notes=notes, up_axis=str(UsdGeom.GetStageUpAxis(stage)))
@@ -102,7 +110,9 @@ class _Reader:
                 continue
             matrix = before @ as_matrix(cache.GetLocalToWorldTransform(prim))
             if prim.IsA(UsdGeom.Mesh):
-                mesh = read_mesh(prim, self.time, matrix, self.metres, self.materials, self.scene)
+                mesh = read_mesh(
+                    prim, self.time, matrix, self.metres, self.materials, self.scene, self.level
+                )
                 if mesh is not None:
                     self.scene.meshes.append(mesh)
             elif is_light(prim):
