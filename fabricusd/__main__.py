@@ -1,6 +1,6 @@
 """`python -m fabricusd`."""
 
-from fabricusd.cli.main import main
+from fabricusd.cli.program import program
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    program()

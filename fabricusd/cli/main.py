@@ -68,7 +68,7 @@ def build_parser(command: str | None) -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; the console entry point."""
+    """Run one command, and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     command = next((word for word in given if word in COMMANDS), None)
     options, unknown = build_parser(command).parse_known_args(given)
@@ -81,25 +81,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except FabricError as error:
-        return _refused(str(error))
+        return refused(str(error))
     except BrokenPipeError:
         # A reader such as `head` has had enough.
         drop_stdout()
         return 0
     except OSError as error:
         drop_stdout()
-        return _refused(f"{error.filename or 'the output'} cannot be written: {error.strerror}")
+        return refused(f"{error.filename or 'the output'} cannot be written: {error.strerror}")
     except MemoryError:
-        return _refused("there is not memory enough for that")
+        return refused("there is not memory enough for that")
     except KeyboardInterrupt:
         print("fabricusd: interrupted", file=sys.stderr)
         return 130
 
 
-def _refused(line: str) -> int:
+def refused(line: str) -> int:
+    """Say what was refused; returns the status for it."""
     print(f"fabricusd: {one_line(line)}", file=sys.stderr)
     return 2
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -1,7 +1,10 @@
-"""A machine's first picture: its kernels are compiled by other processes, meanwhile.
+"""Kernels made ready while a scene is read: loaded by a thread, or compiled by other processes.
 
-numba compiles one function at a time in a process, and keeps on disk what it compiled. Where it has
-not, processes of their own go through one list of kernels, from one end or the other, each taking
+numba keeps on disk what it compiled. A thread calls every kernel of one list once, on next to
+nothing, so that numba loads them while the scene is read and its triangles are prepared.
+
+On a machine's first picture there is nothing to load. numba compiles one function at a time in a
+process, so processes of their own go through the list, from one end or the other, each taking
 the next that none has, and whoever wanted to render waits and finds them on disk. They compile
 without Python's collector of cycles, which costs a fifth of the time, and end with the memory that
 this takes. Whatever they fail to make is compiled by the caller.
@@ -9,22 +12,27 @@ this takes. Whatever they fail to make is compiled by the caller.
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.core.dispatcher import Dispatcher
 
-from fabricusd.appearance.numba_start import load_without_blas
+from fabricusd.appearance.numba_start import load_as_they_are, load_without_blas
 from fabricusd.appearance.surface_sampling import SamplingTables
 from fabricusd.appearance.surface_shares import sampling_tables
 from fabricusd.appearance.surface_tables import SurfaceTables, surface_tables
+from fabricusd.fabric import Fabric
 from fabricusd.reference.arrivals import arrive, sort_lanes
 from fabricusd.reference.camera import build_lens, camera_rays
 from fabricusd.reference.defaults import default_lights
@@ -41,7 +49,6 @@ from fabricusd.reference.sobol import new_numbers
 from fabricusd.reference.triangles import build_tables
 from fabricusd.reference.wave import LANE_SPREAD, LANE_WIDTH, Wave
 from fabricusd.reference.workers import worker_count
-from fabricusd.schema import load
 
 R = np.float32
 _LONGEST = 120.0
@@ -51,13 +58,21 @@ _MOST_PROCESSES = 4
 
 
 class CompileAhead:
-    """The other processes, where they are needed: the cloth's kernel has not been compiled."""
+    """The thread, or where the cloth's kernel has not been compiled the processes."""
 
     def __init__(self) -> None:
         self._processes: list[subprocess.Popen[bytes]] = []
-        # Inside another program `executable` is that program, which must not be started again.
-        if not Path(sys.executable or "").name.startswith("python") or _compiled():
+        self._thread: threading.Thread | None = None
+        if _compiled():
+            # No daemon: Python must not take LLVM apart while it loads code.
+            self._thread = threading.Thread(target=_load_kernels)
+            self._thread.start()
             return
+        load_without_blas()
+        # Inside another program `executable` is that program, which must not be started again.
+        if not Path(sys.executable or "").name.startswith("python"):
+            return
+        atexit.register(self._stop)
         self._claims = tempfile.TemporaryDirectory(prefix="fabricusd-")
         none = subprocess.DEVNULL
         for k in range(min(worker_count(None), _MOST_PROCESSES)):
@@ -69,7 +84,9 @@ class CompileAhead:
             self._processes.append(process)
 
     def wait(self) -> None:
-        """Return when the kernels have been compiled, or will not be."""
+        """Return when the kernels are ready, or will not be."""
+        if self._thread is not None:
+            self._thread.join()
         while self._processes:
             process = self._processes.pop()
             try:
@@ -79,22 +96,39 @@ class CompileAhead:
             if not self._processes:
                 self._claims.cleanup()
 
-    def __del__(self) -> None:
+    def _stop(self) -> None:
         for process in self._processes:
             process.kill()
-        self.wait()
 
 
 @cache
 def compile_ahead() -> CompileAhead:
-    """Start the processes, once; for `wait` before the first kernel is called."""
-    load_without_blas()
+    """Start the thread or the processes, once; for `wait` before the first kernel is called."""
     return CompileAhead()
 
 
 def _compiled() -> bool:
     """Whether numba has the cloth's kernel on disk."""
     return any(Path(shade_far.stats.cache_path).glob("far_shading.shade_far*.nbi"))
+
+
+def _load_kernels() -> None:
+    """Call every kernel; one that cannot be loaded complains where it is needed."""
+    load_as_they_are(_kernels())
+    for task in TASKS:
+        with suppress(Exception):
+            task()
+
+
+def _kernels() -> list[Dispatcher]:
+    """Those of the appearance model and of the tracer, as far as they have been imported."""
+    return [
+        value
+        for name, module in list(sys.modules.items())
+        if name.startswith("fabricusd.")
+        for value in list(vars(module).values())
+        if isinstance(value, Dispatcher)
+    ]
 
 
 def compile_kernels(claims: str, backwards: bool) -> None:
@@ -133,7 +167,8 @@ def _sample() -> _Sample:
 
 
 def _cloth() -> tuple[Any, SurfaceTables]:
-    fabric = load("linen_plain")
+    # Level threads: next to nothing to sample.
+    fabric = Fabric()
     return fabric, surface_tables(fabric, precision=np.float32)
 
 

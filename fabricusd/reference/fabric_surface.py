@@ -105,6 +105,7 @@ class FabricShader:
     """
 
     def __init__(self, fabric: Fabric, shadow: str) -> None:
+        self.fabric = fabric
         self.sides = (_Side(fabric, shadow), _Side(back_of(fabric), shadow))
         self.gap = 0.0 if fabric.opaque else float(self.sides[0].law.published.gap)
 

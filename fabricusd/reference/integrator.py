@@ -6,7 +6,7 @@ are plain Python threads and a batch is what the scheduler hands out.
 
 from __future__ import annotations
 
-from typing import Any
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,10 +40,10 @@ from fabricusd.reference.preview_surface import (
     build_surfaces,
     shade_preview,
 )
-from fabricusd.reference.scene import FabricSurface, Scene
+from fabricusd.reference.scene import FabricSurface, Material, Scene
 from fabricusd.reference.shadow_rays import settle, thin_out
 from fabricusd.reference.sobol import new_numbers
-from fabricusd.reference.triangles import build_tables
+from fabricusd.reference.triangles import TriangleTables, build_tables
 from fabricusd.reference.wave import (
     BEAUTY_ROWS,
     FAR_LEVEL,
@@ -71,6 +71,18 @@ MOST_LAYERS = 32
 """See-through surfaces that one ray may pass before it is taken as blocked."""
 
 
+def _build_geometry(scene: Scene) -> tuple[TriangleTables, Accelerator]:
+    tables = build_tables(scene)
+    return tables, Accelerator(tables.points, tables.triangles)
+
+
+def _shader(surface: Material, shadow: str) -> FabricShader | None:
+    """What shades a cloth; None for a plain surface, which needs nothing of its own."""
+    if not isinstance(surface, FabricSurface):
+        return None
+    return FabricShader(surface.binding.fabric, shadow)
+
+
 class Tracer:
     """A scene made ready for rays.
 
@@ -95,10 +107,12 @@ class Tracer:
             raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
         if max_bounces < 0:
             raise FabricError("max bounces", f"is {max_bounces}; it must be at least 0")
-        ahead = compile_ahead()
-        self.tables = build_tables(scene)
-        self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
-        ahead.wait()
+        # The triangles, while kernels are made ready and, by those, the laws of the cloths.
+        with ThreadPoolExecutor(1) as beside:
+            geometry = beside.submit(_build_geometry, scene)
+            compile_ahead().wait()
+            self.shaders = [_shader(surface, shadow) for surface in scene.materials] or [None]
+            self.tables, self.accelerator = geometry.result()
         self.lights, self.dome = build_lights(scene.lights, self.tables.centre)
         self.surfaces = build_surfaces(scene)
         shining = self.surfaces.table[:, [EMISSIVE, EMISSIVE + 1, EMISSIVE + 2]].any(axis=1)
@@ -108,18 +122,14 @@ class Tracer:
         self.estimator = ESTIMATORS[estimator]
         self.numbers = new_numbers(seed, independent=sampler == "random")
         self.epsilon = np.float32(1e-7 * self.tables.radius + 1e-12)
-        count = max(len(scene.materials), 1)
-        self.shaders: list[Any] = [None] * count
-        self._limits = np.zeros((count, 4), np.float32)
+        self._limits = np.zeros((len(self.shaders), 4), np.float32)
         self.opacity = np.where(
             self.surfaces.table[:, OPACITY_MAP] >= 0, -1.0, self.surfaces.table[:, OPACITY]
         ).astype(np.float32)
-        for k, surface in enumerate(scene.materials):
-            if isinstance(surface, FabricSurface):
-                fabric = surface.binding.fabric
-                self._limits[k] = limits.row(fabric)
-                self.shaders[k] = FabricShader(fabric, shadow)
-                self.opacity[k] = 1.0 - self.shaders[k].gap
+        for k, shader in enumerate(self.shaders):
+            if shader is not None:
+                self._limits[k] = limits.row(shader.fabric)
+                self.opacity[k] = 1.0 - shader.gap
         self.see_through = bool((self.opacity < 1).any())
 
     def aim(self, lens: Lens, width: int, height: int) -> None:
