@@ -204,8 +204,8 @@ class Grid:
         a = i * side + j
         b, c, d = a + side, a + side + 1, a + 1
         quads = np.stack([np.stack([a, b, c], 1), np.stack([a, c, d], 1)], 1).reshape(-1, 3)
-        corners = np.arange(len(topology.indices))[:, None, None] * side**2
-        self.triangles = (corners + quads).reshape(-1, 3)
+        corners = np.arange(len(topology.indices), dtype=np.int32)[:, None, None] * side**2
+        self.triangles = (corners + quads.astype(np.int32)).reshape(-1, 3)
         self.face = np.repeat(topology.face, len(quads))
         self.place = self._places(side)
 
@@ -216,7 +216,7 @@ class Grid:
         spokes = top.count + len(top.uses) * on_edge
         middles = spokes + corners * (r - 1)
         inside = middles + len(top.counts)
-        place = np.empty((corners, side, side), np.int64)
+        place = np.empty((corners, side, side), np.int32)
         step = np.arange(1, side)
 
         def along(corner: Any, steps: NDArray[Any]) -> NDArray[np.int64]:

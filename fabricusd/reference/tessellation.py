@@ -113,16 +113,19 @@ class RefinedTessellation:
         cage = refinement.cage
         self._grid = grid = Grid(cage.topology, level)
         shown = ~cage.hidden[grid.face]
-        self._cage_face = grid.face[shown]
-        self.faces = refinement.face[self._cage_face]
-        self._at = grid.triangles[shown][:, ::-1] if reverse else grid.triangles[shown]
+        faces, at = grid.face, grid.triangles
+        if not shown.all():
+            faces, at = faces[shown], at[shown]
+        self.faces = refinement.face[faces]
+        self._at = at[:, ::-1] if reverse else at
         limit, normals = grid.with_normals(cage)
         number = grid.place[self._at]
-        used, triangles = np.unique(number, return_inverse=True)
-        where = np.empty(int(grid.place.max(initial=0)) + 1, np.int64)
-        where[grid.place] = np.arange(len(grid.place))
-        self.points = limit[where[used]]
-        self.triangles = triangles.reshape(number.shape)
+        used = np.zeros(int(grid.place.max(initial=0)) + 1, bool)
+        used[number] = True
+        points = np.empty((len(used), 3))
+        points[grid.place] = limit
+        self.points = points[used]
+        self.triangles = (np.cumsum(used, dtype=np.int32) - np.int32(1))[number]
         self.normals = (-normals if left_handed else normals)[self._at]
 
     def spread(

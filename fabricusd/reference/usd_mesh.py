@@ -58,7 +58,8 @@ def read_mesh(
     normals = _authored_normals(prim, mesh, cut, time) if scheme == "none" else cut.normals
     if normals is not None:
         # Normals turn by the inverse transpose; rows here are normals.
-        normals = np.asarray(normals @ np.linalg.pinv(matrix[:3, :3]), np.float32)
+        turn = np.linalg.pinv(matrix[:3, :3]).astype(np.float32)
+        normals = np.asarray(normals, np.float32) @ turn
     world = cut.points @ matrix[:3, :3].T + matrix[:3, 3]
     return Mesh(
         path=where,
@@ -185,7 +186,10 @@ def _uv(
         if values is None:
             missing |= mine & surface.is_fabric
             continue
-        uv[mine] = values[mine]
+        if mine.all():
+            uv = values
+        else:
+            uv[mine] = values[mine]
     return (uv if any(v is not None for v in known.values()) else None), missing
 
 
