@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.reference.embree_subdivision import INFINITE
-from fabricusd.reference.subdivision import Cage, Grid, Topology, limit_of
+from fabricusd.reference.limit_grid import Grid, places
+from fabricusd.reference.subdivision import Cage, Topology, limit_of
 
 RULES = ("none", "cornersOnly", "cornersPlus1", "cornersPlus2", "boundaries", "all")
 """USD's `faceVaryingLinearInterpolation`; cornersPlus1 is its fallback."""
@@ -40,7 +41,8 @@ def face_varying(
     point = own.indices[first]
     fixed = _fixed(cage, torn, point, crease, rule) | torn.tangled
     sharpness = np.where(fixed, INFINITE, cage.point_sharpness[point])
-    return grid.evaluate(limit_of(flat, torn, crease, sharpness))[:, :2]
+    surface = limit_of(flat, torn, crease, sharpness)
+    return grid.evaluate(surface, places(torn, grid.size))[:, :2]
 
 
 def _fixed(

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.reference.face_varying import face_varying
+from fabricusd.reference.limit_grid import Grid
 from fabricusd.reference.polygons import triangulate
-from fabricusd.reference.subdivision import Cage, Grid
+from fabricusd.reference.subdivision import Cage
 
 CONSTANT, UNIFORM, VARYING, VERTEX, FACE_VARYING = (
     "constant", "uniform", "varying", "vertex", "faceVarying",
@@ -35,6 +36,7 @@ class Tessellation(Protocol):
     ) -> NDArray[np.float64] | None:
         """(m, 3, c) a primvar's values at the triangles' corners; None where there are too few.
 
+        values : (k, c) float; c is 2 where a surface is refined
         indices : which value each element has, as an indexed primvar says; None for one after the
         other
         """
@@ -134,6 +136,7 @@ class RefinedTessellation:
         """As `Tessellation` says; `vertex` values follow the surface, `varying` ones its cage."""
         own = self._refinement
         top = own.cage.topology
+        values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
         if interpolation == FACE_VARYING:
             there = _elements(values, indices, own.corner)
             if there is None:
@@ -144,12 +147,11 @@ class RefinedTessellation:
             there = _elements(values, indices, np.arange(top.count))
             if there is None:
                 return None
-            if interpolation == VERTEX:
-                deep = np.zeros((len(there), 3))
-                deep[:, : there.shape[1]] = there
-                found = self._grid.evaluate(own.cage.limit(deep))[:, : there.shape[1]]
-            else:
-                found = self._grid.bilinear(there[top.indices])
+            if interpolation == VARYING:
+                return np.asarray(self._grid.bilinear(there[top.indices])[self._at])
+            deep = np.zeros((len(there), 3))
+            deep[:, :2] = there
+            found = self._grid.evaluate(own.cage.limit(deep), self._grid.place)[:, :2]
         else:
             pick = self.faces if interpolation == UNIFORM else np.zeros_like(self.faces)
             return _elements(values, indices, np.repeat(pick[:, None], 3, axis=1))

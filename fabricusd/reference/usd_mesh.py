@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
+from fabricusd.reference.limit_grid import triangles_at
 from fabricusd.reference.scene import Mesh, Scene
-from fabricusd.reference.subdivision import COMPLEXITIES, triangles_at
+from fabricusd.reference.subdivision import COMPLEXITIES
 from fabricusd.reference.tessellation import (
     CageTessellation,
     RefinedTessellation,
