@@ -80,6 +80,8 @@ def write_png(
     kind = oiio.UINT16 if pixels.dtype == np.uint16 else oiio.UINT8
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind)
     spec.attribute("oiio:ColorSpace", color_space)
+    # The code values are the file's: nothing is to be divided by a fourth channel.
+    spec.attribute("oiio:UnassociatedAlpha", 1)
     _write(path, spec, np.ascontiguousarray(pixels))
 
 
@@ -136,26 +138,49 @@ def read_image(
 ) -> NDArray[np.float32]:
     """(h, w, c) float32, linear, c being 1 or 3; raises `FabricError` where it cannot be read.
 
+    Colours are those of the file: a picture's opacity neither multiplies nor divides them.
+
     color_space : "auto" decodes sRGB from 8-bit pictures, "sRGB" always, "raw" never
     most : shrink to at most this many pixels a side; 0 keeps all
     """
-    source = readable_file(path)
-    buffer = oiio.ImageBuf(str(source))
+    pixels, spec = _stored_pixels(path)
+    pixels = _shrunk(pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1], most)
+    eight_bit = spec.format.basetype == oiio.UINT8
+    if color_space == "sRGB" or (color_space == "auto" and eight_bit):
+        pixels = linear_from_srgb(pixels).astype(np.float32)
+    return np.ascontiguousarray(pixels, np.float32)
+
+
+def read_alpha(path: str | os.PathLike[str], *, most: int = 0) -> NDArray[np.float32]:
+    """(h, w, 1) float32 opacity of a picture, 1 where it has none; otherwise as `read_image`."""
+    pixels, spec = _stored_pixels(path)
+    channel = spec.alpha_channel
+    if not 0 <= channel < pixels.shape[2]:
+        return np.ones((1, 1, 1), np.float32)
+    return np.ascontiguousarray(_shrunk(pixels[..., channel : channel + 1], most), np.float32)
+
+
+def _stored_pixels(path: str | os.PathLike[str]) -> tuple[NDArray[np.float32], Any]:
+    """((h, w, c) float32 values as they are in the file, its specification)."""
+    plain = oiio.ImageSpec()
+    plain.attribute("oiio:UnassociatedAlpha", 1)
+    buffer = oiio.ImageBuf(str(readable_file(path)), 0, 0, plain)
     with _silence():
         pixels = buffer.get_pixels(oiio.FLOAT) if buffer.read(0, 0, True, oiio.FLOAT) else None
     if pixels is None or pixels.size == 0:
         raise FabricError(str(path), f"cannot be read as a picture: {_reason(buffer)}")
-    spec = buffer.nativespec()
-    eight_bit = spec.format.basetype == oiio.UINT8
-    pixels = np.asarray(pixels, np.float32)
-    pixels = pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1]
-    if most and max(pixels.shape[:2]) > most:
-        step = -(-max(pixels.shape[:2]) // most)
-        h, w = pixels.shape[0] // step * step, pixels.shape[1] // step * step
-        pixels = pixels[:h, :w].reshape(h // step, step, w // step, step, -1).mean(axis=(1, 3))
-    if color_space == "sRGB" or (color_space == "auto" and eight_bit):
-        pixels = linear_from_srgb(pixels).astype(np.float32)
-    return np.ascontiguousarray(pixels, np.float32)
+    return np.asarray(pixels, np.float32), buffer.nativespec()
+
+
+def _shrunk(pixels: NDArray[np.float32], most: int) -> NDArray[np.float32]:
+    """Means of square blocks, so that no side is longer than `most`; as it is where that is 0."""
+    longest = max(pixels.shape[:2])
+    if not most or longest <= most:
+        return pixels
+    step = -(-longest // most)
+    h, w = pixels.shape[0] // step * step, pixels.shape[1] // step * step
+    blocks = pixels[:h, :w].reshape(h // step, step, w // step, step, -1)
+    return np.asarray(blocks.mean(axis=(1, 3)))
 
 
 def read_exr_layers(

@@ -1,11 +1,12 @@
 """Level `auto`: how much of the cloth to model, from the size of a pixel on it.
 
-The pixel's extent is measured in threads, weave coordinates: `far` where it covers more than about
-a repeat, `weave` where threads resolve, `thread` where a thread is wider than a pixel, as `Limits`
-has it. Between them the levels are mixed by chance, with weights that are continuous in the extent;
-since the mean of each level over what the next one cannot see is that next one, the mean of a
-picture does not jump. Source: `docs/model.md` section 8, which has four pixels a thread: the
-satin's `weave` is off by 1.3 of the mean where a thread is two pixels wide, `chart.level_errors`.
+The pixel's extent is measured in threads, weave coordinates: `far` where a repeat is narrower than
+two pixels, `weave` where threads resolve, `thread` where a thread is wider than a pixel: `Limits`.
+Between them the levels are mixed by chance, with weights that are continuous in the extent; since
+the mean of each level over what the next one cannot see is that next one, the mean of a picture
+does not jump. Source: `docs/model.md` section 8, which has one repeat a pixel, where `weave` is
+moire, and four pixels a thread: the satin's `weave` is off by 1.3 of the mean where a thread is two
+pixels wide, `chart.level_errors`.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ class Limits(NamedTuple):
         that it is centred on, at 0 it is a step
     """
 
-    repeats: float = 0.8
+    repeats: float = 0.4
     pixels: float = 1.0
     octaves: float = 0.5
 
@@ -52,9 +53,10 @@ class Limits(NamedTuple):
 
 
 DEFAULT = Limits()
-"""There `far` is off by a tenth to a fifth of the mean, rms over the pixels (`chart.level_errors`),
-which is the noise that 20 (linen) to 130 (satin) samples of `weave` leave, who sees the repeat's
-highlights one by one. `weave` is off by no more either, but for the satin, by half of the mean."""
+"""Above half a repeat a pixel no picture can show the repeat (`chart.zoom`): what is left of it is
+moire, in `weave` 0.05 to 0.4 of the mean, and noise, with 64 samples of satin 0.3. Below a third
+`far` misses more than that. Where `weave` and `thread` meet they differ by a tenth to a fifth of
+the mean (`chart.level_errors`), but for the satin, by half of it."""
 
 
 @njit(**INLINE)

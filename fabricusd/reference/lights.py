@@ -68,10 +68,16 @@ def _row(light: Light, centre: NDArray[np.float64]) -> NDArray[np.float64]:
     lengths = np.maximum(np.linalg.norm(axes, axis=0), 1e-30)
     row[KIND], row[RED : RED + 3], row[P : P + 3] = light.kind, light.radiance, position
     row[VISIBLE] = float(light.camera_visible)
-    z = -axes[:, 2] / lengths[2]
     x, y = axes[:, 0], axes[:, 1]
+    # Square to the surface, also where the frame is sheared or flat.
+    normal = np.cross(x, y)
+    z = (
+        -normal
+        * math.copysign(1.0, normal @ axes[:, 2])
+        / max(float(np.linalg.norm(normal)), 1e-30)
+    )
     if light.kind == DISTANT:
-        z = -z
+        z = axes[:, 2] / lengths[2]
         x, y = x / lengths[0], y / lengths[1]
         row[SIZE] = math.cos(0.5 * light.angle)
         # 1 - cos without cancellation, for the solid angle.

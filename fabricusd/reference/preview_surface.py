@@ -47,10 +47,12 @@ _WRAPS = ("repeat", "clamp", "mirror", "black")
 
 class Surfaces(NamedTuple):
     """table : (materials, COLUMNS) float32; maps : (k, 6) int64 - start in `texels`, height, width,
-    channels, wrap along u, wrap along v; texels : (t,) float32."""
+    channels, wrap along u, wrap along v; places : (k, 6) float32 - `Texture.place`; texels : (t,)
+    float32."""
 
     table: NDArray[np.float32]
     maps: NDArray[np.int64]
+    places: NDArray[np.float32]
     texels: NDArray[np.float32]
 
 
@@ -60,6 +62,7 @@ def build_surfaces(scene: Scene) -> Surfaces:
     table[:, DIFFUSE_MAP:] = -1.0
     table[:, OPACITY] = 1.0
     maps: list[list[int]] = []
+    places: list[tuple[float, ...]] = []
     pixels: list[NDArray[np.float32]] = []
     start = 0
     for row, surface in zip(table, scene.materials, strict=False):
@@ -74,11 +77,13 @@ def build_surfaces(scene: Scene) -> Surfaces:
                 continue
             row[column] = len(maps)
             maps.append(_map_row(texture, start))
+            places.append(texture.place)
             pixels.append(np.asarray(texture.pixels, np.float32).ravel())
             start += pixels[-1].size
     return Surfaces(
         table,
         np.array(maps, np.int64).reshape(-1, 6),
+        np.array(places, np.float32).reshape(-1, 6),
         np.concatenate(pixels) if pixels else np.zeros(1, np.float32),
     )
 
@@ -106,6 +111,8 @@ def texture_at(surfaces, index, u, v):
     """Bilinear lookup: (r, g, b); v grows upwards from the bottom row."""
     m = surfaces.maps[index]
     start, h, w, channels = m[0], m[1], m[2], m[3]
+    place = surfaces.places[index]
+    u, v = place[0] * u + place[1] * v + place[2], place[3] * u + place[4] * v + place[5]
     x, y = u * R(w) - R(0.5), (R(1) - v) * R(h) - R(0.5)
     if not (abs(x) < R(1e8) and abs(y) < R(1e8)):
         return R(0), R(0), R(0)

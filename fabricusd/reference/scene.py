@@ -24,10 +24,12 @@ class Texture:
 
     pixels : (h, w, c) float32, linear, row 0 at the top; c is 1 or 3
     wrap : (2,) str - `repeat`, `clamp`, `mirror` or `black`, along u and v
+    place : a, b, c, d, e, f - the picture lies at (a u + b v + c, d u + e v + f)
     """
 
     pixels: NDArray[np.float32]
     wrap: tuple[str, str] = ("repeat", "repeat")
+    place: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

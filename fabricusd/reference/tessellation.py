@@ -118,6 +118,7 @@ class RefinedTessellation:
         faces, at = grid.face, grid.triangles
         if not shown.all():
             faces, at = faces[shown], at[shown]
+        self._cage_face = faces
         self.faces = refinement.face[faces]
         self._at = at[:, ::-1] if reverse else at
         limit, normals = grid.with_normals(cage)
@@ -134,28 +135,38 @@ class RefinedTessellation:
         self, values: NDArray[np.float64], interpolation: str, indices: NDArray[Any] | None = None
     ) -> NDArray[np.float64] | None:
         """As `Tessellation` says; `vertex` values follow the surface, `varying` ones its cage."""
-        own = self._refinement
-        top = own.cage.topology
-        values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-        if interpolation == FACE_VARYING:
-            there = _elements(values, indices, own.corner)
-            if there is None:
-                return None
-            keys = _shared(there) if indices is None else indices[own.corner]
-            found = face_varying(own.cage, self._grid, there, keys, own.rule)
-        elif interpolation in (VERTEX, VARYING):
-            there = _elements(values, indices, np.arange(top.count))
-            if there is None:
-                return None
-            if interpolation == VARYING:
-                return np.asarray(self._grid.bilinear(there[top.indices])[self._at])
-            deep = np.zeros((len(there), 3))
-            deep[:, :2] = there
-            found = self._grid.evaluate(own.cage.limit(deep), self._grid.place)[:, :2]
-        else:
+        top = self._refinement.cage.topology
+        if interpolation in (CONSTANT, UNIFORM):
             pick = self.faces if interpolation == UNIFORM else np.zeros_like(self.faces)
             return _elements(values, indices, np.repeat(pick[:, None], 3, axis=1))
-        return np.asarray(found[self._at])
+        varies = interpolation == FACE_VARYING
+        pick = self._refinement.corner if varies else np.arange(top.count)
+        there = _elements(values, indices, pick)
+        if there is None:
+            return None
+        broken = ~np.asarray(np.isfinite(there).all(axis=1))
+        there = np.where(broken[:, None], 0.0, there)
+        keys = None if indices is None else indices[pick]
+        found = self._interpolated(there, interpolation, keys)[self._at]
+        if broken.any():
+            corners = broken if varies else broken[top.indices]
+            faces = np.bincount(top.face, corners, len(top.counts)) > 0
+            found[faces[self._cage_face]] = np.nan
+        return np.asarray(found)
+
+    def _interpolated(
+        self, values: NDArray[np.float64], interpolation: str, keys: NDArray[Any] | None
+    ) -> NDArray[np.float64]:
+        """(k, 2) at the grid's points, of (h, 2) values at corners or (n, 2) at points."""
+        own = self._refinement
+        if interpolation == FACE_VARYING:
+            shared = _shared(values) if keys is None else keys
+            return face_varying(own.cage, self._grid, values, shared, own.rule)
+        if interpolation == VARYING:
+            return self._grid.bilinear(values[own.cage.topology.indices])
+        deep = np.zeros((len(values), 3))
+        deep[:, :2] = values
+        return self._grid.evaluate(own.cage.limit(deep), self._grid.place)[:, :2]
 
 
 def _shared(values: NDArray[np.float64]) -> NDArray[np.int64]:

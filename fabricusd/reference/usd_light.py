@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom, UsdLux
+from pxr import Sdf, Usd, UsdGeom, UsdLux
 
 from fabricusd.errors import FabricError
 from fabricusd.images import read_image
 from fabricusd.reference.scene import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE, Light, Scene
+from fabricusd.reference.usd_asset import asset_file
 
 _KINDS = {
     "DistantLight": DISTANT,
@@ -23,11 +24,63 @@ _KINDS = {
     "SphereLight": SPHERE,
     "CylinderLight": CYLINDER,
 }
+_LENGTHS = {
+    RECT: {"width": 1.0, "height": 1.0},
+    DISK: {"radius": 0.5},
+    SPHERE: {"radius": 0.5},
+    CYLINDER: {"radius": 0.5, "length": 1.0},
+}
+"""The lengths that each kind has, and what they are where nothing is said [scene unit]."""
+
+_SMALLEST = 1e-3
+"""Scene units that a normalised light without extent gets: it has power, and needs a surface."""
+
+_UNEVEN = 1e-3
+"""Relative difference of scales from which a sphere is no sphere any more."""
 
 
 def is_light(prim: Usd.Prim) -> bool:
     """Whether a prim, mesh or not, claims to shine."""
     return bool(prim.HasAPI(UsdLux.LightAPI)) or prim.GetTypeName().endswith("Light")
+
+
+class _Inputs:
+    """A light's inputs, by the names of today or those before USD 21.02, which had no prefix."""
+
+    def __init__(self, prim: Usd.Prim, time: Usd.TimeCode, scene: Scene) -> None:
+        self.prim, self.time, self.scene = prim, time, scene
+
+    def get(self, name: str, otherwise: Any) -> Any:
+        """The value of `inputs:name`, or of `name` where only that is authored."""
+        attribute = self.prim.GetAttribute(f"inputs:{name}")
+        if not (attribute and attribute.HasAuthoredValue()):
+            older = self.prim.GetAttribute(name)
+            attribute = older if older and older.HasAuthoredValue() else attribute
+        given = attribute.Get(self.time) if attribute else None
+        return otherwise if given is None else given
+
+    def numbers(self, name: str, otherwise: tuple[float, ...]) -> NDArray[np.float64]:
+        """As many numbers as `otherwise`, which is taken, with a note, for what are none."""
+        given = self.get(name, otherwise if len(otherwise) > 1 else otherwise[0])
+        try:
+            values = np.array(given, np.float64).reshape(-1)
+        except (TypeError, ValueError):
+            values = np.zeros(0)
+        if len(values) == len(otherwise):
+            return values
+        self.note(f"has {name} '{given}', which is of another type; {otherwise} is taken")
+        return np.array(otherwise)
+
+    def number(self, name: str, otherwise: float) -> float:
+        return float(self.numbers(name, (otherwise,))[0])
+
+    def file(self, name: str) -> Sdf.AssetPath | None:
+        """The file that is named there, or None where none is."""
+        asset = self.get(name, None)
+        return asset if isinstance(asset, Sdf.AssetPath) and asset.path else None
+
+    def note(self, problem: str) -> None:
+        self.scene.note(str(self.prim.GetPath()), problem)
 
 
 def read_light(
@@ -41,81 +94,131 @@ def read_light(
 
     matrix : (4, 4) local to world, in scene units of `metres`
     """
-    where = str(prim.GetPath())
+    inputs = _Inputs(prim, time, scene)
     kind = _KINDS.get(str(prim.GetTypeName()))
     if kind is None:
-        scene.note(where, f"is a light of the unknown type '{prim.GetTypeName()}', left out")
+        inputs.note(f"is a light of the unknown type '{prim.GetTypeName()}', left out")
         return None
-
-    def value(name: str, default: Any) -> Any:
-        attribute = prim.GetAttribute(f"inputs:{name}")
-        got = attribute.Get(time) if attribute else None
-        return default if got is None else got
-
-    color = np.array(value("color", (1.0, 1.0, 1.0)), np.float64)
-    if value("enableColorTemperature", False):
-        color = color * np.array(
-            UsdLux.BlackbodyTemperatureAsRgb(float(value("colorTemperature", 6500.0)))
-        )
-    radiance = color * float(value("intensity", 1.0)) * 2.0 ** float(value("exposure", 0.0))
-    if not np.isfinite(radiance).all():
-        scene.note(where, "has an intensity, exposure or colour that is not finite, left out")
+    angle = math.radians(inputs.number("angle", 0.53)) if kind == DISTANT else 0.0
+    normalize = bool(inputs.get("normalize", False))
+    radiance = _radiance(inputs)
+    lengths = _lengths(inputs, kind, normalize)
+    if radiance is None or lengths is None:
         return None
+    if not (np.isfinite(matrix).all() and 0 <= angle <= 2 * math.pi):
+        inputs.note("has an angle or a transform that makes no sense, left out")
+        return None
+    if normalize:
+        radiance = radiance / _size(kind, matrix, lengths, angle)
+    elif kind == DISTANT and angle <= 0:
+        inputs.note("has no angle; its intensity is taken as irradiance")
+    _note_left_out(inputs, kind, matrix)
     frame = matrix.copy()
     frame[:3, 3] *= metres
-    angle = math.radians(float(value("angle", 0.53))) if kind == DISTANT else 0.0
-    width, height = float(value("width", 1.0)), float(value("height", 1.0))
-    radius = float(value("radius", 0.5))
-    if kind == SPHERE and value("treatAsPoint", False):
-        radius = 1e-3
-    if kind == CYLINDER:
-        height = float(value("length", 1.0))
-        if value("treatAsLine", False):
-            radius = 1e-3
-    if value("normalize", False):
-        radiance = radiance / _size(kind, matrix, width, height, radius, angle)
-    elif kind == DISTANT and angle <= 0:
-        scene.note(where, "has no angle; its intensity is taken as irradiance")
-    if prim.HasAPI(UsdLux.ShapingAPI) and _is_shaped(value):
-        scene.note(where, "is shaped by a cone or profile, which is left out")
     return Light(
-        path=where,
+        path=str(prim.GetPath()),
         kind=kind,
         radiance=(float(radiance[0]), float(radiance[1]), float(radiance[2])),
-        frame=_pole(prim, frame, value, scene) if kind == DOME else frame,
-        width=width * metres,
-        height=height * metres,
-        radius=radius * metres,
+        frame=_pole(prim, frame) if kind == DOME else frame,
+        width=lengths.get("width", 1.0) * metres,
+        height=lengths.get("length", lengths.get("height", 1.0)) * metres,
+        radius=lengths.get("radius", 0.5) * metres,
         angle=angle,
-        image=_picture(prim, where, value, scene) if kind == DOME else None,
+        image=_picture(inputs) if kind == DOME else None,
         camera_visible=kind == DOME,
     )
 
 
-def _is_shaped(value: Any) -> bool:
-    return float(value("shaping:cone:angle", 90.0)) < 90 or bool(value("shaping:ies:file", None))
+def _radiance(inputs: _Inputs) -> NDArray[np.float64] | None:
+    """(3,) emission before it is normalised, or None with a note where it is no light."""
+    color = inputs.numbers("color", (1.0, 1.0, 1.0))
+    if inputs.get("enableColorTemperature", False):
+        kelvin = inputs.number("colorTemperature", 6500.0)
+        color = color * np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
+    with np.errstate(over="ignore", invalid="ignore"):
+        stops = np.exp2(inputs.number("exposure", 0.0))
+        radiance = color * inputs.number("intensity", 1.0) * stops
+    if not np.isfinite(radiance.astype(np.float32)).all():
+        inputs.note("has an intensity, exposure or colour that is not finite, left out")
+        return None
+    if (radiance < 0).any():
+        inputs.note("has a negative intensity or colour, which is taken as 0")
+    return np.asarray(np.maximum(radiance, 0.0))
 
 
-def _size(
-    kind: int, matrix: NDArray[np.float64], width: float, height: float, radius: float, angle: float
-) -> float:
+def _lengths(inputs: _Inputs, kind: int, normalize: bool) -> dict[str, float] | None:
+    """The light's lengths by their names, or None with a note where they make no light."""
+    found = {}
+    for name, otherwise in _LENGTHS.get(kind, {}).items():
+        length = inputs.number(name, otherwise)
+        if not (math.isfinite(length) and length >= 0) or (length == 0 and not normalize):
+            inputs.note(f"has {name} {length:g}; it must be above 0, left out")
+            return None
+        found[name] = max(length, _SMALLEST) if normalize else length
+    return found
+
+
+def _note_left_out(inputs: _Inputs, kind: int, matrix: NDArray[np.float64]) -> None:
+    """What a light asks for that is not rendered, one line each."""
+    for name in ("diffuse", "specular"):
+        share = inputs.number(name, 1.0)
+        if share != 1:
+            inputs.note(f"has a {name} multiplier of {share:g}, left out: it counts as 1")
+    if kind != DOME and inputs.file("texture:file") is not None:
+        inputs.note("has a texture, left out: it shines evenly")
+    if inputs.prim.HasAPI(UsdLux.ShapingAPI) and _is_shaped(inputs):
+        inputs.note("is shaped by a cone, focus or profile, which is left out")
+    if inputs.prim.HasAPI(UsdLux.ShadowAPI) and not inputs.get("shadow:enable", True):
+        inputs.note("asks for no shadows; it casts them")
+    if inputs.prim.GetRelationship("light:filters").GetTargets():
+        inputs.note("has light filters, left out")
+    for name in ("lightLink", "shadowLink"):
+        if _is_linked(inputs.prim, name):
+            inputs.note(f"has a {name} collection, left out: it lights and shadows everything")
+    scales = np.linalg.norm(matrix[:3, :3], axis=0)
+    round_ = {SPHERE: scales, CYLINDER: scales[1:]}.get(kind, scales[:1])
+    if np.ptp(round_) > _UNEVEN * round_.max():
+        inputs.note("is scaled unevenly; it is rendered round, with its mean radius")
+
+
+def _is_shaped(inputs: _Inputs) -> bool:
+    return (
+        inputs.number("shaping:cone:angle", 90.0) < 90
+        or inputs.number("shaping:focus", 0.0) != 0
+        or inputs.file("shaping:ies:file") is not None
+    )
+
+
+def _is_linked(prim: Usd.Prim, name: str) -> bool:
+    """Whether a light's collection is anything else than the whole stage."""
+    if not prim.HasAPI(Usd.CollectionAPI, name):
+        return False
+    collection = Usd.CollectionAPI(prim, name)
+    return (
+        collection.GetIncludeRootAttr().Get() is False
+        or bool(collection.GetExcludesRel().GetTargets())
+        or collection.GetMembershipExpressionAttr().HasAuthoredValue()
+    )
+
+
+def _size(kind: int, matrix: NDArray[np.float64], lengths: dict[str, float], angle: float) -> float:
     """What `normalize` divides by: area in square scene units, for a distant light its projected
-    solid angle."""
+    solid angle, beyond half a sphere as UsdLux continues it."""
     x, y, z = (float(np.linalg.norm(matrix[:3, k])) for k in range(3))
-    mean = (x + y + z) / 3
+    flat = float(np.linalg.norm(np.cross(matrix[:3, 0], matrix[:3, 1])))
+    radius = lengths.get("radius", 0.0)
+    sine2 = math.sin(0.5 * angle) ** 2
     size = {
-        DISTANT: math.pi * math.sin(0.5 * angle) ** 2 if angle > 0 else 1.0,
-        RECT: width * x * height * y,
-        DISK: math.pi * radius**2 * x * y,
-        SPHERE: 4 * math.pi * (radius * mean) ** 2,
-        CYLINDER: 2 * math.pi * radius * 0.5 * (y + z) * height * x,
+        DISTANT: math.pi * (sine2 if angle <= math.pi else 2 - sine2) if angle > 0 else 1.0,
+        RECT: lengths.get("width", 1.0) * lengths.get("height", 1.0) * flat,
+        DISK: math.pi * radius**2 * flat,
+        SPHERE: 4 * math.pi * (radius * (x + y + z) / 3) ** 2,
+        CYLINDER: 2 * math.pi * radius * 0.5 * (y + z) * lengths.get("length", 1.0) * x,
     }.get(kind, 1.0)
-    return max(size, 1e-12)
+    return max(size, 1e-30)
 
 
-def _pole(
-    prim: Usd.Prim, frame: NDArray[np.float64], value: Any, scene: Scene
-) -> NDArray[np.float64]:
+def _pole(prim: Usd.Prim, frame: NDArray[np.float64]) -> NDArray[np.float64]:
     """A dome's frame with its pole along +y: DomeLight_1 may have it along the stage's axis."""
     axis = prim.GetAttribute("poleAxis")
     pole = axis.Get() if axis else None
@@ -128,21 +231,31 @@ def _pole(
     return frame @ turn
 
 
-def _picture(prim: Usd.Prim, where: str, value: Any, scene: Scene) -> NDArray[np.float32] | None:
+def _picture(inputs: _Inputs) -> NDArray[np.float32] | None:
     """A dome's picture (h, w, 3), or None and a constant dome."""
-    asset = value("texture:file", None)
-    if asset is None or not asset.path:
+    asset = inputs.file("texture:file")
+    if asset is None:
         return None
-    layout = value("texture:format", "automatic")
+    layout = inputs.get("texture:format", "automatic")
     if layout not in ("automatic", "latlong"):
-        scene.note(where, f"has a picture laid out as '{layout}'; it is rendered as constant")
+        inputs.note(f"has a picture laid out as '{layout}'; it is rendered as constant")
         return None
     try:
-        picture = read_image(asset.resolvedPath or asset.path, most=4096)
+        with asset_file(asset) as file:
+            picture = read_image(file, most=4096)
     except FabricError as error:
-        scene.note(where, f"is rendered as constant: {error}")
+        inputs.note(f"is rendered as constant: {error}")
         return None
-    if not np.isfinite(picture).all():
-        scene.note(where, f"has {int((~np.isfinite(picture)).sum())} values that are not finite")
-        picture = np.where(np.isfinite(picture), picture, 0.0)
+    finite = np.isfinite(picture)
+    if not finite.all():
+        # A sun beyond the largest half float is infinite in the file: it stays the brightest.
+        brightest = float(picture[finite].max(initial=0.0))
+        inputs.note(
+            f"has {int((~finite).sum())} values that are not finite; infinity is taken as "
+            f"{brightest:g}, the rest as 0"
+        )
+        picture = np.nan_to_num(picture, nan=0.0, posinf=brightest, neginf=0.0)
+    if (picture < 0).any():
+        inputs.note(f"has {int((picture < 0).sum())} negative values; they are taken as 0")
+        picture = np.maximum(picture, 0.0)
     return np.ascontiguousarray(np.broadcast_to(picture, (*picture.shape[:2], 3)), np.float32)

@@ -10,28 +10,13 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
-from fabricusd.images import read_image
-from fabricusd.reference.scene import FabricSurface, PreviewSurface, Scene, Texture
+from fabricusd.reference.scene import FabricSurface, PreviewSurface, Scene
+from fabricusd.reference.usd_preview import PreviewNetwork
 from fabricusd.schema import read_binding
 
-_LARGEST = 4096
-"""Pixels a side that a texture is shrunk to."""
-
-_NUMBERS = {
-    "metallic": "metallic",
-    "roughness": "roughness",
-    "ior": "ior",
-    "opacity": "opacity",
-    "opacityThreshold": "opacity_threshold",
-}
-_COLORS = {"diffuseColor": "diffuse", "emissiveColor": "emissive"}
-_TEXTURED = {
-    "diffuseColor": "diffuse",
-    "emissiveColor": "emissive",
-    "metallic": "metallic",
-    "roughness": "roughness",
-    "opacity": "opacity",
-}
+_PURPOSES = (UsdShade.Tokens.full, UsdShade.Tokens.preview)
+"""Material purposes in the order in which they are looked for; each falls back on bindings without
+a purpose."""
 
 
 @dataclass(frozen=True)
@@ -55,43 +40,90 @@ class Materials:
 
     def of(self, prim: Usd.Prim) -> Resolved | None:
         """The surface of a mesh or subset, None where it says nothing about it."""
-        where = str(prim.GetPath())
-        if "FabricBindingAPI" in prim.GetAppliedSchemas():
-            try:
-                binding = read_binding(prim)
-            except (FabricError, IndexError) as error:
-                words = str(error) if isinstance(error, FabricError) else "names no fabric"
-                line = words if words.startswith(where) else f"{where} {words}"
-                self.scene.note(line, "- rendered without a fabric")
-            else:
-                return self._fabric(binding)
-        material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+        fabric = self._bound_fabric(prim)
+        if fabric is not None:
+            return fabric
+        material, relationship = self._bound_material(prim)
         if not material:
+            return None
+        if prim.IsA(UsdGeom.Subset) and relationship == self._bound_material(prim.GetParent())[1]:
+            # The mesh's own, which goes behind a fabric that the mesh wears.
             return None
         path = material.GetPath()
         if path not in self._known:
-            surface, uv_set = self._preview(material)
+            surface, uv_set = PreviewNetwork(material, self.time, self.scene).read()
             self._known[path] = self._add(surface, uv_set)
         return self._known[path]
+
+    def _bound_fabric(self, prim: Usd.Prim) -> Resolved | None:
+        where = str(prim.GetPath())
+        if "FabricBindingAPI" not in prim.GetAppliedSchemas():
+            if prim.GetRelationship("fabric:binding").GetTargets():
+                self.scene.note(
+                    where, "has fabric:binding but not FabricBindingAPI applied, left out"
+                )
+            return None
+        try:
+            return self._fabric(read_binding(prim))
+        except (FabricError, IndexError) as error:
+            words = str(error) if isinstance(error, FabricError) else "names no fabric"
+            line = words if words.startswith(where) else f"{where} {words}"
+            self.scene.note(line, "- rendered without a fabric")
+            return None
+
+    def _bound_material(self, prim: Usd.Prim) -> tuple[UsdShade.Material, Usd.Relationship]:
+        """The material that USD binds to `prim`, and by which relationship; none is noted where
+        one is named that is not there."""
+        api = UsdShade.MaterialBindingAPI(prim)
+        for purpose in _PURPOSES:
+            material, relationship = api.ComputeBoundMaterial(purpose)
+            if material:
+                return material, relationship
+        for owner in (prim, *_ancestors(prim)):
+            path = UsdShade.MaterialBindingAPI(owner).GetDirectBinding().GetMaterialPath()
+            if path and not path.isEmpty:
+                self.scene.note(
+                    str(owner.GetPath()), f"is bound to {path}, which is no material, left out"
+                )
+        return material, relationship
 
     def fallback(self, prim: Usd.Prim) -> Resolved:
         """The surface of a mesh that has none: the given fabric, its display colour, or grey."""
         if self.binding is not None:
             return self._fabric(self.binding)
-        color = None
-        primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("displayColor")
-        if primvar and primvar.HasValue():
-            values = primvar.Get(self.time)
-            if values is not None and len(values):
-                color = tuple(float(c) for c in np.mean(np.array(values), axis=0))
-        if color not in self._known:
+        color = self._display(prim, "displayColor", 3)
+        opacity = self._display(prim, "displayOpacity", 1)
+        key = color, opacity
+        if key not in self._known:
             surface = PreviewSurface(
                 name="displayColor" if color else "grey",
                 diffuse=color or (0.18, 0.18, 0.18),  # type: ignore[arg-type]
                 roughness=0.6,
+                opacity=min(max(opacity[0], 0.0), 1.0) if opacity else 1.0,
             )
-            self._known[color] = self._add(surface, "")
-        return self._known[color]
+            self._known[key] = self._add(surface, "")
+        return self._known[key]
+
+    def _display(self, prim: Usd.Prim, name: str, count: int) -> tuple[float, ...] | None:
+        """The mean of a display primvar of `count` channels; None where it has no usable value."""
+        primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+        given = primvar.Get(self.time) if primvar and primvar.HasValue() else None
+        if given is None or not len(given):
+            return None
+        where = str(prim.GetPath())
+        try:
+            values = np.array(given, np.float64).reshape(-1, count)
+        except (TypeError, ValueError):
+            self.scene.note(where, f"has {name} of the type {primvar.GetTypeName()}, left out")
+            return None
+        sound = values[np.isfinite(values).all(axis=1)]
+        if len(sound) < len(values):
+            self.scene.note(where, f"has {name} that is not finite, left out")
+        if not len(sound):
+            return None
+        if np.ptp(sound, axis=0).any():
+            self.scene.note(where, f"has {name} that varies; its mean is rendered")
+        return tuple(float(x) for x in np.maximum(sound.mean(axis=0), 0.0))
 
     def without_uv(self) -> Resolved:
         """The surface where a fabric cannot lie, since there are no UVs."""
@@ -114,86 +146,12 @@ class Materials:
         self._known["fabric", known.index] = known
         return known
 
-    def _preview(self, material: UsdShade.Material) -> tuple[PreviewSurface, str]:
-        """The material's UsdPreviewSurface and the UV set that its textures read."""
-        where = str(material.GetPath())
-        shader, _, _ = material.ComputeSurfaceSource()
-        if not shader or shader.GetIdAttr().Get() != "UsdPreviewSurface":
-            self.scene.note(where, "has no UsdPreviewSurface; it is rendered grey")
-            return PreviewSurface(name=where), ""
-        values: dict[str, Any] = {}
-        textures: dict[str, Texture] = {}
-        uv_set = ""
-        for name, field in {**_NUMBERS, **_COLORS}.items():
-            source = self._source(shader, name)
-            if source is None:
-                continue
-            if not isinstance(source, UsdShade.Shader):
-                values[field] = (
-                    tuple(float(c) for c in source) if name in _COLORS else float(source)
-                )
-            elif name in _TEXTURED:
-                texture, asked = self._texture(shader.GetInput(name), source, where)
-                uv_set = asked or uv_set
-                if texture is not None:
-                    textures[_TEXTURED[name]] = texture
-        if self._source(shader, "useSpecularWorkflow") == 1:
-            self.scene.note(where, "asks for the specular workflow; the metallic one is rendered")
-        return PreviewSurface(name=where, textures=textures, **values), uv_set
 
-    def _source(self, shader: UsdShade.Shader, name: str) -> Any:
-        """An input's value, or the shader that it is connected to; None where neither is."""
-        given = shader.GetInput(name)
-        if not given:
-            return None
-        for attribute in UsdShade.Utils.GetValueProducingAttributes(given):
-            producer = UsdShade.Shader(attribute.GetPrim())
-            if UsdShade.Output.IsOutput(attribute) and producer:
-                return producer
-            return attribute.Get(self.time)
-        return None
-
-    def _texture(
-        self, given: UsdShade.Input, shader: UsdShade.Shader, where: str
-    ) -> tuple[Texture | None, str]:
-        """The picture behind a UsdUVTexture, one channel or three, and its UV set."""
-        if shader.GetIdAttr().Get() != "UsdUVTexture":
-            self.scene.note(where, f"reads {given.GetBaseName()} from an unknown kind of node")
-            return None, ""
-        file = self._source(shader, "file")
-        fallback = self._source(shader, "fallback")
-        color = given.GetBaseName() in _COLORS
-        try:
-            if file is None or not file.path:
-                raise FabricError(where, "names no file")
-            space = str(self._source(shader, "sourceColorSpace") or "auto")
-            pixels = read_image(
-                file.resolvedPath or file.path, color_space=space if color else "raw",
-                most=_LARGEST,
-            )  # fmt: skip
-        except FabricError as error:
-            self.scene.note(where, f"is rendered without a texture: {error}")
-            if fallback is None:
-                return None, ""
-            pixels = np.array(fallback, np.float32)[:3].reshape(1, 1, 3)
-        scale, bias = self._source(shader, "scale"), self._source(shader, "bias")
-        if scale is not None:
-            pixels = pixels * np.array(scale, np.float32)[: pixels.shape[2]]
-        if bias is not None:
-            pixels = pixels + np.array(bias, np.float32)[: pixels.shape[2]]
-        if not color:
-            output = given.GetConnectedSources()[0][0].sourceName
-            channel = {"g": 1, "b": 2}.get(str(output), 0)
-            pixels = pixels[..., min(channel, pixels.shape[2] - 1)][..., None]
-        pixels = np.nan_to_num(pixels, nan=0.0, posinf=0.0, neginf=0.0)
-        wraps = [str(self._source(shader, n) or "repeat") for n in ("wrapS", "wrapT")]
-        known = [w if w in ("repeat", "clamp", "mirror", "black") else "repeat" for w in wraps]
-        reader = self._source(shader, "st")
-        name = ""
-        if isinstance(reader, UsdShade.Shader):
-            if reader.GetIdAttr().Get() == "UsdTransform2d":
-                self.scene.note(where, "moves a texture by UsdTransform2d, which is left out")
-                reader = self._source(reader, "in")
-            if isinstance(reader, UsdShade.Shader):
-                name = str(self._source(reader, "varname") or "")
-        return Texture(pixels=pixels.astype(np.float32), wrap=(known[0], known[1])), name
+def _ancestors(prim: Usd.Prim) -> list[Usd.Prim]:
+    """Parents of a prim, the nearest first, without the pseudo-root."""
+    found = []
+    parent = prim.GetParent()
+    while parent and not parent.IsPseudoRoot():
+        found.append(parent)
+        parent = parent.GetParent()
+    return found

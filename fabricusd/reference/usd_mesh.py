@@ -23,6 +23,17 @@ from fabricusd.reference.usd_subdivision import read_refinement
 MOST_TRIANGLES = 4_000_000
 """Triangles of a scene up to which surfaces are refined: some 4 GB with all that is done."""
 
+_OF_UVS = (
+    Sdf.ValueTypeNames.TexCoord2fArray,
+    Sdf.ValueTypeNames.TexCoord2dArray,
+    Sdf.ValueTypeNames.TexCoord2hArray,
+    Sdf.ValueTypeNames.Float2Array,
+)
+"""Types of primvars that are taken for UVs whatever their name."""
+
+_FARTHEST = 1e9
+"""Metres from the origin: beyond it squares of areas leave the range of 32-bit numbers."""
+
 
 def read_mesh(
     prim: Usd.Prim,
@@ -47,30 +58,49 @@ def read_mesh(
     if problem:
         scene.note(where, f"{problem}, left out")
         return None
+    if (counts < 3).any():
+        scene.note(where, f"has {int((counts < 3).sum())} faces below three corners, left out")
+    points = _near(points, matrix, metres, where, scene)
     mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
     cut = _tessellate(mesh, time, points, counts, indices, scene, level, mirrored=mirrored)
-    resolved, which = _materials(prim, mesh, materials, len(counts))
+    resolved, which = _materials(prim, mesh, materials, len(counts), time, scene)
     uv, missing = _uv(prim, resolved, which[cut.faces], cut, time, where, scene)
     numbers = np.array([r.index for r in resolved], np.int32)[which[cut.faces]]
     if missing.any():
         scene.note(where, "has no UVs for its fabric; it is rendered grey")
         numbers = np.where(missing, materials.without_uv().index, numbers)
     scheme = _scheme(mesh, time)
-    normals = _authored_normals(prim, mesh, cut, time) if scheme == "none" else cut.normals
+    normals = _authored_normals(prim, mesh, cut, time, scene) if scheme == "none" else cut.normals
     if normals is not None:
         # Normals turn by the inverse transpose; rows here are normals.
         turn = np.linalg.pinv(matrix[:3, :3]).astype(np.float32)
         normals = np.asarray(normals, np.float32) @ turn
-    world = cut.points @ matrix[:3, :3].T + matrix[:3, 3]
     return Mesh(
         path=where,
-        points=world * metres,
+        points=(cut.points @ matrix[:3, :3].T + matrix[:3, 3]) * metres,
         triangles=cut.triangles,
         normals=normals,
         smooth=scheme != "bilinear",
         uv=uv,
         material=numbers,
     )
+
+
+def _near(
+    points: NDArray[np.float64],
+    matrix: NDArray[np.float64],
+    metres: float,
+    where: str,
+    scene: Scene,
+) -> NDArray[np.float64]:
+    """The points, NaN where they lie beyond what can be traced, which is noted."""
+    world = (points @ matrix[:3, :3].T + matrix[:3, 3]) * metres
+    beyond = (np.abs(world) > _FARTHEST).any(axis=1)
+    far = np.asarray(np.isfinite(world).all(axis=1) & beyond)
+    if not far.any():
+        return points
+    scene.note(where, f"has {int(far.sum())} points beyond {_FARTHEST:g} m, which do not count")
+    return np.where(far[:, None], np.nan, points)
 
 
 def _scheme(mesh: UsdGeom.Mesh, time: Usd.TimeCode) -> str:
@@ -145,7 +175,12 @@ def _problem(points: Any, counts: Any, indices: Any) -> str:
 
 
 def _materials(
-    prim: Usd.Prim, mesh: UsdGeom.Mesh, materials: Materials, faces: int
+    prim: Usd.Prim,
+    mesh: UsdGeom.Mesh,
+    materials: Materials,
+    faces: int,
+    time: Usd.TimeCode,
+    scene: Scene,
 ) -> tuple[list[Resolved], NDArray[np.int64]]:
     """The mesh's surfaces, and which of them each face has."""
     resolved = [materials.of(prim)]
@@ -154,8 +189,15 @@ def _materials(
         own = materials.of(subset.GetPrim())
         if own is None or subset.GetElementTypeAttr().Get() != UsdGeom.Tokens.face:
             continue
-        chosen = np.array(subset.GetIndicesAttr().Get() or [], np.int64)
-        which[chosen[(chosen >= 0) & (chosen < faces)]] = len(resolved)
+        named = np.array(subset.GetIndicesAttr().Get(time) or [], np.int64)
+        chosen = named[(named >= 0) & (named < faces)]
+        where = str(subset.GetPath())
+        if len(chosen) < len(named):
+            scene.note(where, f"names {len(named) - len(chosen)} faces that are none, left out")
+        if (which[chosen] > 0).any():
+            taken = int((which[chosen] > 0).sum())
+            scene.note(where, f"takes {taken} faces from another subset; the last one has them")
+        which[chosen] = len(resolved)
         resolved.append(own)
     first = resolved[0] or (materials.fallback(prim) if (which == 0).any() else resolved[-1])
     return [first, *(r for r in resolved[1:] if r is not None)], which  # type: ignore[list-item]
@@ -182,11 +224,19 @@ def _uv(
         primvar = _uv_primvar(prim, surface, where, scene)
         name = primvar.GetName() if primvar else ""
         if name not in known:
-            known[name] = _at_corners(primvar, cut, time) if primvar else None
+            known[name] = _at_corners(primvar, cut, time, 2) if primvar else None
         values = known[name]
+        if primvar and values is None:
+            scene.note(
+                where, f"has a UV set '{primvar.GetPrimvarName()}' that does not fit its faces"
+            )
         if values is None:
             missing |= mine & surface.is_fabric
             continue
+        broken = ~np.isfinite(values[mine])
+        if broken.any():
+            count = int(broken.any(axis=(1, 2)).sum())
+            scene.note(where, f"has UVs that are not finite on {count} triangles; they count as 0")
         if mine.all():
             uv = values
         else:
@@ -204,10 +254,7 @@ def _uv_primvar(
     if primvar and primvar.HasValue():
         return primvar
     for other in api.GetPrimvarsWithValues():
-        kind = other.GetTypeName()
-        if kind in (Sdf.ValueTypeNames.TexCoord2fArray, Sdf.ValueTypeNames.Float2Array) or (
-            kind == Sdf.ValueTypeNames.TexCoord2dArray
-        ):
+        if other.GetTypeName() in _OF_UVS:
             if surface.uv_set:
                 scene.note(
                     where, f"has no UV set '{name}'; '{other.GetPrimvarName()}' is taken instead"
@@ -216,23 +263,34 @@ def _uv_primvar(
     return None
 
 
-def _at_corners(primvar: Any, cut: Tessellation, time: Usd.TimeCode) -> NDArray[np.float64] | None:
-    """(m, 3, c) values of a primvar at the triangles' corners; None where its length is wrong."""
+def _at_corners(
+    primvar: Any, cut: Tessellation, time: Usd.TimeCode, width: int
+) -> NDArray[np.float64] | None:
+    """(m, 3, width) values of a primvar at the triangles' corners; None where its type or its
+    length are others."""
     values = primvar.Get(time)
-    if values is None or not len(values):
+    try:
+        array = np.array([] if values is None else values, np.float64)
+    except (TypeError, ValueError):
+        return None
+    if array.ndim != 2 or array.shape[1] < width:
         return None
     indices = np.array(primvar.GetIndices(time), np.int64) if primvar.IsIndexed() else None
-    return cut.spread(np.array(values, np.float64), str(primvar.GetInterpolation()), indices)
+    return cut.spread(array[:, :width], str(primvar.GetInterpolation()), indices)
 
 
 def _authored_normals(
-    prim: Usd.Prim, mesh: UsdGeom.Mesh, cut: Tessellation, time: Usd.TimeCode
+    prim: Usd.Prim, mesh: UsdGeom.Mesh, cut: Tessellation, time: Usd.TimeCode, scene: Scene
 ) -> NDArray[np.float64] | None:
     """(m, 3, 3) normals of the file, or None; the primvar wins over the attribute."""
     primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals")
-    if primvar and primvar.HasValue():
-        return _at_corners(primvar, cut, time)
     authored = mesh.GetNormalsAttr().Get(time)
-    if authored is None or not len(authored):
+    if primvar and primvar.HasValue():
+        values = _at_corners(primvar, cut, time, 3)
+    elif authored is not None and len(authored):
+        values = cut.spread(np.array(authored, np.float64), str(mesh.GetNormalsInterpolation()))
+    else:
         return None
-    return cut.spread(np.array(authored, np.float64), str(mesh.GetNormalsInterpolation()))
+    if values is None:
+        scene.note(str(prim.GetPath()), "has normals that do not fit its faces; it is smoothed")
+    return values

@@ -5,27 +5,34 @@ Whatever cannot be read is left out and noted in one line; the rest is rendered.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Tf, Usd, UsdGeom
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 import fabricusd.schema  # registers the schema, before the first stage is opened
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, one_line
 from fabricusd.fabric import Binding
 from fabricusd.reference.scene import Camera, Scene
+from fabricusd.reference.usd_camera import read_camera
 from fabricusd.reference.usd_light import is_light, read_light
 from fabricusd.reference.usd_material import Materials
 from fabricusd.reference.usd_mesh import read_mesh
+from fabricusd.schema.source import compose_stage, usd_errors
 
 _PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 _DEEPEST = 8
 """Point instancers inside one another before they are taken for a cycle."""
 
-_SOLIDS = ("Cube", "Sphere", "Cylinder", "Cone", "Capsule", "Plane", "BasisCurves", "NurbsPatch")
+_OF_PROTOTYPES = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
+"""Prototypes often lie below an `over`, where nothing else would be seen."""
+
+_DETAIL = 1e-5
+"""Size of a mesh over that of the scene below which 32-bit coordinates show."""
 
 assert fabricusd.schema.PLUGIN_PATH
 
@@ -45,21 +52,21 @@ def read_usd_scene(
     level : how often the edges of subdivision surfaces are halved; 0 for their cages
     """
     stage, notes = _open(path)
-    return _Reader(stage, notes, binding, time_code, level).read(path, camera)
+    # What USD has to say of a prim would be several lines on standard error.
+    warnings = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        scene = _Reader(stage, notes, binding, time_code, level).read(path, camera)
+        for warning in warnings.TakeUncoalescedDiagnostics():
+            scene.note(str(path), f"USD: {one_line(warning.commentary, 300)}")
+    finally:
+        del warnings
+    return scene
 
 
 def _open(path: Path) -> tuple[Usd.Stage, list[str]]:
-    try:
-        stage = Usd.Stage.Open(str(path))
-    except Tf.ErrorException as error:
-        raise FabricError(str(path), f"cannot be read as USD: {_one_line(str(error))}") from error
-    notes = [f"{path} {_one_line(str(e))}" for e in stage.GetCompositionErrors()]
-    return stage, notes
-
-
-def _one_line(text: str) -> str:
-    words = " ".join(text.split())
-    return words if len(words) <= 200 else words[:197] + "..."
+    with usd_errors(str(path), "read as USD"):
+        stage = compose_stage(str(path))
+    return stage, [f"{path} {one_line(str(e), 200)}" for e in stage.GetCompositionErrors()]
 
 
 def as_matrix(matrix: Any) -> NDArray[np.float64]:
@@ -79,17 +86,22 @@ class _Reader:
         self.stage = stage
         self.level = level
         self.time = Usd.TimeCode.EarliestTime() if time_code is None else Usd.TimeCode(time_code)
-        self.metres = UsdGeom.GetStageMetersPerUnit(stage)
         self.scene = Scene(notes=notes, up_axis=str(UsdGeom.GetStageUpAxis(stage)))
+        self.metres = UsdGeom.GetStageMetersPerUnit(stage)
+        if not (math.isfinite(self.metres) and self.metres > 0):
+            where = stage.GetRootLayer().GetDisplayName()
+            self.scene.note(where, f"has metersPerUnit {self.metres:g}; 0.01 is taken")
+            self.metres = 0.01
         self.materials = Materials(self.scene, binding, self.time)
         self.cameras: list[Usd.Prim] = []
 
     def read(self, path: Path, camera: str | None) -> Scene:
         root = self.stage.GetPseudoRoot()
-        self._visit(root, UsdGeom.XformCache(self.time), np.eye(4), 0, ())
+        self._visit(root, UsdGeom.XformCache(self.time), np.eye(4), ())
         self.scene.camera = self._camera(path, camera)
         if not self.scene.meshes:
             self.scene.note(str(path), "holds no visible mesh with faces")
+        _note_small_meshes(self.scene)
         return self.scene
 
     def _visit(
@@ -97,37 +109,45 @@ class _Reader:
         root: Usd.Prim,
         cache: UsdGeom.XformCache,
         before: NDArray[np.float64],
-        depth: int,
         inside: tuple[Sdf.Path, ...],
     ) -> None:
-        """Add what is visible under `root`; `before` comes after each prim's own transform."""
+        """Add what is visible under `root`; `before` comes after each prim's own transform, from
+        `root`'s parent on."""
+        base = root if root.IsPseudoRoot() else root.GetParent()
         for prim in self._visible(root):
-            if prim.IsA(UsdGeom.PointInstancer):
-                self._instances(prim, cache, before, depth, inside)
-                continue
+            where = str(prim.GetPath())
             if prim.IsA(UsdGeom.Camera):
                 self.cameras.append(prim)
                 continue
-            matrix = before @ as_matrix(cache.GetLocalToWorldTransform(prim))
-            if prim.IsA(UsdGeom.Mesh):
-                mesh = read_mesh(
-                    prim, self.time, matrix, self.metres, self.materials, self.scene, self.level
-                )
-                if mesh is not None:
-                    self.scene.meshes.append(mesh)
+            matrix = before @ as_matrix(cache.ComputeRelativeTransform(prim, base)[0])
+            if not np.isfinite(matrix).all():
+                self.scene.note(where, "has a transform that is not finite, left out")
+            elif prim.IsA(UsdGeom.PointInstancer):
+                self._instances(prim, matrix, inside)
+            elif prim.IsA(UsdGeom.Mesh):
+                self._mesh(prim, matrix)
             elif is_light(prim):
                 light = read_light(prim, self.time, matrix, self.metres, self.scene)
                 if light is not None:
                     self.scene.lights.append(light)
-            elif prim.GetTypeName() in _SOLIDS:
-                self.scene.note(
-                    str(prim.GetPath()),
-                    f"is a {prim.GetTypeName()}, left out; only meshes are seen",
-                )
+            elif prim.IsA(UsdGeom.Gprim) or prim.GetTypeName() == "Volume":
+                self.scene.note(where, f"is a {prim.GetTypeName()}, left out; only meshes are seen")
+            elif "FabricBindingAPI" in prim.GetAppliedSchemas():
+                self.scene.note(where, "binds a fabric, left out: only meshes and subsets wear one")
+
+    def _mesh(self, prim: Usd.Prim, matrix: NDArray[np.float64]) -> None:
+        if is_light(prim):
+            self.scene.note(str(prim.GetPath()), "shines as a light, left out: it is a mesh alone")
+        mesh = read_mesh(
+            prim, self.time, matrix, self.metres, self.materials, self.scene, self.level
+        )
+        if mesh is not None:
+            self.scene.meshes.append(mesh)
 
     def _visible(self, root: Usd.Prim) -> Iterator[Usd.Prim]:
         """Prims under `root` in order, without invisible ones and what only serves others."""
-        walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+        which = Usd.PrimDefaultPredicate if root.IsPseudoRoot() else _OF_PROTOTYPES
+        walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(which)))
         for prim in walk:
             imageable = UsdGeom.Imageable(prim)
             if imageable:
@@ -140,16 +160,11 @@ class _Reader:
             yield prim
 
     def _instances(
-        self,
-        prim: Usd.Prim,
-        cache: UsdGeom.XformCache,
-        before: NDArray[np.float64],
-        depth: int,
-        inside: tuple[Sdf.Path, ...],
+        self, prim: Usd.Prim, world: NDArray[np.float64], inside: tuple[Sdf.Path, ...]
     ) -> None:
-        """Each instance of a point instancer: its prototype's prims, moved."""
+        """Each instance of a point instancer that lies at `world`: its prototype's prims, moved."""
         where = str(prim.GetPath())
-        if depth >= _DEEPEST or prim.GetPath() in inside:
+        if len(inside) >= _DEEPEST or prim.GetPath() in inside:
             self.scene.note(where, "instances itself; the inner instances are left out")
             return
         instancer = UsdGeom.PointInstancer(prim)
@@ -164,73 +179,55 @@ class _Reader:
                 self.time, self.time, exclude, UsdGeom.PointInstancer.IgnoreMask
             )
         except Tf.ErrorException as error:
-            self.scene.note(where, f"is left out: {_one_line(str(error))}")
+            self.scene.note(where, f"is left out: {one_line(str(error), 200)}")
             return
         mask = instancer.ComputeMaskAtTime(self.time) or [True] * len(indices)
-        world = before @ as_matrix(cache.GetLocalToWorldTransform(prim))
         if len(moves) != len(indices):
             self.scene.note(where, "has arrays of different lengths, left out")
             return
+        cache = UsdGeom.XformCache(self.time)
         for index, move, shown in zip(indices, moves, mask, strict=True):
             root = self.stage.GetPrimAtPath(targets[index]) if 0 <= index < len(targets) else None
-            if not root or not shown:
-                if shown:
-                    self.scene.note(where, f"names prototype {index}, which is no prim")
+            if not shown:
+                continue
+            if not root or root.IsAbstract():
+                self.scene.note(where, f"names prototype {index}, which is no prim to be seen")
                 continue
             # The prototype keeps its own transform, not those of its parents.
-            local = UsdGeom.XformCache(self.time)
-            parent = np.linalg.inv(as_matrix(local.GetParentToWorldTransform(root)))
-            self._visit(
-                root, local, world @ as_matrix(move) @ parent, depth + 1,
-                (*inside, prim.GetPath()),
-            )  # fmt: skip
+            self._visit(root, cache, world @ as_matrix(move), (*inside, prim.GetPath()))
 
     def _camera(self, path: Path, name: str | None) -> Camera | None:
+        """The camera `name`, or the first that sees anything; None where there is none."""
         if name is not None:
             prim = self.stage.GetPrimAtPath(name) if Sdf.Path.IsValidPathString(name) else None
             if not prim or not prim.IsA(UsdGeom.Camera):
                 known = ", ".join(str(p.GetPath()) for p in self.cameras) or "none"
                 raise FabricError(f"{path}:{name}", f"is no camera; the scene's are: {known}")
-        elif self.cameras:
-            prim = self.cameras[0]
-            if len(self.cameras) > 1:
-                self.scene.note(
-                    str(prim.GetPath()), f"is taken, the first of {len(self.cameras)} cameras"
-                )
-        else:
-            return None
-        return _read_camera(prim, self.time, self.metres)
+            found = read_camera(prim, self.time, self.metres, self.scene)
+            if found is None:
+                raise FabricError(str(path), self.scene.notes[-1])
+            return found
+        for prim in self.cameras:
+            found = read_camera(prim, self.time, self.metres, self.scene)
+            if found is not None:
+                if len(self.cameras) > 1:
+                    self.scene.note(found.path, f"is taken, one of {len(self.cameras)} cameras")
+                return found
+        return None
 
 
-def _read_camera(prim: Usd.Prim, time: Usd.TimeCode, metres: float) -> Camera:
-    camera = UsdGeom.Camera(prim)
-
-    def value(attribute: Any) -> float:
-        return float(attribute.Get(time))
-
-    frame = as_matrix(UsdGeom.XformCache(time).GetLocalToWorldTransform(prim))
-    frame[:3, 3] *= metres
-    lengths = np.linalg.norm(frame[:3, :3], axis=0)
-    frame[:3, :3] /= np.maximum(lengths, 1e-30)
-    # A camera's lengths on film are in tenths of a scene unit, whatever that is.
-    film = 0.1 * metres
-    orthographic = camera.GetProjectionAttr().Get(time) == UsdGeom.Tokens.orthographic
-    near, far = camera.GetClippingRangeAttr().Get(time)
-    return Camera(
-        path=str(prim.GetPath()),
-        frame=frame,
-        focal_length=value(camera.GetFocalLengthAttr()) * film,
-        aperture=(
-            value(camera.GetHorizontalApertureAttr()) * film,
-            value(camera.GetVerticalApertureAttr()) * film,
-        ),
-        aperture_offset=(
-            value(camera.GetHorizontalApertureOffsetAttr()) * film,
-            value(camera.GetVerticalApertureOffsetAttr()) * film,
-        ),
-        f_stop=value(camera.GetFStopAttr()),
-        focus_distance=value(camera.GetFocusDistanceAttr()) * metres,
-        orthographic=orthographic,
-        clipping=(near * metres, far * metres),
-        exposure=value(camera.GetExposureAttr()),
-    )
+def _note_small_meshes(scene: Scene) -> None:
+    """One line for each mesh that is lost in the size of its scene."""
+    found = [(m, m.points[np.isfinite(m.points).all(axis=1)]) for m in scene.meshes]
+    boxes = [(mesh, p.min(axis=0), p.max(axis=0)) for mesh, p in found if len(p)]
+    if not boxes:
+        return
+    low, high = np.min([b[1] for b in boxes], axis=0), np.max([b[2] for b in boxes], axis=0)
+    whole = float(np.linalg.norm(high - low))
+    for mesh, low, high in boxes:
+        size = float(np.linalg.norm(high - low))
+        if 0 < size < _DETAIL * whole:
+            scene.note(
+                mesh.path,
+                f"is {size:.3g} m wide in a scene of {whole:.3g} m; 32-bit coordinates show there",
+            )

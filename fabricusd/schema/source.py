@@ -56,15 +56,16 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
         if Sdf.FileFormat.FindByExtension(str(path)) is None:
             raise FabricError(str(path), "is not USD; it must be .usda, .usdc, .usd or .usdz")
         require_schema()
-        stage = _composed(str(path))
+        stage = compose_stage(str(path))
         errors = stage.GetCompositionErrors()
         if errors:
             raise FabricError(str(path), f"does not compose: {one_line(str(errors[0]), 300)}")
     return stage, str(path)
 
 
-def _composed(path: str) -> Usd.Stage:
-    # USD also prints composition errors as warnings; `open_stage` raises them, once.
+def compose_stage(path: str) -> Usd.Stage:
+    """The stage of a file as it is on disk now; composition errors are the caller's to look at."""
+    # USD also prints them as warnings.
     silence = UsdUtils.CoalescingDiagnosticDelegate()
     try:
         layer = Sdf.Layer.FindOrOpen(path)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fabricusd.appearance.compiled import true_repeat
+from fabricusd.appearance.footprint import FAR, weights
 from fabricusd.chart.cloth_picture import SIZE, difference, ideal_spectrum, picture, view_of
-from fabricusd.schema import load
+from fabricusd.schema import load, preset_names
 
 
 def waves(*parts: tuple[int, int, float]) -> np.ndarray:
@@ -64,3 +66,18 @@ def test_a_close_view_is_nearly_its_spectrum():
     assert found.total < 0.3 * contrast
     turned = ideal_spectrum(view).T
     assert difference(picture(view, "weave", 4), turned).total > 0.5 * contrast
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_auto_shows_of_a_repeat_what_a_picture_can_hold(name):
+    """All of it from four pixels a repeat on; below two no moire, and nothing that is missing."""
+    fabric = load(name)
+    repeat = max(true_repeat(fabric))
+    assert weights(fabric, [[repeat / 4.0] * 2])[0, FAR] == 0.0
+    view = view_of(fabric, repeat / 1.8)
+    far, weave = picture(view, "far", 1), picture(view, "weave", 4)
+    share = weights(fabric, [[view.threads_per_pixel] * 2])[0, FAR]
+    ideal = ideal_spectrum(view)
+    auto, woven = (difference(p, ideal) for p in (share * far + (1 - share) * weave, weave))
+    assert auto.alias < 0.1 * woven.alias
+    assert auto.blur < woven.blur + 0.01

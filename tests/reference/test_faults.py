@@ -96,6 +96,92 @@ def missing_reference(stage):
     UsdGeom.Xform.Define(stage, "/bad").GetPrim().GetReferences().AddReference("./lost.usda")
 
 
+def infinite_transform(stage):
+    mesh = square(stage, "/bad")
+    mesh.CreateNormalsAttr([(0, 1, 0)] * 4)
+    UsdGeom.XformCommonAPI(mesh).SetTranslate((math.inf, 0, 0))
+
+
+def far_point(stage):
+    square(stage, "/bad").GetPointsAttr().Set([(1e30, 0, 0), *SQUARE[1:]])
+
+
+def two_corners(stage):
+    mesh = square(stage, "/bad", uv=False)
+    mesh.GetFaceVertexCountsAttr().Set([2, 3])
+    mesh.GetFaceVertexIndicesAttr().Set([0, 1, 0, 3, 2])
+
+
+def lost_in_the_distance(stage):
+    UsdGeom.XformCommonAPI(square(stage, "/bad")).SetTranslate((1e7, 0, 0))
+
+
+def uv_of(values, kind=Sdf.ValueTypeNames.TexCoord2fArray):
+    def make(stage):
+        mesh = square(stage, "/bad", uv=False)
+        UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", kind, "faceVarying").Set(values)
+        bind_fabric(stage, mesh.GetPrim())
+
+    return make
+
+
+def normals_too_few(stage):
+    square(stage, "/bad").CreateNormalsAttr([(0, 1, 0)] * 2)
+
+
+def overlapping_subsets(stage):
+    mesh = square(stage, "/bad")
+    material = UsdShade.Material.Define(stage, "/m")
+    shader = UsdShade.Shader.Define(stage, "/m/surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+    for name, faces in (("a", [0, 7]), ("b", [0])):
+        subset = UsdGeom.Subset.CreateGeomSubset(mesh, name, UsdGeom.Tokens.face, faces)
+        UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
+
+
+def no_unit(stage):
+    UsdGeom.SetStageMetersPerUnit(stage, 0.0)
+
+
+def fabric_on_a_group(stage):
+    bind_fabric(stage, UsdGeom.Xform.Define(stage, "/bad").GetPrim())
+
+
+def fabric_without_its_api(stage):
+    prim = square(stage, "/bad").GetPrim()
+    prim.CreateRelationship("fabric:binding").SetTargets(["/Looks/Cloth"])
+
+
+def binding_without_its_api(stage):
+    prim = square(stage, "/bad").GetPrim()
+    UsdShade.Material.Define(stage, "/m")
+    prim.CreateRelationship("material:binding").SetTargets(["/m"])
+
+
+def abstract_prototype(stage):
+    stage.CreateClassPrim("/_proto")
+    square(stage, "/_proto/square")
+    instancer = UsdGeom.PointInstancer.Define(stage, "/bad")
+    instancer.CreatePrototypesRel().SetTargets(["/_proto/square"])
+    instancer.CreatePositionsAttr([(0, 0, 0)])
+    instancer.CreateProtoIndicesAttr([0])
+
+
+def instancer_arrays(stage):
+    abstract_prototype(stage)
+    UsdGeom.PointInstancer(stage.GetPrimAtPath("/bad")).GetProtoIndicesAttr().Set([0, 0])
+
+
+def camera(**values):
+    def make(stage):
+        prim = UsdGeom.Camera.Define(stage, "/bad").GetPrim()
+        for name, value in values.items():
+            prim.GetAttribute(name).Set(value)
+
+    return make
+
+
 FAULTS = {
     "points that are not finite": (nan_points, "/bad has 1 points that are not finite"),
     "triangles without area": (degenerate, "/bad has 2 triangles without area"),
@@ -112,7 +198,33 @@ FAULTS = {
     "a reference to itself": (cyclic_reference, "/bad"),
     "a solid": (solid, "/bad is a Cube, left out"),
     "a reference to a file that is not there": (missing_reference, "lost.usda"),
-}
+    "a transform that is not finite": (infinite_transform, "/bad has a transform that is not fin"),
+    "a point beyond 32-bit numbers": (far_point, "/bad has 1 points beyond 1e+09 m"),
+    "a face of two corners": (two_corners, "/bad has 1 faces below three corners"),
+    "a mesh lost in its scene": (lost_in_the_distance, "/bad is 2.83 m wide in a scene of 1e+07"),
+    "UVs that are not finite": (
+        uv_of([(0, 0), (1, 0), (math.nan, 1), (0, 1)]), "/bad has UVs that are not finite",
+    ),
+    "too few UVs": (uv_of([(0, 0)]), "/bad has a UV set 'st' that does not fit its faces"),
+    "UVs of text": (
+        uv_of(["a"] * 4, Sdf.ValueTypeNames.StringArray), "/bad has a UV set 'st' that does not",
+    ),
+    "too few normals": (normals_too_few, "/bad has normals that do not fit its faces"),
+    "a subset of faces that are none": (overlapping_subsets, "/bad/a names 1 faces that are none"),
+    "subsets that overlap": (overlapping_subsets, "/bad/b takes 1 faces from another subset"),
+    "no unit of length": (no_unit, "scene.usda has metersPerUnit 0; 0.01 is taken"),
+    "a fabric bound to a group": (fabric_on_a_group, "/bad binds a fabric, left out"),
+    "a fabric bound without its API": (fabric_without_its_api, "/bad has fabric:binding but not"),
+    "a material bound without its API": (binding_without_its_api, "MaterialBindingAPI is not"),
+    "a prototype that is a class": (abstract_prototype, "/bad names prototype 0"),
+    "an instancer's arrays that differ": (instancer_arrays, "/bad has arrays of different lengths"),
+    "a camera without focal length": (camera(focalLength=0.0), "/bad has focalLength 0"),
+    "a camera without film": (camera(horizontalAperture=0.0), "/bad has horizontalAperture 0"),
+    "a camera that is no number": (camera(focalLength=math.nan), "/bad has focalLength nan"),
+    "a camera clipped to nothing": (camera(clippingRange=(5, 1)), "/bad has clippingRange 5 to 1"),
+    "an aperture without focus": (camera(fStop=2.0), "/bad has f-stop 2 and no focus distance"),
+    "clipping planes": (camera(clippingPlanes=[(0, 0, 1, 0)]), "/bad has clipping planes"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -129,6 +241,16 @@ def test_a_fault_is_one_line_and_the_rest_is_rendered(tmp_path, name):
     assert any(m.path == "/good" for m in scene.meshes)
 
 
+def test_usd_itself_writes_nothing_to_standard_error(tmp_path, capfd):
+    stage = new_stage(tmp_path)
+    instancer_arrays(stage)
+    missing_reference(stage)
+    binding_without_its_api(stage)
+    capfd.readouterr()
+    read(stage)
+    assert capfd.readouterr().err == ""
+
+
 def test_a_camera_that_is_not_there_is_an_error_that_names_those_that_are(tmp_path):
     stage = new_stage(tmp_path)
     UsdGeom.Camera.Define(stage, "/front")
@@ -140,6 +262,7 @@ FILES = {
     "missing": (None, "cannot be read"),
     "empty": (b"", "is empty"),
     "not USD": (b"hello", "cannot be read as USD"),
+    "a word too many": (b'#usda 1.0\ndef Mesh "m" { int a = 1 b }\n', r"^[^ ]*x.usda .*:2:"),
 }
 
 

@@ -249,3 +249,39 @@ def test_weave_coordinates_far_from_the_origin_keep_their_place_in_the_thread(tm
         np.abs(base[0] - expected).max() < 1e-3
         or np.abs(np.abs(base[0] - expected) - repeat).max() < 1e-3
     )
+
+
+def test_prototypes_below_an_over_and_below_a_flat_parent_are_placed(tmp_path):
+    stage = new_stage(tmp_path)
+    square(stage, "/hidden/a")
+    stage.GetPrimAtPath("/hidden").SetSpecifier(Sdf.SpecifierOver)
+    flat = UsdGeom.Xform.Define(stage, "/flat")
+    UsdGeom.XformCommonAPI(flat).SetScale((0, 0, 0))
+    square(stage, "/flat/b")
+    instancer = UsdGeom.PointInstancer.Define(stage, "/many")
+    instancer.CreatePrototypesRel().SetTargets(["/hidden/a", "/flat/b"])
+    instancer.CreatePositionsAttr([(5, 0, 0), (9, 0, 0)])
+    instancer.CreateProtoIndicesAttr([0, 1])
+    placed = [m for m in read(stage).meshes if np.ptp(m.points) > 0]
+    assert sorted(m.points[:, 0].mean() for m in placed) == pytest.approx([5, 9])
+
+
+def test_a_transform_that_is_reset_ignores_its_parents(tmp_path):
+    stage = new_stage(tmp_path)
+    UsdGeom.XformCommonAPI(UsdGeom.Xform.Define(stage, "/group")).SetTranslate((0, 9, 0))
+    mesh = square(stage, "/group/square")
+    UsdGeom.XformCommonAPI(mesh).SetTranslate((0, 0, 3))
+    mesh.SetResetXformStack(True)
+    assert read(stage).meshes[0].points.mean(axis=0) == pytest.approx([0, 0, 3])
+
+
+def test_the_same_file_is_read_as_it_is_now(tmp_path):
+    from fabricusd.reference.read import read_scene
+
+    stage = new_stage(tmp_path)
+    square(stage)
+    path = stage.GetRootLayer().realPath
+    assert len(read(stage).meshes) == 1
+    text = stage.GetRootLayer().ExportToString()
+    (tmp_path / "scene.usda").write_text(text + text[text.index("def") :].replace("square", "two"))
+    assert len(read_scene(path).meshes) == 2
