@@ -21,7 +21,7 @@ from fabricusd.reference.usd_material import Materials, Resolved
 from fabricusd.reference.usd_subdivision import read_refinement
 
 MOST_TRIANGLES = 4_000_000
-"""Triangles of a scene up to which surfaces are refined: some 4 GB with all that is done."""
+"""Triangles that a scene's surfaces are refined to, together: some 3 GB with all that is done."""
 
 _OF_UVS = (
     Sdf.ValueTypeNames.TexCoord2fArray,
@@ -134,10 +134,11 @@ def _tessellate(
 def _affordable(mesh: UsdGeom.Mesh, refinement: Refinement, level: int, scene: Scene) -> int:
     """`level`, or with a note a lower one for which there is memory."""
     topology = refinement.cage.topology
-    before = sum(len(m.triangles) for m in scene.meshes)
-    wanted, asked = before + triangles_at(topology, level), level
-    while level and before + triangles_at(topology, level) > MOST_TRIANGLES:
+    wanted, asked = scene.refined + triangles_at(topology, level), level
+    while level and scene.refined + triangles_at(topology, level) > MOST_TRIANGLES:
         level -= 1
+    if level:
+        scene.refined += triangles_at(topology, level)
     if level < asked:
         names = list(COMPLEXITIES)
         scene.note(
