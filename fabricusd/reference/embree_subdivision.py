@@ -90,7 +90,8 @@ class LimitSurface:
         self._face = np.repeat(np.arange(len(counts)), counts)
         self._corner = np.arange(len(indices)) - starts[self._face]
         # Float32 is spent on the shape, wherever it lies.
-        low, high = points.min(axis=0), points.max(axis=0)
+        used = points[indices]
+        low, high = used.min(axis=0), used.max(axis=0)
         self._middle = 0.5 * (low + high)
         self._scale = float((high - low).max()) or 1.0
         # Embree reads 16 bytes for the last vertex.

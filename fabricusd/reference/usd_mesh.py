@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
+from fabricusd.errors import FabricError
 from fabricusd.reference.limit_grid import triangles_at
 from fabricusd.reference.scene import Mesh, Scene
 from fabricusd.reference.subdivision import COMPLEXITIES
@@ -125,9 +126,12 @@ def _tessellate(
         refinement = read_refinement(mesh, time, points, counts, indices, hidden, scene, level)
         level = 0 if refinement is None else _affordable(mesh, refinement, level, scene)
         if refinement is not None and level:
-            return RefinedTessellation(
-                refinement, level, left_handed=left_handed, reverse=left_handed != mirrored
-            )
+            try:
+                return RefinedTessellation(
+                    refinement, level, left_handed=left_handed, reverse=left_handed != mirrored
+                )
+            except FabricError as error:
+                scene.note(str(mesh.GetPath()), f"is rendered at its cage: {error}")
     return CageTessellation(points, counts, indices, hidden=hidden, reverse=left_handed != mirrored)
 
 

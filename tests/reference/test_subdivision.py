@@ -11,7 +11,7 @@ from pxr import Gf, Sdf, UsdGeom, UsdShade
 from scipy.spatial import cKDTree
 
 from fabricusd.errors import FabricError
-from fabricusd.reference import embree, usd_mesh
+from fabricusd.reference import embree, subdivision, usd_mesh
 from fabricusd.reference.render import render
 from fabricusd.reference.triangles import build_tables
 from tests.reference.catmull_clark import FOREVER, limit_of
@@ -173,6 +173,19 @@ def test_triangles_and_normals_face_the_front(tmp_path, name):
     assert np.abs(p - middle).max(axis=(0, 1)) == pytest.approx(
         np.array([0.03, 0.02, 0.01]) * 0.8395, rel=1e-3
     )
+
+
+def test_far_from_the_origin_the_shape_is_kept(tmp_path):
+    stage = new_stage(tmp_path)
+    # The last point belongs to no face.
+    mesh = cage(stage, [*((x + 4096, y, z) for x, y, z in CUBE), (0, 0, 0)], SIDES)
+    coordinates(mesh, [(1e4 + u, v) for u, v in [(0, 0), (1, 0), (1, 1), (0, 1)] * 6])
+    far = refined(stage)
+    cage(stage, CUBE, SIDES)
+    coordinates(mesh, [(0, 0), (1, 0), (1, 1), (0, 1)] * 6)
+    near = refined(stage)
+    assert far.points - (4096, 0, 0) == pytest.approx(near.points, abs=1e-6)
+    assert far.uv - (1e4, 0) == pytest.approx(near.uv, abs=1e-6)
 
 
 def test_authored_normals_are_ignored(tmp_path):
@@ -490,6 +503,18 @@ def test_loop_surfaces_and_a_missing_library_leave_the_cage(tmp_path, monkeypatc
     scene = read(stage, complexity="high")
     assert len(scene.meshes[0].triangles) == len(THIRDS)
     assert [n.endswith("Embree's own library is not here") for n in scene.notes] == [True]
+
+
+def test_what_embree_refuses_leaves_the_cage(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise FabricError("Embree", "refuses a cage of 6 faces (4)")
+
+    monkeypatch.setattr(subdivision, "LimitSurface", refuse)
+    stage = new_stage(tmp_path)
+    cage(stage, CUBE, SIDES)
+    scene = read(stage, complexity="high")
+    assert scene.notes == ["/mesh is rendered at its cage: Embree refuses a cage of 6 faces (4)"]
+    assert len(scene.meshes[0].triangles) == 12
 
 
 def test_a_surface_that_would_be_too_large_is_refined_less(tmp_path, monkeypatch):
