@@ -309,6 +309,7 @@ def _sample(
         if not Batches(workers, task).run(len(starts), report):
             return False
         done += samples
+        film.compare_halves()
         if noise is not None:
             active = order[film.relative_error()[order] > noise]
     return True
