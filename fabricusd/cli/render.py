@@ -49,6 +49,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--max-error", type=float, metavar="E", help="choose --shadow, and --noise, by this bound"
     )
+    parser.add_argument(
+        "--complexity", choices=("low", "medium", "high", "veryhigh"), default="high",
+        help="of subdivision surfaces; low: their cages (default: high)",
+    )  # fmt: skip
     parser.add_argument("--aov", action="append", default=[], metavar="LAYER", help="or 'all'")
     parser.add_argument("--frames", metavar="A-B", help="time codes: 7, 1-10, 1-10x2, or a list")
     parser.add_argument("--exposure", type=float, default=0.0, metavar="STOPS", help="of the .png")
@@ -73,7 +77,9 @@ def run(options: argparse.Namespace) -> int:
         fabric, _ = load_any(options.fabric)
     _choose(options, fabric)
     if options.dry_run:
-        scene = read_scene(options.scene, fabric=fabric, camera=options.camera)
+        scene = read_scene(
+            options.scene, fabric=fabric, camera=options.camera, complexity=options.complexity
+        )
         _tell(scene.notes, options)
         triangles = sum(len(mesh.triangles) for mesh in scene.meshes)
         words = f"{len(scene.meshes)} meshes, {triangles} triangles, {len(scene.lights)} lights"
@@ -87,7 +93,8 @@ def run(options: argparse.Namespace) -> int:
             width=options.width, height=options.height, spp=options.spp, noise=options.noise,
             max_bounces=options.max_bounces, level=options.level, shadow=options.shadow,
             limits=options.limits, aovs=layers, frames=frames, seed=options.seed,
-            workers=options.workers, exposure=options.exposure, progress=progress,
+            workers=options.workers, exposure=options.exposure,
+            complexity=options.complexity, progress=progress,
         )  # fmt: skip
     finally:
         bar()

@@ -2,7 +2,8 @@
 
 The C library that the embreex wheel ships is called by name from compiled kernels, without the
 interpreter in between. Where that library is not found, embreex's own Python interface answers the
-same two questions, slower. No other file of the project knows Embree.
+same two questions, slower. The only other file of the project that knows Embree is
+`embree_subdivision`, which asks the same library for limit surfaces.
 
 Rays travel as Embree's own `RTCRayHit16`: an array (packets, ROWS, 16) float32 whose rows are named
 below; rows 9, 10, 11, 17, 18, ... hold unsigned integers. A lane whose `TFAR` is below its `TNEAR`
@@ -80,10 +81,18 @@ def _find_library() -> str | None:
     return None
 
 
-def _declare(library: ctypes.CDLL) -> None:
+def declare(library: ctypes.CDLL, functions: tuple[tuple[Any, ...], ...]) -> None:
+    """Give functions of the library their types: (name, result, *arguments) each."""
+    for name, result, *arguments in functions:
+        function = getattr(library, name)
+        function.restype = result
+        function.argtypes = arguments
+
+
+def _declare_scene(library: ctypes.CDLL) -> None:
     """Give the few functions that build a scene their types."""
     pointer, size, unsigned = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_uint
-    for name, result, *arguments in (
+    declare(library, (
         ("rtcNewDevice", pointer, ctypes.c_char_p),
         ("rtcNewScene", pointer, pointer),
         ("rtcNewGeometry", pointer, pointer, ctypes.c_int),
@@ -98,10 +107,7 @@ def _declare(library: ctypes.CDLL) -> None:
         ("rtcReleaseDevice", None, pointer),
         ("rtcGetDeviceProperty", ctypes.c_ssize_t, pointer, ctypes.c_int),
         ("rtcGetDeviceError", ctypes.c_int, pointer),
-    ):  # fmt: skip
-        function = getattr(library, name)
-        function.restype = result
-        function.argtypes = arguments
+    ))  # fmt: skip
 
 
 _LIBRARY: ctypes.CDLL | None = None
@@ -109,11 +115,17 @@ _PATH = _find_library()
 if _PATH is not None:
     try:
         _LIBRARY = ctypes.CDLL(_PATH)
-        _declare(_LIBRARY)
+        _declare_scene(_LIBRARY)
         # Kernels find the functions by name, also those that come out of numba's disk cache.
         binding.load_library_permanently(_PATH)
     except (OSError, AttributeError, RuntimeError):
         _LIBRARY = None
+
+
+def library() -> ctypes.CDLL | None:
+    """Embree's C library, None where embreex's own interface must do."""
+    return _LIBRARY
+
 
 _trace16 = types.void(types.uintp, types.uintp, types.uintp, types.uintp)
 _rtcIntersect16 = types.ExternalFunction("rtcIntersect16", _trace16)

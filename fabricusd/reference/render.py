@@ -93,6 +93,7 @@ def render(
     pixel_filter: str = "tent",
     exposure: float = 0.0,
     estimator: str = "mis",
+    complexity: str = "high",
     progress: Progress | None = None,
 ) -> RenderResult:
     """Path-trace `scene` (a USD, OBJ, GLB or PLY file, or a `Scene`) and write `out`.
@@ -105,6 +106,8 @@ def render(
     noise : stop a pixel when its relative error is below this
     frames : time codes; None for the stage's default time
     exposure : of the PNG, in stops, added to the camera's own
+    complexity : how finely subdivision surfaces are refined: "low" (their cages), "medium", "high"
+        or "veryhigh", as usdrecord and usdview have it
 
     Raises `FabricError` for what cannot be rendered at all; what had to be left out is in the
     result's `notes`. On Ctrl-C what is done is written, and `complete` is False.
@@ -123,7 +126,9 @@ def render(
             loaded = (
                 scene
                 if isinstance(scene, Scene)
-                else read_scene(scene, fabric=fabric, camera=camera, time_code=time_code)
+                else read_scene(
+                    scene, fabric=fabric, camera=camera, time_code=time_code, complexity=complexity
+                )
             )
             result = render_scene(
                 loaded, width=width, height=height, spp=spp, noise=noise, max_bounces=max_bounces,
@@ -354,6 +359,7 @@ def _sample(
         if not Batches(workers, task, stop).run(len(starts), report):
             return False
         done += samples
+        film.compare_halves()
         if noise is not None:
             active = order[film.relative_error()[order] > noise]
     return True

@@ -134,7 +134,10 @@ class Camera:
 
 @dataclass(kw_only=True, eq=False)
 class Scene:
-    """Everything to render, and what had to be left out or assumed on the way (`notes`)."""
+    """Everything to render, and what had to be left out or assumed on the way (`notes`).
+
+    refined : triangles that subdivision surfaces were refined to
+    """
 
     meshes: list[Mesh] = field(default_factory=list)
     materials: list[Material] = field(default_factory=list)
@@ -142,6 +145,7 @@ class Scene:
     camera: Camera | None = None
     notes: list[str] = field(default_factory=list)
     up_axis: str = "Y"
+    refined: int = 0
 
     def note(self, where: str, problem: str) -> None:
         """Keep one clear line about `where`, once."""

@@ -8,9 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
-from fabricusd.reference.polygons import triangulate
+from fabricusd.errors import FabricError
+from fabricusd.reference.limit_grid import triangles_at
 from fabricusd.reference.scene import Mesh, Scene
+from fabricusd.reference.subdivision import COMPLEXITIES
+from fabricusd.reference.tessellation import (
+    CageTessellation,
+    RefinedTessellation,
+    Refinement,
+    Tessellation,
+)
 from fabricusd.reference.usd_material import Materials, Resolved
+from fabricusd.reference.usd_subdivision import read_refinement
+
+MOST_TRIANGLES = 4_000_000
+"""Triangles that a scene's surfaces are refined to, together: some 3 GB with all that is done."""
 
 _OF_UVS = (
     Sdf.ValueTypeNames.TexCoord2fArray,
@@ -31,10 +43,12 @@ def read_mesh(
     metres: float,
     materials: Materials,
     scene: Scene,
+    level: int = 0,
 ) -> Mesh | None:
     """The mesh in world space and metres, or None with a note where it has no usable faces.
 
     matrix : (4, 4) local to world, in scene units of `metres`
+    level : how often the edges of a subdivision surface are halved
     """
     where = str(prim.GetPath())
     mesh = UsdGeom.Mesh(prim)
@@ -45,39 +59,112 @@ def read_mesh(
     if problem:
         scene.note(where, f"{problem}, left out")
         return None
-    scheme = str(mesh.GetSubdivisionSchemeAttr().Get(time) or "none")
-    if scheme != "none":
-        scene.note(where, f"is a subdivision surface ({scheme}), rendered at its cage")
     if (counts < 3).any():
         scene.note(where, f"has {int((counts < 3).sum())} faces below three corners, left out")
-    faces, corners = triangulate(points, counts, indices)
-    holes = np.array(mesh.GetHoleIndicesAttr().Get(time) or [], np.int64)
-    if len(holes):
-        kept = ~np.isin(faces, holes)
-        faces, corners = faces[kept], corners[kept]
-    left_handed = mesh.GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded
-    if left_handed != (np.linalg.det(matrix[:3, :3]) < 0):
-        corners = corners[:, ::-1]
+    points = _near(points, matrix, metres, where, scene)
+    mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
+    cut = _tessellate(mesh, time, points, counts, indices, scene, level, mirrored=mirrored)
     resolved, which = _materials(prim, mesh, materials, len(counts), time, scene)
-    uv, missing = _uv(prim, resolved, which[faces], faces, corners, indices, time, where, scene)
-    numbers = np.array([r.index for r in resolved], np.int32)[which[faces]]
+    uv, missing = _uv(prim, resolved, which[cut.faces], cut, time, where, scene)
+    numbers = np.array([r.index for r in resolved], np.int32)[which[cut.faces]]
     if missing.any():
         scene.note(where, "has no UVs for its fabric; it is rendered grey")
         numbers = np.where(missing, materials.without_uv().index, numbers)
-    normals = _normals(prim, mesh, faces, corners, indices, time, matrix, scene)
-    world = (points @ matrix[:3, :3].T + matrix[:3, 3]) * metres
-    far = np.isfinite(world).all(axis=1) & (np.abs(world) > _FARTHEST).any(axis=1)
-    if far.any():
-        scene.note(where, f"has {int(far.sum())} points beyond {_FARTHEST:g} m, which do not count")
-        world[far] = np.nan
+    scheme = _scheme(mesh, time)
+    normals = _authored_normals(prim, mesh, cut, time, scene) if scheme == "none" else cut.normals
+    if normals is not None:
+        # Normals turn by the inverse transpose; rows here are normals.
+        turn = np.linalg.pinv(matrix[:3, :3]).astype(np.float32)
+        normals = np.asarray(normals, np.float32) @ turn
     return Mesh(
         path=where,
-        points=world,
-        triangles=indices[corners],
+        points=(cut.points @ matrix[:3, :3].T + matrix[:3, 3]) * metres,
+        triangles=cut.triangles,
         normals=normals,
+        smooth=scheme != "bilinear",
         uv=uv,
         material=numbers,
     )
+
+
+def _near(
+    points: NDArray[np.float64],
+    matrix: NDArray[np.float64],
+    metres: float,
+    where: str,
+    scene: Scene,
+) -> NDArray[np.float64]:
+    """The points, NaN where they lie beyond what can be traced, which is noted."""
+    world = (points @ matrix[:3, :3].T + matrix[:3, 3]) * metres
+    beyond = (np.abs(world) > _FARTHEST).any(axis=1)
+    far = np.asarray(np.isfinite(world).all(axis=1) & beyond)
+    if not far.any():
+        return points
+    scene.note(where, f"has {int(far.sum())} points beyond {_FARTHEST:g} m, which do not count")
+    return np.where(far[:, None], np.nan, points)
+
+
+def _scheme(mesh: UsdGeom.Mesh, time: Usd.TimeCode) -> str:
+    return str(mesh.GetSubdivisionSchemeAttr().Get(time) or "none")
+
+
+def _tessellate(
+    mesh: UsdGeom.Mesh,
+    time: Usd.TimeCode,
+    points: NDArray[np.float64],
+    counts: NDArray[np.int64],
+    indices: NDArray[np.int64],
+    scene: Scene,
+    level: int,
+    *,
+    mirrored: bool,
+) -> Tessellation:
+    """The faces as triangles: refined if they are those of a subdivision surface, and it can be."""
+    left_handed = mesh.GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded
+    hidden = _holes(mesh, time, len(counts), scene)
+    if _scheme(mesh, time) not in ("none", "bilinear"):
+        refinement = read_refinement(mesh, time, points, counts, indices, hidden, scene, level)
+        level = 0 if refinement is None else _affordable(mesh, refinement, level, scene)
+        if refinement is not None and level:
+            try:
+                return RefinedTessellation(
+                    refinement, level, left_handed=left_handed, reverse=left_handed != mirrored
+                )
+            except FabricError as error:
+                scene.note(str(mesh.GetPath()), f"is rendered at its cage: {error}")
+    return CageTessellation(points, counts, indices, hidden=hidden, reverse=left_handed != mirrored)
+
+
+def _affordable(mesh: UsdGeom.Mesh, refinement: Refinement, level: int, scene: Scene) -> int:
+    """`level`, or with a note a lower one for which there is memory."""
+    topology = refinement.cage.topology
+    wanted, asked = scene.refined + triangles_at(topology, level), level
+    while level and scene.refined + triangles_at(topology, level) > MOST_TRIANGLES:
+        level -= 1
+    if level:
+        scene.refined += triangles_at(topology, level)
+    if level < asked:
+        names = list(COMPLEXITIES)
+        scene.note(
+            str(mesh.GetPath()),
+            f"is refined as by complexity '{names[level]}': '{names[asked]}' would make "
+            f"{wanted / 1e6:.3g} million triangles; at most {MOST_TRIANGLES / 1e6:g} are made",
+        )
+    return level
+
+
+def _holes(mesh: UsdGeom.Mesh, time: Usd.TimeCode, count: int, scene: Scene) -> NDArray[np.bool_]:
+    """(f,) which faces are holes."""
+    hidden = np.zeros(count, bool)
+    holes = np.array(mesh.GetHoleIndicesAttr().Get(time) or [], np.int64)
+    known = (holes >= 0) & (holes < count)
+    if not known.all():
+        bad = holes[np.argmin(known)]
+        scene.note(
+            str(mesh.GetPath()), f"holeIndices has {bad}; it must be from 0 to {count - 1}; ignored"
+        )
+    hidden[holes[known]] = True
+    return hidden
 
 
 def _problem(points: Any, counts: Any, indices: Any) -> str:
@@ -125,24 +212,25 @@ def _uv(
     prim: Usd.Prim,
     resolved: list[Resolved],
     which: NDArray[np.int64],
-    faces: NDArray[np.int64],
-    corners: NDArray[np.int64],
-    indices: NDArray[np.int64],
+    cut: Tessellation,
     time: Usd.TimeCode,
     where: str,
     scene: Scene,
 ) -> tuple[NDArray[np.float64] | None, NDArray[np.bool_]]:
     """(m, 3, 2) UVs, each triangle's from the set that its surface names, and which fabrics
     have none."""
-    uv = np.zeros((len(faces), 3, 2))
-    missing = np.zeros(len(faces), bool)
-    found = False
+    uv = np.zeros((len(cut.faces), 3, 2))
+    missing = np.zeros(len(cut.faces), bool)
+    known: dict[str, NDArray[np.float64] | None] = {}
     for k, surface in enumerate(resolved):
         mine = which == k
         if not mine.any():
             continue
         primvar = _uv_primvar(prim, surface, where, scene)
-        values = _at_corners(primvar, faces, corners, indices, time, 2) if primvar else None
+        name = primvar.GetName() if primvar else ""
+        if name not in known:
+            known[name] = _at_corners(primvar, cut, time, 2) if primvar else None
+        values = known[name]
         if primvar and values is None:
             scene.note(
                 where, f"has a UV set '{primvar.GetPrimvarName()}' that does not fit its faces"
@@ -152,13 +240,15 @@ def _uv(
             if surface.is_textured:
                 scene.note(where, "has no UVs for its textures; they are read at (0, 0)")
             continue
-        found = True
         broken = ~np.isfinite(values[mine])
         if broken.any():
             count = int(broken.any(axis=(1, 2)).sum())
             scene.note(where, f"has UVs that are not finite on {count} triangles; they count as 0")
-        uv[mine] = values[mine]
-    return (uv if found else None), missing
+        if mine.all():
+            uv = values
+        else:
+            uv[mine] = values[mine]
+    return (uv if any(v is not None for v in known.values()) else None), missing
 
 
 def _uv_primvar(
@@ -181,65 +271,33 @@ def _uv_primvar(
 
 
 def _at_corners(
-    primvar: Any,
-    faces: NDArray[np.int64],
-    corners: NDArray[np.int64],
-    indices: NDArray[np.int64],
-    time: Usd.TimeCode,
-    width: int,
+    primvar: Any, cut: Tessellation, time: Usd.TimeCode, width: int
 ) -> NDArray[np.float64] | None:
     """(m, 3, width) values of a primvar at the triangles' corners; None where its type or its
     length are others."""
-    values = primvar.ComputeFlattened(time)
+    values = primvar.Get(time)
     try:
         array = np.array([] if values is None else values, np.float64)
     except (TypeError, ValueError):
         return None
     if array.ndim != 2 or array.shape[1] < width:
         return None
-    return _spread(array[:, :width], primvar.GetInterpolation(), faces, corners, indices)
+    indices = np.array(primvar.GetIndices(time), np.int64) if primvar.IsIndexed() else None
+    return cut.spread(array[:, :width], str(primvar.GetInterpolation()), indices)
 
 
-def _spread(
-    array: NDArray[np.float64], interpolation: str, faces: Any, corners: Any, indices: Any
+def _authored_normals(
+    prim: Usd.Prim, mesh: UsdGeom.Mesh, cut: Tessellation, time: Usd.TimeCode, scene: Scene
 ) -> NDArray[np.float64] | None:
-    if interpolation == UsdGeom.Tokens.faceVarying:
-        pick = corners
-    elif interpolation in (UsdGeom.Tokens.vertex, UsdGeom.Tokens.varying):
-        pick = indices[corners]
-    elif interpolation == UsdGeom.Tokens.uniform:
-        pick = np.repeat(faces[:, None], 3, axis=1)
-    else:
-        pick = np.zeros_like(corners)
-    if pick.size and int(pick.max()) >= len(array):
-        return None
-    return np.asarray(array[pick])
-
-
-def _normals(
-    prim: Usd.Prim,
-    mesh: UsdGeom.Mesh,
-    faces: NDArray[np.int64],
-    corners: NDArray[np.int64],
-    indices: NDArray[np.int64],
-    time: Usd.TimeCode,
-    matrix: NDArray[np.float64],
-    scene: Scene,
-) -> NDArray[np.float64] | None:
-    """(m, 3, 3) authored normals in world space, or None; the primvar wins over the attribute."""
-    values = None
+    """(m, 3, 3) normals of the file, or None; the primvar wins over the attribute."""
     primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals")
     authored = mesh.GetNormalsAttr().Get(time)
     if primvar and primvar.HasValue():
-        values = _at_corners(primvar, faces, corners, indices, time, 3)
+        values = _at_corners(primvar, cut, time, 3)
     elif authored is not None and len(authored):
-        values = _spread(
-            np.array(authored, np.float64), mesh.GetNormalsInterpolation(), faces, corners, indices
-        )
+        values = cut.spread(np.array(authored, np.float64), str(mesh.GetNormalsInterpolation()))
     else:
         return None
     if values is None:
         scene.note(str(prim.GetPath()), "has normals that do not fit its faces; it is smoothed")
-        return None
-    # Normals turn by the inverse transpose; rows here are normals.
-    return np.asarray(values @ np.linalg.pinv(matrix[:3, :3]))
+    return values

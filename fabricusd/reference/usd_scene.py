@@ -46,17 +46,19 @@ def read_usd_scene(
     binding: Binding | None = None,
     camera: str | None = None,
     time_code: float | None = None,
+    level: int = 0,
 ) -> Scene:
     """Everything visible on the stage at `time_code`; its earliest time where that is None.
 
     binding : on meshes without a material of their own
     camera : prim path; the first camera on the stage where that is None
+    level : how often the edges of subdivision surfaces are halved; 0 for their cages
     """
     stage, notes = _open(path)
     # What USD has to say of a prim would be several lines on standard error.
     warnings = UsdUtils.CoalescingDiagnosticDelegate()
     try:
-        scene = _Reader(stage, notes, binding, time_code).read(path, camera)
+        scene = _Reader(stage, notes, binding, time_code, level).read(path, camera)
         for warning in warnings.TakeUncoalescedDiagnostics():
             scene.note(str(path), f"USD: {one_line(warning.commentary, 300)}")
     finally:
@@ -77,9 +79,15 @@ def as_matrix(matrix: Any) -> NDArray[np.float64]:
 
 class _Reader:
     def __init__(
-        self, stage: Usd.Stage, notes: list[str], binding: Binding | None, time_code: float | None
+        self,
+        stage: Usd.Stage,
+        notes: list[str],
+        binding: Binding | None,
+        time_code: float | None,
+        level: int,
     ) -> None:
         self.stage = stage
+        self.level = level
         self.time = Usd.TimeCode.EarliestTime() if time_code is None else Usd.TimeCode(time_code)
         self.scene = Scene(notes=notes, up_axis=str(UsdGeom.GetStageUpAxis(stage)))
         self.metres = UsdGeom.GetStageMetersPerUnit(stage)
@@ -133,7 +141,9 @@ class _Reader:
     def _mesh(self, prim: Usd.Prim, matrix: NDArray[np.float64]) -> None:
         if is_light(prim):
             self.scene.note(str(prim.GetPath()), "shines as a light, left out: it is a mesh alone")
-        mesh = read_mesh(prim, self.time, matrix, self.metres, self.materials, self.scene)
+        mesh = read_mesh(
+            prim, self.time, matrix, self.metres, self.materials, self.scene, self.level
+        )
         if mesh is not None:
             self.scene.meshes.append(mesh)
 

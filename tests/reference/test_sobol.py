@@ -100,5 +100,5 @@ def test_a_lamps_soft_shadow_has_a_third_of_the_variance_of_independent_numbers(
     loose, _ = beauty(spp=64, sampler="random")
     error, other = ((p - exact) ** 2 for p in (even, loose))
     assert error.mean() < other.mean() / 3
-    # What the picture says of itself is no less than its error.
-    assert variance.mean() > error.mean()
+    # What the picture says of itself is its error, and a little more.
+    assert error.mean() < variance.mean() < 1.8 * error.mean()
