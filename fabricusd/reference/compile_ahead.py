@@ -65,7 +65,7 @@ class CompileAhead:
         self._thread: threading.Thread | None = None
         if _compiled():
             # No daemon: Python must not take LLVM apart while it loads code.
-            self._thread = threading.Thread(target=_load_kernels)
+            self._thread = threading.Thread(target=_load_kernels, args=(_kernels(),))
             self._thread.start()
             return
         load_without_blas()
@@ -112,9 +112,9 @@ def _compiled() -> bool:
     return any(Path(shade_far.stats.cache_path).glob("far_shading.shade_far*.nbi"))
 
 
-def _load_kernels() -> None:
+def _load_kernels(kernels: list[Dispatcher]) -> None:
     """Call every kernel; one that cannot be loaded complains where it is needed."""
-    load_as_they_are(_kernels())
+    load_as_they_are(kernels)
     for task in TASKS:
         with suppress(Exception):
             task()
@@ -124,9 +124,9 @@ def _kernels() -> list[Dispatcher]:
     """Those of the appearance model and of the tracer, as far as they have been imported."""
     return [
         value
-        for name, module in list(sys.modules.items())
+        for name, module in sys.modules.copy().items()
         if name.startswith("fabricusd.")
-        for value in list(vars(module).values())
+        for value in vars(module).copy().values()
         if isinstance(value, Dispatcher)
     ]
 
