@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from fabricusd.reference.embree_subdivision import LimitSurface
 from fabricusd.reference.subdivision import Cage, Topology
 
-PART = 1 << 15
-"""Sub-quads that are evaluated together."""
+PART = 1 << 17
+"""Points that are evaluated together."""
 
 ASIDE = 1 / 16
 """How far beside a point, of its sub-quad, a normal is looked for that is not to be had there."""
@@ -53,12 +53,7 @@ class Grid:
 
     def evaluate(self, surface: LimitSurface, place: NDArray[Any]) -> NDArray[np.float64]:
         """(k, 3) points of the surface at the whole array, the same wherever `place` is."""
-        points = np.empty((len(self.place), 3))
-        for part, corners, s, t in self._parts():
-            points[part] = surface.evaluate(corners, s, t)[0]
-        one = np.empty((int(place.max(initial=0)) + 1, 3))
-        one[place] = points
-        return np.asarray(one[place])
+        return self._once(surface, place)[0][place]
 
     def with_normals(self, cage: Cage) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
         """(k, 3) points and unit normals of the cage's surface, from the side of each face.
@@ -66,28 +61,44 @@ class Grid:
         A normal is 0 where there is none.
         """
         surface = cage.limit()
-        points = np.empty((len(self.place), 3))
-        normals = np.empty((len(self.place), 3), np.float32)
-        for part, corners, s, t in self._parts():
-            points[part], cross = surface.evaluate(corners, s, t, normals=True)
-            normals[part] = _unit(cross)
+        points, one = self._once(surface, self.place, normals=True)
+        assert one is not None
+        normals = one[self.place]
         aside = self._aside(cage).reshape(-1, 2)
-        for some in np.array_split(np.flatnonzero(aside.any(axis=1)), 1 + len(aside) // PART):
-            corners, at = np.divmod(some, len(self.s))
-            near, far = (
-                _unit(
-                    surface.evaluate(
-                        corners,
-                        self.s[at] + step * aside[some, 0],
-                        self.t[at] + step * aside[some, 1],
-                        normals=True,
-                    )[1]
-                )
-                for step in (ASIDE, 2 * ASIDE)
-            )
-            normals[some] = _unit(2 * near - far)
+        some = np.flatnonzero(aside.any(axis=1))
+        near, far = (self._beside(surface, some, aside, ASIDE * step) for step in (1, 2))
+        normals[some] = _unit(2 * near - far)
         self._make_one(normals, aside.any(axis=1) & ~self._creased(cage)[self.place])
-        return points, normals
+        return points[self.place], normals
+
+    def _once(
+        self, surface: LimitSurface, place: NDArray[Any], *, normals: bool = False
+    ) -> tuple[NDArray[np.float64], NDArray[np.float32] | None]:
+        """(places, 3) points of the surface, and unit normals where asked for."""
+        source = np.full(int(place.max(initial=0)) + 1, -1, np.int32)
+        source[place] = np.arange(len(place), dtype=np.int32)
+        points = np.zeros((len(source), 3))
+        units = np.zeros((len(source), 3), np.float32) if normals else None
+        # Face by face, which Embree prepares once for all of its points that follow one another.
+        for part in _parts(np.sort(source[source >= 0])):
+            corners, at = np.divmod(part, len(self.s))
+            found = surface.evaluate(corners, self.s[at], self.t[at], normals=normals)
+            points[place[part]] = found[0]
+            if units is not None:
+                units[place[part]] = _unit(found[1])
+        return points, units
+
+    def _beside(
+        self, surface: LimitSurface, some: NDArray[Any], aside: NDArray[np.int8], step: float
+    ) -> NDArray[np.float32]:
+        """(n, 3) unit normals a step aside of `some` points of the array."""
+        units = np.empty((len(some), 3), np.float32)
+        for where in _parts(np.arange(len(some))):
+            part = some[where]
+            corners, at = np.divmod(part, len(self.s))
+            s, t = self.s[at] + step * aside[part, 0], self.t[at] + step * aside[part, 1]
+            units[where] = _unit(surface.evaluate(corners, s, t, normals=True)[1])
+        return units
 
     def _make_one(self, normals: NDArray[np.float32], some: NDArray[np.bool_]) -> None:
         """Give `some` points of the array the mean normal of all that lie at the same place.
@@ -102,15 +113,19 @@ class Grid:
         """(places,) where the surface has a normal for each side."""
         top = self.topology
         creased = np.zeros(int(self.place.max(initial=0)) + 1, bool)
-        sharp = self._sharp(cage)
-        creased[top.ends[sharp].ravel()] = True
+        edges, points = self._sharp(cage)
+        creased[: top.count] = points
         on_edge = 2 * self.size - 1
-        creased[top.count : top.count + len(sharp) * on_edge] = np.repeat(sharp, on_edge)
+        creased[top.count : top.count + len(edges) * on_edge] = np.repeat(edges, on_edge)
         return creased
 
-    def _sharp(self, cage: Cage) -> NDArray[np.bool_]:
-        """(e,) edges between two faces that are sharper than what these triangles can round."""
-        return (cage.crease > np.log2(2 * self.size)) & (self.topology.uses > 1)
+    def _sharp(self, cage: Cage) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """(e,) edges and (n,) points that are sharper than what these triangles can round."""
+        top, most = self.topology, np.log2(2 * self.size)
+        edges = ((cage.crease > most) & (top.uses > 1)) | top.tangled_edges
+        points = cage.point_sharpness > most
+        points[top.ends[edges].ravel()] = True
+        return edges, points
 
     def _aside(self, cage: Cage) -> NDArray[np.int8]:
         """(h, (r + 1)^2, 2) direction in s and t in which a normal must be looked for, 0 for none.
@@ -120,24 +135,13 @@ class Grid:
         """
         top, side = self.topology, self.size + 1
         aside = np.zeros((len(top.indices), side, side, 2), np.int8)
-        sharp = self._sharp(cage)
-        leaving = sharp[top.edge]
+        edges, points = self._sharp(cage)
+        leaving = edges[top.edge]
         aside[leaving, 1:, 0, 1] = 1
         aside[leaving[top.before], 0, 1:, 0] = 1
         aside[top.counts[top.face] != 4, -1, -1] = -1
-        odd = cage.irregular.copy()
-        odd[top.ends[sharp].ravel()] = True
-        aside[odd[top.indices], 0, 0] = 1
+        aside[(points | cage.irregular)[top.indices], 0, 0] = 1
         return aside.reshape(len(top.indices), side**2, 2)
-
-    def _parts(self) -> Iterator[tuple[slice, NDArray[Any], NDArray[Any], NDArray[Any]]]:
-        """Slices of the array, and of each the corners and their s and t."""
-        each, total = len(self.s), len(self.topology.indices)
-        for begin in range(0, total, PART):
-            corners = np.arange(begin, min(begin + PART, total))
-            s, t = np.tile(self.s, len(corners)), np.tile(self.t, len(corners))
-            part = slice(begin * each, (begin + len(corners)) * each)
-            yield part, np.repeat(corners, each), s, t
 
     def bilinear(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k, c) at the whole array, of values (h, c) at the corners; edges stay straight."""
@@ -178,6 +182,11 @@ def places(topology: Topology, size: int) -> NDArray[np.int32]:
     place[:, r, r] = middles + top.face
     place[:, 1:r, 1:r] = inside + np.arange(corners * (r - 1) ** 2).reshape(corners, r - 1, r - 1)
     return place.reshape(-1)
+
+
+def _parts(numbers: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    for begin in range(0, len(numbers), PART):
+        yield numbers[begin : begin + PART]
 
 
 def _unit(vectors: NDArray[Any] | None) -> NDArray[np.float64]:

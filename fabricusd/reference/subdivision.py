@@ -54,12 +54,16 @@ class Topology:
         return np.bincount(self.ends[self.uses == 1].ravel(), minlength=self.count)
 
     @cached_property
+    def tangled_edges(self) -> NDArray[np.bool_]:
+        """(e,) edges of more than two faces, or of two that wind against each other."""
+        same_way = np.bincount(self.edge, self.forward, len(self.uses))
+        return np.asarray((self.uses > 2) | ((self.uses == 2) & (same_way != 1)))
+
+    @cached_property
     def tangled(self) -> NDArray[np.bool_]:
         """(n,) points where the faces are no single fan: OpenSubdiv keeps them where they are."""
-        same_way = np.bincount(self.edge, self.forward, len(self.uses))
-        wrong = (self.uses > 2) | ((self.uses == 2) & (same_way != 1))
-        bad = self.borders_at > 2
-        bad[self.ends[wrong].ravel()] = True
+        bad = np.asarray(self.borders_at > 2)
+        bad[self.ends[self.tangled_edges].ravel()] = True
         return bad
 
     def edges_of(self, pairs: NDArray[Any]) -> NDArray[np.int64]:

@@ -16,6 +16,7 @@ from fabricusd.reference.render import render
 from fabricusd.reference.triangles import build_tables
 from tests.reference.catmull_clark import FOREVER, limit_of
 from tests.reference.stages import bind_fabric, new_stage, read
+from tests.reference.test_usd_scene import ORIENTATIONS
 
 CUBE = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -144,21 +145,12 @@ def test_a_crease_has_a_normal_for_each_side_and_a_smooth_edge_has_one(tmp_path)
         assert np.ptp(one, axis=0).max() < 5e-3
 
 
-ORIENTATIONS = {
-    "right-handed": ("rightHanded", 1, 1),
-    "left-handed": ("leftHanded", 1, -1),
-    "mirrored": ("rightHanded", -1, 1),
-    "left-handed and mirrored": ("leftHanded", -1, -1),
-}
-
-
 @pytest.mark.parametrize("name", ORIENTATIONS)
 def test_triangles_and_normals_face_the_front(tmp_path, name):
     orientation, scale, sign = ORIENTATIONS[name]
     stage = new_stage(tmp_path, metres=0.01)
     mesh = cage(stage, CUBE, SIDES)
     mesh.CreateOrientationAttr(orientation)
-    # The first face winds inwards of these sides.
     xform = UsdGeom.XformCommonAPI(mesh)
     xform.SetScale((3 * scale, 2, 1))
     xform.SetTranslate((50, 0, 0))
@@ -205,6 +197,29 @@ def test_holes_are_not_drawn_and_shape_the_surface_all_the_same(tmp_path):
     after = refined(stage)
     assert len(after.triangles) == len(before.triangles) * 5 // 6
     assert cKDTree(before.points).query(after.points)[0].max() < 1e-9
+
+
+def test_an_edge_of_three_faces_stays_where_it_is(tmp_path):
+    stage = new_stage(tmp_path)
+    pages = [
+        (0, 0, 0),
+        (0, 1, 0),
+        (1, 0, 0),
+        (1, 1, 0),
+        (-1, 0, 1),
+        (-1, 1, 1),
+        (-1, 0, -1),
+        (-1, 1, -1),
+    ]
+    cage(stage, pages, [(0, 2, 3, 1), (0, 4, 5, 1), (0, 1, 7, 6)])
+    mesh = refined(stage)
+    spine = (np.abs(mesh.points[:, [0, 2]]) < 1e-6).all(axis=1)
+    assert np.sort(mesh.points[spine, 1]) == pytest.approx([0, 0.25, 0.5, 0.75, 1], abs=1e-6)
+    p = mesh.points[mesh.triangles]
+    flat = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    flat /= np.linalg.norm(flat, axis=1)[:, None]
+    # Each page has its own normals up to the spine, one of them wound against another.
+    assert np.einsum("ijk,ik->ij", mesh.normals, flat).min() > 0.9
 
 
 def test_without_boundary_interpolation_the_faces_at_the_border_are_hidden(tmp_path):
