@@ -22,6 +22,27 @@ def whole_file(path: str | os.PathLike[str], *, clobber: bool = True) -> Iterato
     file is replaced in one step, or refused before anything is written when `clobber` is False. A
     link stays, and what it points to is replaced; devices and pipes are refused.
     """
+    target, temporary = _begin(path, clobber=clobber)
+    try:
+        yield temporary
+        # mkstemp makes files private; what a user writes follows the umask.
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        temporary.replace(target)
+    except OSError as error:
+        raise FabricError(str(target), f"cannot be written: {error.strerror or error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def require_writable(path: str | os.PathLike[str]) -> None:
+    """Raise now what `whole_file` would raise once the work is done."""
+    _begin(path, clobber=True)[1].unlink(missing_ok=True)
+
+
+def _begin(path: str | os.PathLike[str], *, clobber: bool) -> tuple[Path, Path]:
+    """(what will be written, an empty temporary file beside it)."""
     target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
     # os.path answers False where pathlib raises: names too long, folders nobody may look into.
     if os.path.isdir(target):
@@ -41,18 +62,7 @@ def whole_file(path: str | os.PathLike[str], *, clobber: bool = True) -> Iterato
     except OSError as error:
         raise FabricError(str(target), f"cannot be written: {error.strerror}") from error
     os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        # mkstemp makes files private; what a user writes follows the umask.
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        temporary.replace(target)
-    except OSError as error:
-        raise FabricError(str(target), f"cannot be written: {error.strerror or error}") from error
-    finally:
-        temporary.unlink(missing_ok=True)
+    return target, Path(name)
 
 
 def remove_partial_files(folder: Path) -> None:

@@ -20,6 +20,7 @@ from fabricusd.appearance.footprint import DEFAULT, Limits
 from fabricusd.appearance.shadow import METHODS
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
+from fabricusd.files import require_writable
 from fabricusd.images import write_exr, write_png
 from fabricusd.reference.camera import build_lens, default_camera
 from fabricusd.reference.compile_ahead import compile_ahead
@@ -36,6 +37,9 @@ from fabricusd.reference.workers import Batches, pixels_along_z_curve, worker_co
 BATCH = 1 << 13
 """Paths in a batch: enough that starting a stage costs little, few enough to stay in cache."""
 
+MOST_TRIED = 100
+"""Frames whose files are tried before the work."""
+
 PASS = 16
 """Samples of every pixel before any pixel gets more."""
 
@@ -50,7 +54,9 @@ Progress = Callable[[float, float], None]
 class RenderResult:
     """What was rendered.
 
-    layers : AOV name -> (h, w, c) float32; of the last frame, if there were several
+    Of several frames sums, all notes, mean samples and the worst noise, but the last one's layers.
+
+    layers : AOV name -> (h, w, c) float32
     paths : the files written; notes : what was left out or assumed, one line each
     rays : rays traced, shadow rays included; seconds : of sampling, without reading the scene;
         processor_seconds : of this process, all workers together, meanwhile
@@ -119,7 +125,7 @@ def render(
     require_aovs(layers)
     targets = _targets(out, frames)
     compile_ahead()
-    result: RenderResult | None = None
+    frame_results: list[RenderResult] = []
     paths: tuple[str, ...] = ()
     with Stop() as stop:
         for time_code, target in targets:
@@ -139,11 +145,30 @@ def render(
             result.metadata.update(_asked_for(scene, time_code, stops))
             if target is not None:
                 paths += _write(target, result, stops)
+            # Layers are those of the last frame; the others would fill the memory.
+            frame_results = [replace(r, layers={}) for r in frame_results] + [result]
             stop.release()
             if stop.asked or not result.complete:
                 break
-    assert result is not None
-    return replace(result, paths=paths, complete=result.complete and target == targets[-1][1])
+    return _together(frame_results, paths, complete=len(frame_results) == len(targets))
+
+
+def _together(
+    results: list[RenderResult], paths: tuple[str, ...], *, complete: bool
+) -> RenderResult:
+    """What several frames took and lacked, with the last one's layers."""
+    return replace(
+        results[-1],
+        paths=paths,
+        notes=tuple(dict.fromkeys(note for r in results for note in r.notes)),
+        rays=sum(r.rays for r in results),
+        seconds=sum(r.seconds for r in results),
+        processor_seconds=sum(r.processor_seconds for r in results),
+        not_finite=sum(r.not_finite for r in results),
+        samples=float(np.mean([r.samples for r in results])),
+        noise=max(r.noise for r in results),
+        complete=complete and results[-1].complete,
+    )
 
 
 def _require_settings(
@@ -169,15 +194,10 @@ def _targets(
     path = Path(out)
     if path.suffix.lower() not in (".exr", ".png"):
         raise FabricError(str(path), "is no picture format; it must end in .exr or .png")
-    if not path.parent.is_dir():
-        raise FabricError(str(path), f"is in '{path.parent}', which is no directory; make it first")
-    if not os.access(path.parent, os.W_OK):
-        raise FabricError(str(path), f"cannot be written: '{path.parent}' is read-only")
     targets = frame_files(path, frames)
-    for _, target in targets:
+    for _, target in targets[:MOST_TRIED]:
         for file in written_files(target):
-            if file.is_dir():
-                raise FabricError(str(file), "is a directory; it must be a file's name")
+            require_writable(file)
     return [*targets]
 
 

@@ -38,6 +38,7 @@ REFUSED = {
         "x.0002.png", ["--frames", "1-2", "--no-clobber"], "x.0002.png exists",
     ),
     "a picture beside it that is a folder": ("x.png/", [], "x.png is a directory"),
+    "a name that is too long": ("", ["-o", "x" * 300 + ".exr"], "cannot be written: File name too"),
     "an empty list of frames": ("", ["--frames", ""], "--frames is ''"),
     "a seed beyond 64 bits": ("", ["--seed", "99999999999999999999"], "seed is 99999999999999999"),
     "an exposure that is no number": ("", ["--exposure", "nan"], "exposure is nan"),
@@ -45,7 +46,8 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_cannot_be_done_is_refused_before_the_work(tmp_path, capsys, name):
+def test_what_cannot_be_done_is_refused_before_the_work(tmp_path, capsys, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
     lies, arguments, words = REFUSED[name]
     (tmp_path / "x.obj").write_text(OBJ)
     if lies.endswith("/"):

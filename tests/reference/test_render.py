@@ -121,6 +121,21 @@ def test_a_png_alone_and_frames_with_numbers(tmp_path):
     assert not np.array_equal(first, second)
 
 
+def test_what_one_of_several_frames_lacks_is_told_of_all(tmp_path):
+    stage = new_stage(tmp_path)
+    mesh = square(stage)
+    mesh.GetPointsAttr().Set([(np.nan, 0, 0), (1, 0, -1), (1, 0, 1), (-1, 0, 1)], 1)
+    mesh.GetPointsAttr().Set([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)], 2)
+    stage.GetRootLayer().Save()
+    one = render(tmp_path / "scene.usda", width=8, height=8, spp=1, frames=(2,))
+    both = render(tmp_path / "scene.usda", width=8, height=8, spp=1, frames=(1, 2))
+    assert any("points that are not finite" in note for note in both.notes)
+    assert len(both.notes) > len(one.notes)
+    assert both.rays > one.rays
+    assert both.complete
+    assert np.array_equal(both.layers["beauty"], one.layers["beauty"])
+
+
 BAD_SETTINGS = {
     "no width": ({"width": 0}, "width is 0"),
     "no samples": ({"spp": 0}, "spp is 0"),

@@ -10,7 +10,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdUtils
 
 from fabricusd.images import write_exr, write_png
 from fabricusd.reference.lights import AREA, P, X, Y, Z, build_lights
-from tests.reference.scenes import above, grid, lambert, picture
+from fabricusd.reference.scene import DOME, Camera, Light
+from tests.reference.scenes import above, grid, lambert, looking, picture
 from tests.reference.stages import new_stage, read, square
 
 DOWN = ((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 1, 0, 1))
@@ -228,3 +229,21 @@ def test_a_dome_has_its_pole_where_it_says(tmp_path, name):
     frame = read(stage).lights[0].frame[:3, :3]
     assert frame @ [0, 1, 0] == pytest.approx(top)
     assert frame @ [0, 0, 1] == pytest.approx(middle)
+
+
+def test_a_dome_lies_as_openexr_lays_out_latitude_and_longitude(tmp_path):
+    # +z in the middle, +x a quarter of the width to the left of it, +y at the top.
+    sky = np.zeros((4, 8, 3), np.float32)
+    sky[..., 0] = np.arange(8)
+    sky[..., 1] = np.arange(4)[:, None]
+    light = Light(path="sky", kind=DOME, radiance=(1, 1, 1), image=sky)
+    for way, column, row in (
+        ((0, 0, 1), 3.5, 1.5), ((1, 0, 0), 1.5, 1.5), ((-1, 0, 0), 5.5, 1.5), ((0, 1, 0), None, 0),
+        ((0, -1, 0), None, 3),
+    ):  # fmt: skip
+        camera = Camera(frame=looking((0, 0, 0), at=way), focal_length=1.0, aperture=(1e-4, 1e-4))
+        seen = (
+            picture([], [], [light], camera, size=2, spp=1).layers["beauty"][..., :2].mean((0, 1))
+        )
+        assert seen[1] == pytest.approx(row, abs=1e-3)
+        assert column is None or seen[0] == pytest.approx(column, abs=1e-3)
