@@ -154,9 +154,21 @@ class Scene:
             self.notes.append(line)
 
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The box around the used points, (low, high) [m]; zeros where there are no triangles."""
-        used = [m.points[np.unique(m.triangles)] for m in self.meshes if len(m.triangles)]
+        """The box around all triangles whose corners are finite, (low, high) [m]; zeros where there
+        are none."""
+        used = [p for p in map(_corners, self.meshes) if len(p)]
         if not used:
             return np.zeros(3), np.zeros(3)
         low = np.min([p.min(axis=0) for p in used], axis=0)
         return low, np.max([p.max(axis=0) for p in used], axis=0)
+
+
+def _corners(mesh: Mesh) -> NDArray[np.float64]:
+    """(n, 3) points of a mesh that are corners of triangles without any that is not finite."""
+    finite = np.isfinite(mesh.points).all(axis=1)
+    triangles = np.asarray(mesh.triangles)
+    if not finite.all():
+        triangles = triangles[finite[triangles].all(axis=1)]
+    used = np.zeros(len(mesh.points), bool)
+    used[triangles.ravel()] = True
+    return np.asarray(mesh.points[used])

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from pxr import Sdf, UsdGeom, UsdShade
 
 from fabricusd.errors import FabricError
 from fabricusd.reference.read import read_scene
+from fabricusd.reference.render import render_scene
 from fabricusd.reference.scene import FabricSurface
 from fabricusd.reference.triangles import build_tables
 from tests.reference.stages import SQUARE, bind_fabric, new_stage, read, square
@@ -239,6 +241,18 @@ def test_a_fault_is_one_line_and_the_rest_is_rendered(tmp_path, name):
     assert len(matching) == 1, scene.notes
     assert "\n" not in matching[0]
     assert any(m.path == "/good" for m in scene.meshes)
+
+
+@pytest.mark.parametrize("fault", [nan_points, far_point])
+def test_a_view_of_its_own_sees_what_is_sound(tmp_path, fault):
+    stage = new_stage(tmp_path)
+    square(stage, "/good")
+    sound = render_scene(read(stage), width=16, height=16, spp=4)
+    fault(stage)
+    broken = render_scene(read(stage), width=16, height=16, spp=4)
+    seen = sound.layers["beauty"][..., 3]
+    assert seen.max() == 1
+    assert np.abs(broken.layers["beauty"][..., 3] - seen).max() < 0.3
 
 
 def test_usd_itself_writes_nothing_to_standard_error(tmp_path, capfd):
