@@ -165,7 +165,7 @@ class Scene:
 
 def _corners(mesh: Mesh) -> NDArray[np.float64]:
     """(n, 3) points of a mesh that are corners of triangles without any that is not finite."""
-    finite = np.isfinite(mesh.points).all(axis=1)
+    finite = np.asarray(np.isfinite(mesh.points).all(axis=1))
     triangles = np.asarray(mesh.triangles)
     if not finite.all():
         triangles = triangles[finite[triangles].all(axis=1)]
