@@ -35,6 +35,9 @@ _LENGTHS = {
 _SMALLEST = 1e-3
 """Scene units that a normalised light without extent gets: it has power, and needs a surface."""
 
+_NOTHING = 1e-30
+"""Square scene units below which a light has no surface."""
+
 _UNEVEN = 1e-3
 """Relative difference of scales from which a sphere is no sphere any more."""
 
@@ -108,8 +111,12 @@ def read_light(
     if not (np.isfinite(matrix).all() and 0 <= angle <= 2 * math.pi):
         inputs.note("has an angle or a transform that makes no sense, left out")
         return None
+    size = _size(kind, matrix, lengths, angle)
+    if size < _NOTHING:
+        inputs.note("is scaled to nothing, left out")
+        return None
     if normalize:
-        radiance = radiance / _size(kind, matrix, lengths, angle)
+        radiance = radiance / size
     elif kind == DISTANT and angle <= 0:
         inputs.note("has no angle; its intensity is taken as irradiance")
     _note_left_out(inputs, kind, matrix)
@@ -208,14 +215,13 @@ def _size(kind: int, matrix: NDArray[np.float64], lengths: dict[str, float], ang
     flat = float(np.linalg.norm(np.cross(matrix[:3, 0], matrix[:3, 1])))
     radius = lengths.get("radius", 0.0)
     sine2 = math.sin(0.5 * angle) ** 2
-    size = {
+    return {
         DISTANT: math.pi * (sine2 if angle <= math.pi else 2 - sine2) if angle > 0 else 1.0,
         RECT: lengths.get("width", 1.0) * lengths.get("height", 1.0) * flat,
         DISK: math.pi * radius**2 * flat,
         SPHERE: 4 * math.pi * (radius * (x + y + z) / 3) ** 2,
         CYLINDER: 2 * math.pi * radius * 0.5 * (y + z) * lengths.get("length", 1.0) * x,
     }.get(kind, 1.0)
-    return max(size, 1e-30)
 
 
 def _pole(prim: Usd.Prim, frame: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -178,6 +178,15 @@ def test_a_light_that_is_not_round_any_more_is_noted(tmp_path, name):
     assert any("unevenly" in note for note in read(stage).notes) == noted
 
 
+@pytest.mark.parametrize("kind", ["RectLight", "DiskLight", "CylinderLight"])
+def test_a_light_that_is_scaled_to_nothing_is_noted(tmp_path, kind):
+    stage = new_stage(tmp_path)
+    light(stage, kind, (0, 0, 0, 0, 0), normalize=True)
+    scene = read(stage)
+    assert scene.lights == []
+    assert "/light is scaled to nothing, left out" in scene.notes
+
+
 def test_a_mesh_that_shines_is_noted_and_rendered(tmp_path):
     stage = new_stage(tmp_path)
     UsdLux.MeshLightAPI.Apply(square(stage).GetPrim())
