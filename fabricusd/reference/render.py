@@ -23,7 +23,7 @@ from fabricusd.fabric import Binding, Fabric
 from fabricusd.files import require_writable
 from fabricusd.images import write_exr, write_png
 from fabricusd.reference.camera import build_lens, default_camera
-from fabricusd.reference.compile_ahead import compile_ahead
+from fabricusd.reference.compile_ahead import FAR, compile_ahead
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import AOVS, Film, require_aovs
 from fabricusd.reference.integrator import Tracer
@@ -124,7 +124,7 @@ def render(
     layers = tuple(dict.fromkeys(("beauty", *aovs)))
     require_aovs(layers)
     targets = _targets(out, frames)
-    compile_ahead()
+    compile_ahead(FAR)
     frame_results: list[RenderResult] = []
     paths: tuple[str, ...] = ()
     with Stop() as stop:
