@@ -8,6 +8,7 @@ the vectorised loops, which want directions of their own, side by side.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -71,8 +72,8 @@ class _Scratch:
 class _Side:
     """One side of a cloth, made ready."""
 
-    def __init__(self, fabric: Fabric, shadow: str) -> None:
-        self.fabric, self.method = fabric, shadow
+    def __init__(self, fabric: Fabric, shadow: str, make_ready: Callable[[], None]) -> None:
+        self.fabric, self.method, self.make_ready = fabric, shadow, make_ready
         self._law: SurfaceLaw | None = None
         self._near: dict[int, tuple[CompiledFabric, Shadow]] = {}
 
@@ -90,6 +91,7 @@ class _Side:
         # may not be called from two threads at once.
         with _ONE_AT_A_TIME:
             if level not in self._near:
+                self.make_ready()
                 name = "thread" if level == THREAD_LEVEL else "weave"
                 self._near[level] = (
                     compile_fabric(self.fabric, precision=np.float32),
@@ -102,11 +104,14 @@ class FabricShader:
     """Shades hits of one fabric: rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP of `Wave.hits`.
 
     shadow : one of `shadow.METHODS`, at levels `weave` and `thread`
+    make_ready : called before the first hit at one of those levels, which many a picture never has
     """
 
-    def __init__(self, fabric: Fabric, shadow: str) -> None:
+    def __init__(
+        self, fabric: Fabric, shadow: str, make_ready: Callable[[], None] = lambda: None
+    ) -> None:
         self.fabric = fabric
-        self.sides = (_Side(fabric, shadow), _Side(back_of(fabric), shadow))
+        self.sides = tuple(_Side(f, shadow, make_ready) for f in (fabric, back_of(fabric)))
         self.gap = 0.0 if fabric.opaque else float(self.sides[0].law.published.gap)
 
     def __call__(self, level: int, back: int, wave: Wave, first: int, last: int) -> None:
@@ -155,7 +160,7 @@ class FabricShader:
         )  # fmt: skip
         sets, threads, _, across, psi0, _ = found
         v_sign = R(-1) if back else R(1)
-        _look_up(R, cloth, v_sign, hits, first, *found)
+        look_up(R, cloth, v_sign, hits, first, *found)
         if law.kind == PUBLISHED_ONLY:
             sample_points(
                 R, law.published, law.lobes, level == THREAD_LEVEL, sets, threads, psi0, across,
@@ -168,7 +173,7 @@ class FabricShader:
             point_values(*near, go, wo, onwards, 0, count)
         else:
             _by_law(R, law, level, hits, first, *vectors, sets, threads, psi0, across)
-        _finish_point(
+        finish_point(
             R, cloth, shadow, v_sign, R(0 if self.gap == 0 else 1), hits, first, wi, go,
             towards, onwards, *found,
         )  # fmt: skip
@@ -218,7 +223,7 @@ def _finish(hits, h, keep, k, go, onwards):
 
 
 @njit(**LEAN)
-def _look_up(R, cloth, v_sign, hits, first, sets, threads, along, across, psi0, length):
+def look_up(R, cloth, v_sign, hits, first, sets, threads, along, across, psi0, length):
     """The thread under each hit."""
     for k in range(sets.shape[0]):
         h = first + k
@@ -230,7 +235,7 @@ def _look_up(R, cloth, v_sign, hits, first, sets, threads, along, across, psi0, 
 
 
 @njit(**LEAN)
-def _finish_point(
+def finish_point(
     R, cloth, shadow, v_sign, open_gap, hits, first, wi, go, towards, onwards,
     sets, threads, along, across, psi0, length,
 ):  # fmt: skip

@@ -16,7 +16,7 @@ from fabricusd.errors import FabricError
 from fabricusd.reference import arrivals
 from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, arrive, sort_lanes
 from fabricusd.reference.camera import Lens, camera_rays
-from fabricusd.reference.compile_ahead import compile_ahead
+from fabricusd.reference.compile_ahead import FAR, NEAR, compile_ahead
 from fabricusd.reference.departures import depart, record_first
 from fabricusd.reference.embree import (
     DX,
@@ -80,7 +80,7 @@ def _shader(surface: Material, shadow: str) -> FabricShader | None:
     """What shades a cloth; None for a plain surface, which needs nothing of its own."""
     if not isinstance(surface, FabricSurface):
         return None
-    return FabricShader(surface.binding.fabric, shadow)
+    return FabricShader(surface.binding.fabric, shadow, lambda: compile_ahead(NEAR).wait())
 
 
 class Tracer:
@@ -110,7 +110,7 @@ class Tracer:
         # The triangles, while kernels are made ready and, by those, the laws of the cloths.
         with ThreadPoolExecutor(1) as beside:
             geometry = beside.submit(_build_geometry, scene)
-            compile_ahead().wait()
+            compile_ahead(FAR).wait()
             self.shaders = [_shader(surface, shadow) for surface in scene.materials] or [None]
             self.tables, self.accelerator = geometry.result()
         self.lights, self.dome = build_lights(scene.lights, self.tables.centre)

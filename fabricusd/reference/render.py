@@ -20,7 +20,7 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.images import write_exr, write_png
 from fabricusd.reference.camera import build_lens, default_camera
-from fabricusd.reference.compile_ahead import compile_ahead
+from fabricusd.reference.compile_ahead import FAR, compile_ahead
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import AOVS, Film, require_aovs
 from fabricusd.reference.integrator import Tracer
@@ -115,7 +115,7 @@ def render(
     layers = tuple(dict.fromkeys(("beauty", *aovs)))
     require_aovs(layers)
     targets = _targets(out, frames)
-    compile_ahead()
+    compile_ahead(FAR)
     result: RenderResult | None = None
     paths: tuple[str, ...] = ()
     for time_code, target in targets:

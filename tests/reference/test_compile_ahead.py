@@ -9,7 +9,8 @@ from pathlib import Path
 from numba.core.dispatcher import Dispatcher
 
 from fabricusd.fabric import Binding
-from fabricusd.reference.compile_ahead import TASKS, compile_kernels
+from fabricusd.reference.compile_ahead import compile_kernels
+from fabricusd.reference.kernel_tasks import FAR, NEAR, TASKS
 from fabricusd.reference.scene import FabricSurface, PreviewSurface, Scene
 from fabricusd.schema import load
 from tests.reference.scenes import above, grid, render_scene
@@ -27,7 +28,7 @@ def signatures():
     }
 
 
-def picture():
+def picture(level):
     """Cloth and a plain floor, small."""
     scene = Scene(
         meshes=[grid(), grid(material=1, size=2.0)],
@@ -37,14 +38,20 @@ def picture():
         ],
         camera=above(width=4.0),
     )
-    render_scene(scene, width=8, height=8, spp=1, level="far")
+    render_scene(scene, width=8, height=8, spp=1, level=level)
 
 
 def test_a_picture_compiles_nothing_that_was_not_compiled_ahead():
-    for task in TASKS:
+    for task in TASKS[FAR]:
         task()
     before = signatures()
-    picture()
+    picture("far")
+    assert signatures() == before
+    for task in TASKS[NEAR]:
+        task()
+    before = signatures()
+    for level in ("weave", "thread"):
+        picture(level)
     assert signatures() == before
 
 
@@ -60,12 +67,12 @@ class Compiled(event.Listener):
         pass
 
 event.register("numba:compile", Compiled())
-picture()
+picture("far")
 """
 
 
 def test_a_second_start_compiles_nothing():
-    picture()
+    picture("far")
     run = [sys.executable, "-c", SECOND_START]
     done = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout == ""
@@ -80,9 +87,9 @@ def test_processes_share_the_kernels_out_by_claims(tmp_path, monkeypatch):
     def second():
         done.append("second")
 
-    monkeypatch.setattr("fabricusd.reference.compile_ahead.TASKS", (first, second))
+    monkeypatch.setattr("fabricusd.reference.compile_ahead.TASKS", {FAR: (first, second)})
     monkeypatch.setattr("gc.disable", lambda: None)
     (tmp_path / "first").touch()
-    compile_kernels(str(tmp_path), backwards=False)
-    compile_kernels(str(tmp_path), backwards=True)
+    compile_kernels(FAR, str(tmp_path), backwards=False)
+    compile_kernels(FAR, str(tmp_path), backwards=True)
     assert done == ["second"]
