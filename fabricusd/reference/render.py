@@ -125,10 +125,11 @@ def render(
     require_aovs(layers)
     targets = _targets(out, frames)
     compile_ahead(FAR)
+    begun = time.perf_counter()
     frame_results: list[RenderResult] = []
     paths: tuple[str, ...] = ()
     with Stop() as stop:
-        for time_code, target in targets:
+        for number, (time_code, target) in enumerate(targets):
             loaded = (
                 scene
                 if isinstance(scene, Scene)
@@ -139,7 +140,8 @@ def render(
             result = render_scene(
                 loaded, width=width, height=height, spp=spp, noise=noise, max_bounces=max_bounces,
                 level=level, shadow=shadow, limits=limits, aovs=layers, seed=seed, workers=workers,
-                pixel_filter=pixel_filter, estimator=estimator, progress=progress, stop=stop,
+                pixel_filter=pixel_filter, estimator=estimator, stop=stop,
+                progress=progress and _of_frame(progress, number, len(targets), begun),
             )  # fmt: skip
             stops = exposure + (loaded.camera.exposure if loaded.camera else 0.0)
             result.metadata.update(_asked_for(scene, time_code, stops))
@@ -151,6 +153,15 @@ def render(
             if stop.asked or not result.complete:
                 break
     return _together(frame_results, paths, complete=len(frame_results) == len(targets))
+
+
+def _of_frame(progress: Progress, number: int, frames: int, begun: float) -> Progress:
+    """What frame `number` of several has done, as a share of them all."""
+
+    def report(share: float, _seconds: float) -> None:
+        progress((number + share) / frames, time.perf_counter() - begun)
+
+    return report
 
 
 def _together(

@@ -136,6 +136,22 @@ def test_what_one_of_several_frames_lacks_is_told_of_all(tmp_path):
     assert np.array_equal(both.layers["beauty"], one.layers["beauty"])
 
 
+def test_progress_is_that_of_all_frames_and_never_falls(tmp_path):
+    stage = new_stage(tmp_path)
+    square(stage)
+    stage.GetRootLayer().Save()
+    told: list[tuple[float, float]] = []
+    render(
+        tmp_path / "scene.usda", width=8, height=8, spp=1, frames=(1, 2, 3, 4),
+        progress=lambda share, seconds: told.append((share, seconds)),
+    )  # fmt: skip
+    shares, seconds = zip(*told, strict=True)
+    assert list(shares) == sorted(shares)
+    assert list(seconds) == sorted(seconds)
+    assert shares[0] <= 0.25
+    assert shares[-1] == pytest.approx(1.0)
+
+
 BAD_SETTINGS = {
     "no width": ({"width": 0}, "width is 0"),
     "no samples": ({"spp": 0}, "spp is 0"),
