@@ -91,8 +91,10 @@ class _Reader:
         self.time = Usd.TimeCode.EarliestTime() if time_code is None else Usd.TimeCode(time_code)
         self.scene = Scene(notes=notes, up_axis=str(UsdGeom.GetStageUpAxis(stage)))
         self.metres = UsdGeom.GetStageMetersPerUnit(stage)
-        if not (math.isfinite(self.metres) and self.metres > 0):
-            where = stage.GetRootLayer().GetDisplayName()
+        where = stage.GetRootLayer().GetDisplayName()
+        if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
+            self.scene.note(where, f"has no metersPerUnit; USD's {self.metres:g} is taken")
+        elif not (math.isfinite(self.metres) and self.metres > 0):
             self.scene.note(where, f"has metersPerUnit {self.metres:g}; 0.01 is taken")
             self.metres = 0.01
         self.materials = Materials(self.scene, binding, self.time)

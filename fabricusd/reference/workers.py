@@ -94,4 +94,6 @@ class Batches:
                 self.stop.asked = True
         if state["error"] is not None:
             raise state["error"]
+        if progress is not None:
+            progress(state["done"])
         return bool(state["done"] == count)

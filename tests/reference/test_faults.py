@@ -146,6 +146,10 @@ def no_unit(stage):
     UsdGeom.SetStageMetersPerUnit(stage, 0.0)
 
 
+def no_unit_authored(stage):
+    stage.ClearMetadata("metersPerUnit")
+
+
 def fabric_on_a_group(stage):
     bind_fabric(stage, UsdGeom.Xform.Define(stage, "/bad").GetPrim())
 
@@ -215,6 +219,7 @@ FAULTS = {
     "a subset of faces that are none": (overlapping_subsets, "/bad/a names 1 faces that are none"),
     "subsets that overlap": (overlapping_subsets, "/bad/b takes 1 faces from another subset"),
     "no unit of length": (no_unit, "scene.usda has metersPerUnit 0; 0.01 is taken"),
+    "no unit at all": (no_unit_authored, "scene.usda has no metersPerUnit; USD's 0.01 is taken"),
     "a fabric bound to a group": (fabric_on_a_group, "/bad binds a fabric, left out"),
     "a fabric bound without its API": (fabric_without_its_api, "/bad has fabric:binding but not"),
     "a material bound without its API": (binding_without_its_api, "MaterialBindingAPI is not"),
