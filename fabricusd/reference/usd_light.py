@@ -140,8 +140,7 @@ def _radiance(inputs: _Inputs) -> NDArray[np.float64] | None:
     """(3,) emission before it is normalised, or None with a note where it is no light."""
     color = inputs.numbers("color", (1.0, 1.0, 1.0))
     if inputs.get("enableColorTemperature", False):
-        kelvin = inputs.number("colorTemperature", 6500.0)
-        color = color * np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
+        color = color * _of_black_body(inputs)
     with np.errstate(over="ignore", invalid="ignore"):
         stops = np.exp2(inputs.number("exposure", 0.0))
         radiance = color * inputs.number("intensity", 1.0) * stops
@@ -151,6 +150,18 @@ def _radiance(inputs: _Inputs) -> NDArray[np.float64] | None:
     if (radiance < 0).any():
         inputs.note("has a negative intensity or colour, which is taken as 0")
     return np.asarray(np.maximum(radiance, 0.0))
+
+
+def _of_black_body(inputs: _Inputs) -> NDArray[np.float64]:
+    """(3,) colour of the light's temperature, which UsdLux knows from 1000 to 10000 K."""
+    given = inputs.number("colorTemperature", 6500.0)
+    if math.isnan(given):
+        # USD's own function would end the process.
+        return np.full(3, math.nan)
+    kelvin = min(max(given, 1000.0), 10000.0)
+    if kelvin != given:
+        inputs.note(f"has colorTemperature {given:g}; {kelvin:g} is taken")
+    return np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
 
 
 def _lengths(inputs: _Inputs, kind: int, normalize: bool) -> dict[str, float] | None:

@@ -136,6 +136,14 @@ FAULTS = {
     "no width": ("RectLight", {"width": 0.0}, None, "has width 0", False),
     "a radius that is no number": ("SphereLight", {"radius": math.nan}, None, "radius nan", False),
     "exposure beyond all numbers": ("RectLight", {"exposure": 2000.0}, None, "not finite", False),
+    "a temperature that is no number": (
+        "RectLight", {"enableColorTemperature": True, "colorTemperature": math.nan}, None,
+        "not finite", False,
+    ),
+    "a temperature out of range": (
+        "RectLight", {"enableColorTemperature": True, "colorTemperature": 20000.0}, None,
+        "has colorTemperature 20000; 10000 is taken", True,
+    ),
     "negative intensity": ("RectLight", {"intensity": -1.0}, None, "negative intensity", True),
     "a colour of one number": ("RectLight", {}, mistyped, "has color '1.0'", True),
     "a diffuse multiplier": ("RectLight", {"diffuse": 0.5}, None, "diffuse multiplier", True),
@@ -145,7 +153,7 @@ FAULTS = {
     "no shadows": ("DiskLight", {}, no_shadow, "asks for no shadows", True),
     "a link": ("DiskLight", {}, linked, "lightLink", True),
     "filters": ("DiskLight", {}, filtered, "filters", True),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", FAULTS)
