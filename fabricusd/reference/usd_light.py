@@ -35,6 +35,9 @@ _LENGTHS = {
 _SMALLEST = 1e-3
 """Scene units that a normalised light without extent gets: it has power, and needs a surface."""
 
+_BRIGHTEST = 1e16
+"""Radiance whose square, in a picture's variance, is a 32-bit number."""
+
 _NOTHING = 1e-30
 """Square scene units below which a light has no surface."""
 
@@ -117,7 +120,10 @@ def read_light(
         return None
     if normalize:
         radiance = radiance / size
-    elif kind == DISTANT and angle <= 0:
+    if radiance.max() > _BRIGHTEST:
+        inputs.note(f"has a radiance of {radiance.max():.3g}, beyond {_BRIGHTEST:g}; left out")
+        return None
+    if kind == DISTANT and angle <= 0 and not normalize:
         inputs.note("has no angle; its intensity is taken as irradiance")
     _note_left_out(inputs, kind, matrix)
     frame = matrix.copy()

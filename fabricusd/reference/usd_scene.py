@@ -143,9 +143,11 @@ class _Reader:
     def _mesh(self, prim: Usd.Prim, matrix: NDArray[np.float64]) -> None:
         if is_light(prim):
             self.scene.note(str(prim.GetPath()), "shines as a light, left out: it is a mesh alone")
-        mesh = read_mesh(
-            prim, self.time, matrix, self.metres, self.materials, self.scene, self.level
-        )
+        # What is not finite is noted; NumPy would write of it to standard error as well.
+        with np.errstate(all="ignore"):
+            mesh = read_mesh(
+                prim, self.time, matrix, self.metres, self.materials, self.scene, self.level
+            )
         if mesh is not None:
             self.scene.meshes.append(mesh)
 
@@ -198,8 +200,12 @@ class _Reader:
             if not root or root.IsAbstract():
                 self.scene.note(where, f"names prototype {index}, which is no prim to be seen")
                 continue
+            place = as_matrix(move)
+            if not np.isfinite(place).all():
+                self.scene.note(where, "has instances whose place is not finite, left out")
+                continue
             # The prototype keeps its own transform, not those of its parents.
-            self._visit(root, cache, world @ as_matrix(move), (*inside, prim.GetPath()))
+            self._visit(root, cache, world @ place, (*inside, prim.GetPath()))
 
     def _camera(self, path: Path, name: str | None) -> Camera | None:
         """The camera `name`, or the first that sees anything; None where there is none."""

@@ -179,6 +179,14 @@ def instancer_arrays(stage):
     UsdGeom.PointInstancer(stage.GetPrimAtPath("/bad")).GetProtoIndicesAttr().Set([0, 0])
 
 
+def instance_nowhere(stage):
+    square(stage, "/bad/square")
+    instancer = UsdGeom.PointInstancer.Define(stage, "/bad")
+    instancer.CreatePrototypesRel().SetTargets(["/bad/square"])
+    instancer.CreatePositionsAttr([(0, 0, 0), (math.nan, 0, 0)])
+    instancer.CreateProtoIndicesAttr([0, 0])
+
+
 def camera(**values):
     def make(stage):
         prim = UsdGeom.Camera.Define(stage, "/bad").GetPrim()
@@ -225,6 +233,7 @@ FAULTS = {
     "a material bound without its API": (binding_without_its_api, "MaterialBindingAPI is not"),
     "a prototype that is a class": (abstract_prototype, "/bad names prototype 0"),
     "an instancer's arrays that differ": (instancer_arrays, "/bad has arrays of different lengths"),
+    "an instance that is nowhere": (instance_nowhere, "/bad has instances whose place is not fin"),
     "a camera without focal length": (camera(focalLength=0.0), "/bad has focalLength 0"),
     "a camera without film": (camera(horizontalAperture=0.0), "/bad has horizontalAperture 0"),
     "a camera that is no number": (camera(focalLength=math.nan), "/bad has focalLength nan"),

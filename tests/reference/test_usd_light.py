@@ -144,6 +144,9 @@ FAULTS = {
         "RectLight", {"enableColorTemperature": True, "colorTemperature": 20000.0}, None,
         "has colorTemperature 20000; 10000 is taken", True,
     ),
+    "radiance beyond squares of 32 bits": (
+        "RectLight", {"intensity": 1e30}, None, "has a radiance of 1e+30", False,
+    ),
     "negative intensity": ("RectLight", {"intensity": -1.0}, None, "negative intensity", True),
     "a colour of one number": ("RectLight", {}, mistyped, "has color '1.0'", True),
     "a diffuse multiplier": ("RectLight", {"diffuse": 0.5}, None, "diffuse multiplier", True),
