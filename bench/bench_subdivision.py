@@ -1,6 +1,6 @@
 """Time and memory that refining a subdivision surface of 100 000 faces takes.
 
-    python bench/bench_subdivision.py [quads | triangles] [low | medium | high | veryhigh] [render]
+    python bench/bench_subdivision.py [quads | triangles] [auto | low | medium | high] [render]
 
 Printed: seconds on the clock and of the processor to read the stage, and the most memory held; with
 `render` also the most that a picture of 2048 x 2048 takes.
@@ -58,7 +58,7 @@ def main() -> None:
         write_stage(path, shape)
         before = most()
         wall, busy = time.perf_counter(), time.process_time()
-        [mesh] = read_scene(path, complexity=complexity).meshes
+        [mesh] = read_scene(path, complexity=complexity, width=2048).meshes
         wall, busy = time.perf_counter() - wall, time.process_time() - busy
         print(
             f"{shape}, {complexity}: {len(mesh.triangles)} triangles in {wall:.2f} s, "

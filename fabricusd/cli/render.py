@@ -50,8 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--max-error", type=float, metavar="E", help="choose --shadow, and --noise, by this bound"
     )
     parser.add_argument(
-        "--complexity", choices=("low", "medium", "high", "veryhigh"), default="high",
-        help="of subdivision surfaces; low: their cages (default: high)",
+        "--complexity", choices=("auto", "low", "medium", "high", "veryhigh"), default="auto",
+        help="of subdivision surfaces; low: their cages; auto: as the picture shows",
     )  # fmt: skip
     parser.add_argument("--aov", action="append", default=[], metavar="LAYER", help="or 'all'")
     parser.add_argument("--frames", metavar="A-B", help="time codes: 7, 1-10, 1-10x2, or a list")
@@ -78,7 +78,11 @@ def run(options: argparse.Namespace) -> int:
     _choose(options, fabric)
     if options.dry_run:
         scene = read_scene(
-            options.scene, fabric=fabric, camera=options.camera, complexity=options.complexity
+            options.scene,
+            fabric=fabric,
+            camera=options.camera,
+            complexity=options.complexity,
+            width=options.width,
         )
         _tell(scene.notes, options)
         triangles = sum(len(mesh.triangles) for mesh in scene.meshes)

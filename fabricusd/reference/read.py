@@ -8,8 +8,8 @@ from pathlib import Path
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.files import readable_file
+from fabricusd.reference.fineness import Fineness
 from fabricusd.reference.scene import Scene
-from fabricusd.reference.subdivision import COMPLEXITIES
 
 USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 MESH_SUFFIXES = (".obj", ".glb", ".gltf", ".ply")
@@ -22,16 +22,15 @@ def read_scene(
     camera: str | None = None,
     time_code: float | None = None,
     complexity: str = "low",
+    width: int = 960,
 ) -> Scene:
     """The scene of a USD or mesh file, in metres. Raises `FabricError` where it has none.
 
-    complexity : how finely subdivision surfaces are refined, one of `COMPLEXITIES`; by default not
-    at all, since textures are baked and materials bound on the faces that their UVs were laid on
+    complexity : how finely subdivision surfaces are refined, "low" to "veryhigh", or "auto", as a
+        picture of `width` pixels shows; by default not at all, since textures are baked and
+        materials bound on the faces that their UVs were laid on
     """
-    if complexity not in COMPLEXITIES:
-        raise FabricError(
-            "complexity", f"is '{complexity}'; it must be one of {', '.join(COMPLEXITIES)}"
-        )
+    Fineness(complexity=complexity)
     path = Path(source)
     suffix = path.suffix.lower()
     if suffix not in USD_SUFFIXES + MESH_SUFFIXES:
@@ -49,8 +48,9 @@ def read_scene(
     from fabricusd.reference.usd_scene import read_usd_scene
 
     return read_usd_scene(
-        path, binding=binding, camera=camera, time_code=time_code, level=COMPLEXITIES[complexity]
-    )
+        path, binding=binding, camera=camera, time_code=time_code, complexity=complexity,
+        width=width,
+    )  # fmt: skip
 
 
 def as_binding(fabric: str | Fabric | Binding | None) -> Binding | None:

@@ -99,7 +99,7 @@ def render(
     pixel_filter: str = "tent",
     exposure: float = 0.0,
     estimator: str = "mis",
-    complexity: str = "high",
+    complexity: str = "auto",
     progress: Progress | None = None,
 ) -> RenderResult:
     """Path-trace `scene` (a USD, OBJ, GLB or PLY file, or a `Scene`) and write `out`.
@@ -113,7 +113,7 @@ def render(
     frames : time codes; None for the stage's default time
     exposure : of the PNG, in stops, added to the camera's own
     complexity : how finely subdivision surfaces are refined: "low" (their cages), "medium", "high"
-        or "veryhigh", as usdrecord and usdview have it
+        or "veryhigh", as usdrecord and usdview have it, or "auto": until edges are two pixels long
 
     Raises `FabricError` for what cannot be rendered at all; what had to be left out is in the
     result's `notes`. On Ctrl-C what is done is written, and `complete` is False.
@@ -134,7 +134,12 @@ def render(
                 scene
                 if isinstance(scene, Scene)
                 else read_scene(
-                    scene, fabric=fabric, camera=camera, time_code=time_code, complexity=complexity
+                    scene,
+                    fabric=fabric,
+                    camera=camera,
+                    time_code=time_code,
+                    complexity=complexity,
+                    width=width,
                 )
             )
             result = render_scene(

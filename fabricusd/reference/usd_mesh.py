@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
 from fabricusd.errors import FabricError
+from fabricusd.reference.fineness import Fineness
 from fabricusd.reference.limit_grid import triangles_at
 from fabricusd.reference.scene import Mesh, Scene
-from fabricusd.reference.subdivision import COMPLEXITIES
 from fabricusd.reference.tessellation import (
     CageTessellation,
     RefinedTessellation,
@@ -43,12 +43,11 @@ def read_mesh(
     metres: float,
     materials: Materials,
     scene: Scene,
-    level: int = 0,
+    fineness: Fineness,
 ) -> Mesh | None:
     """The mesh in world space and metres, or None with a note where it has no usable faces.
 
     matrix : (4, 4) local to world, in scene units of `metres`
-    level : how often the edges of a subdivision surface are halved
     """
     where = str(prim.GetPath())
     mesh = UsdGeom.Mesh(prim)
@@ -63,6 +62,14 @@ def read_mesh(
         scene.note(where, f"has {int((counts < 3).sum())} faces below three corners, left out")
     points = _near(points, matrix, metres, where, scene)
     mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
+    scheme = _scheme(mesh, time)
+    level = None
+    if scheme not in ("none", "bilinear"):
+        world = (points @ matrix[:3, :3].T + matrix[:3, 3]) * metres
+        level = fineness.level(world, counts, indices)
+        if scheme == "catmullClark" and fineness.is_auto and not level:
+            # Its cage is as good.
+            level = None
     cut = _tessellate(mesh, time, points, counts, indices, scene, level, mirrored=mirrored)
     resolved, which = _materials(prim, mesh, materials, len(counts), time, scene)
     uv, missing = _uv(prim, resolved, which[cut.faces], cut, time, where, scene)
@@ -70,7 +77,6 @@ def read_mesh(
     if missing.any():
         scene.note(where, "has no UVs for its fabric; it is rendered grey")
         numbers = np.where(missing, materials.without_uv().index, numbers)
-    scheme = _scheme(mesh, time)
     normals = _authored_normals(prim, mesh, cut, time, scene) if scheme == "none" else cut.normals
     if normals is not None:
         # Normals turn by the inverse transpose; rows here are normals.
@@ -115,14 +121,14 @@ def _tessellate(
     counts: NDArray[np.int64],
     indices: NDArray[np.int64],
     scene: Scene,
-    level: int,
+    level: int | None,
     *,
     mirrored: bool,
 ) -> Tessellation:
-    """The faces as triangles: refined if they are those of a subdivision surface, and it can be."""
+    """The faces as triangles, refined where a level is given and they are a surface that can be."""
     left_handed = mesh.GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded
     hidden = _holes(mesh, time, len(counts), scene)
-    if _scheme(mesh, time) not in ("none", "bilinear"):
+    if level is not None:
         refinement = read_refinement(mesh, time, points, counts, indices, hidden, scene, level)
         level = 0 if refinement is None else _affordable(mesh, refinement, level, scene)
         if refinement is not None and level:
@@ -144,10 +150,9 @@ def _affordable(mesh: UsdGeom.Mesh, refinement: Refinement, level: int, scene: S
     if level:
         scene.refined += triangles_at(topology, level)
     if level < asked:
-        names = list(COMPLEXITIES)
         scene.note(
             str(mesh.GetPath()),
-            f"is refined as by complexity '{names[level]}': '{names[asked]}' would make "
+            f"has its edges halved {level} times, not {asked}: that would make "
             f"{wanted / 1e6:.3g} million triangles; at most {MOST_TRIANGLES / 1e6:g} are made",
         )
     return level

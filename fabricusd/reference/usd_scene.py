@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 import fabricusd.schema  # registers the schema, before the first stage is opened
 from fabricusd.errors import FabricError, one_line
 from fabricusd.fabric import Binding
+from fabricusd.reference.fineness import Fineness
 from fabricusd.reference.scene import Camera, Scene
 from fabricusd.reference.usd_camera import read_camera
 from fabricusd.reference.usd_light import is_light, read_light
@@ -46,19 +48,21 @@ def read_usd_scene(
     binding: Binding | None = None,
     camera: str | None = None,
     time_code: float | None = None,
-    level: int = 0,
+    complexity: str = "low",
+    width: int = 960,
 ) -> Scene:
     """Everything visible on the stage at `time_code`; its earliest time where that is None.
 
     binding : on meshes without a material of their own
     camera : prim path; the first camera on the stage where that is None
-    level : how often the edges of subdivision surfaces are halved; 0 for their cages
+    complexity, width : see `fineness.Fineness`
     """
+    fineness = Fineness(complexity=complexity, width=width)
     stage, notes = _open(path)
     # What USD has to say of a prim would be several lines on standard error.
     warnings = UsdUtils.CoalescingDiagnosticDelegate()
     try:
-        scene = _Reader(stage, notes, binding, time_code, level).read(path, camera)
+        scene = _Reader(stage, notes, binding, time_code, fineness).read(path, camera)
         for warning in warnings.TakeUncoalescedDiagnostics():
             scene.note(str(path), f"USD: {one_line(warning.commentary, 300)}")
     finally:
@@ -84,10 +88,11 @@ class _Reader:
         notes: list[str],
         binding: Binding | None,
         time_code: float | None,
-        level: int,
+        fineness: Fineness,
     ) -> None:
         self.stage = stage
-        self.level = level
+        self.fineness = fineness
+        self.waiting: list[tuple[Usd.Prim, NDArray[np.float64]]] = []
         self.time = Usd.TimeCode.EarliestTime() if time_code is None else Usd.TimeCode(time_code)
         self.scene = Scene(notes=notes, up_axis=str(UsdGeom.GetStageUpAxis(stage)))
         self.metres = UsdGeom.GetStageMetersPerUnit(stage)
@@ -104,6 +109,10 @@ class _Reader:
         root = self.stage.GetPseudoRoot()
         self._visit(root, UsdGeom.XformCache(self.time), np.eye(4), ())
         self.scene.camera = self._camera(path, camera)
+        # How finely a mesh is refined may depend on the camera.
+        self.fineness = replace(self.fineness, camera=self.scene.camera)
+        for prim, matrix in self.waiting:
+            self._mesh(prim, matrix)
         if not self.scene.meshes:
             self.scene.note(str(path), "holds no visible mesh with faces")
         _note_small_meshes(self.scene)
@@ -130,7 +139,7 @@ class _Reader:
             elif prim.IsA(UsdGeom.PointInstancer):
                 self._instances(prim, matrix, inside)
             elif prim.IsA(UsdGeom.Mesh):
-                self._mesh(prim, matrix)
+                self.waiting.append((prim, matrix))
             elif is_light(prim):
                 light = read_light(prim, self.time, matrix, self.metres, self.scene)
                 if light is not None:
@@ -146,7 +155,7 @@ class _Reader:
         # What is not finite is noted; NumPy would write of it to standard error as well.
         with np.errstate(all="ignore"):
             mesh = read_mesh(
-                prim, self.time, matrix, self.metres, self.materials, self.scene, self.level
+                prim, self.time, matrix, self.metres, self.materials, self.scene, self.fineness
             )
         if mesh is not None:
             self.scene.meshes.append(mesh)

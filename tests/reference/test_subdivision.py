@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from functools import cache
 
 import numpy as np
 import pytest
@@ -539,7 +540,7 @@ def test_a_surface_that_would_be_too_large_is_refined_less(tmp_path, monkeypatch
     cage(stage, CUBE, SIDES, path="/b")
     scene = read(stage, complexity="high")
     assert [len(m.triangles) for m in scene.meshes] == [192, 48]
-    assert [n.split(":")[0] for n in scene.notes] == ["/b is refined as by complexity 'medium'"]
+    assert [n.split(":")[0] for n in scene.notes] == ["/b has its edges halved 1 times, not 2"]
 
 
 def test_frames_and_complexity_reach_the_picture(tmp_path):
@@ -557,5 +558,74 @@ def test_frames_and_complexity_reach_the_picture(tmp_path):
         seen[time, complexity] = np.abs(result.layers["normal"]).sum(axis=2).astype(bool).sum()
         assert result.metadata["fabricusd:triangles"] == {"low": 12, "high": 192}[complexity]
     assert seen[1.0, "low"] > seen[1.0, "high"] > seen[2.0, "high"] > 0
-    with pytest.raises(FabricError, match="complexity is 'ultra'; it must be one of low, medium"):
+    with pytest.raises(
+        FabricError, match="complexity is 'ultra'; it must be one of auto, low, medium"
+    ):
         render(path, complexity="ultra")
+
+
+def look(stage, distance):
+    camera = UsdGeom.Camera.Define(stage, "/cam")
+    UsdGeom.XformCommonAPI(camera).SetTranslate((0, 0, distance))
+    camera.CreateFocalLengthAttr(50.0)
+    camera.CreateHorizontalApertureAttr(25.0)
+    stage.SetMetadata("metersPerUnit", 1.0)
+
+
+@cache
+def limit_points(name):
+    points, faces, rules, *_ = CAGES[name]
+    found, normals = limit_of(points, faces, 4, 2, **rules)
+    known = np.isfinite(normals).all(axis=1)
+    return found[known], normals[known]
+
+
+def off_limit(mesh, name):
+    """How far the middles of triangles and of their edges are from the surface [m]."""
+    limit, normals = limit_points(name)
+    corners = mesh.points[mesh.triangles]
+    middles = np.concatenate([corners.mean(axis=1), 0.5 * (corners[:, 0] + corners[:, 1])])
+    which = cKDTree(limit).query(middles)[1]
+    return np.abs(((middles - limit[which]) * normals[which]).sum(axis=1)).max()
+
+
+@pytest.mark.parametrize("name", ["a cube", "a sheet", "a heptagonal prism"])
+@pytest.mark.parametrize("distance", [10, 100, 1000, 10000])
+def test_auto_is_less_than_a_pixel_off_and_no_finer_than_that_needs(tmp_path, name, distance):
+    points, faces, rules, *_ = CAGES[name]
+    stage = new_stage(tmp_path)
+    cage(stage, points, faces, **rules)
+    look(stage, distance)
+    scene = read(stage, complexity="auto", width=500)
+    assert not scene.notes
+    pixel = 1e-3 * distance
+    assert off_limit(scene.meshes[0], name) < 0.8 * pixel
+    cages = len(read(stage, complexity="low").meshes[0].triangles)
+    if len(scene.meshes[0].triangles) > 4 * cages:
+        coarser = read(stage, complexity="auto", width=62).meshes[0]
+        assert off_limit(coarser, name) > 0.1 * pixel
+
+
+def test_auto_sees_what_is_near_and_fills_a_picture_that_has_no_camera(tmp_path):
+    stage = new_stage(tmp_path)
+    cage(stage, CUBE, SIDES)
+
+    def times():
+        [mesh] = read(stage, complexity="auto", width=500).meshes
+        return math.log(len(mesh.triangles) / 12, 4)
+
+    filling = times()
+    look(stage, 2.0)
+    assert times() == filling + 1
+    look(stage, 1000.0)
+    assert times() == 1
+    UsdGeom.Camera.Get(stage, "/cam").CreateProjectionAttr("orthographic")
+    assert times() == filling
+
+
+def test_auto_lives_with_points_that_are_not_finite(tmp_path):
+    stage = new_stage(tmp_path)
+    cage(stage, [(math.nan, 0, 0), *CUBE[1:]], SIDES)
+    look(stage, 100)
+    [mesh] = read(stage, complexity="auto", width=500).meshes
+    assert len(mesh.triangles) >= 6 * 4
