@@ -113,7 +113,7 @@ def render(
     frames : time codes; None for the stage's default time
     exposure : of the PNG, in stops, added to the camera's own
     complexity : how finely subdivision surfaces are refined: "low" (their cages), "medium", "high"
-        or "veryhigh", as usdrecord and usdview have it, or "auto": until edges are two pixels long
+        or "veryhigh", as usdrecord and usdview have it, or "auto", as far as the picture shows
 
     Raises `FabricError` for what cannot be rendered at all; what had to be left out is in the
     result's `notes`. On Ctrl-C what is done is written, and `complete` is False.
