@@ -38,6 +38,9 @@ _SMALLEST = 1e-3
 _BRIGHTEST = 1e16
 """Radiance whose square, in a picture's variance, is a 32-bit number."""
 
+_FARTHEST = 1e15
+"""Metres beyond which a light's area is no 32-bit number."""
+
 _NOTHING = 1e-30
 """Square scene units below which a light has no surface."""
 
@@ -125,9 +128,12 @@ def read_light(
         return None
     if kind == DISTANT and angle <= 0 and not normalize:
         inputs.note("has no angle; its intensity is taken as irradiance")
-    _note_left_out(inputs, kind, matrix)
     frame = matrix.copy()
     frame[:3, 3] *= metres
+    if kind in _LENGTHS and _reach(frame, lengths, metres) > _FARTHEST:
+        inputs.note(f"reaches beyond {_FARTHEST:g} m, left out")
+        return None
+    _note_left_out(inputs, kind, matrix)
     return Light(
         path=str(prim.GetPath()),
         kind=kind,
@@ -223,6 +229,12 @@ def _is_linked(prim: Usd.Prim, name: str) -> bool:
         or bool(collection.GetExcludesRel().GetTargets())
         or collection.GetMembershipExpressionAttr().HasAuthoredValue()
     )
+
+
+def _reach(frame: NDArray[np.float64], lengths: dict[str, float], metres: float) -> float:
+    """The farthest that anything of a light may be from the origin [m], or more."""
+    extent = float(np.abs(frame[:3, :3]).max()) * max(lengths.values()) * metres
+    return float(np.abs(frame[:3, 3]).max()) + extent
 
 
 def _size(kind: int, matrix: NDArray[np.float64], lengths: dict[str, float], angle: float) -> float:

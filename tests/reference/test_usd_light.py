@@ -147,6 +147,9 @@ FAULTS = {
     "radiance beyond squares of 32 bits": (
         "RectLight", {"intensity": 1e30}, None, "has a radiance of 1e+30", False,
     ),
+    "a width beyond areas of 32 bits": (
+        "RectLight", {"width": 1e30}, None, "reaches beyond 1e+15 m", False,
+    ),
     "negative intensity": ("RectLight", {"intensity": -1.0}, None, "negative intensity", True),
     "a colour of one number": ("RectLight", {}, mistyped, "has color '1.0'", True),
     "a diffuse multiplier": ("RectLight", {"diffuse": 0.5}, None, "diffuse multiplier", True),
