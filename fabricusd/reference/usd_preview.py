@@ -30,14 +30,16 @@ class _Input(NamedTuple):
 
 
 _INPUTS = {
-    "diffuseColor": _Input("diffuse", True, 0.0, math.inf, True),
-    "emissiveColor": _Input("emissive", True, 0.0, math.inf, True),
+    "diffuseColor": _Input("diffuse", True, 0.0, 100.0, True),
+    "emissiveColor": _Input("emissive", True, 0.0, 1e12, True),
     "metallic": _Input("metallic", False, 0.0, 1.0, True),
     "roughness": _Input("roughness", False, 0.0, 1.0, True),
     "ior": _Input("ior", False, 0.01, 100.0, False),
     "opacity": _Input("opacity", False, 0.0, 1.0, True),
     "opacityThreshold": _Input("opacity_threshold", False, 0.0, 1.0, False),
 }
+"""Between which bounds each is rendered; those of colours keep paths inside 32-bit numbers."""
+
 _LEFT_OUT = {"clearcoat": 0.0, "displacement": 0.0, "normal": Gf.Vec3f(0, 0, 1)}
 """Inputs that are not rendered, and the value that says nothing."""
 

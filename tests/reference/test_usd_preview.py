@@ -198,6 +198,9 @@ CONSTANTS = {
         "diffuseColor", (math.nan, 0, 0), "must be a colour", "diffuse", (0.18,) * 3,
     ),
     "a negative colour": ("diffuseColor", (-1, 0.5, 0), "cut off", "diffuse", (0, 0.5, 0)),
+    "a colour beyond all measure": (
+        "diffuseColor", (1e30, 0, 0), "cut off", "diffuse", (100, 0, 0),
+    ),
     "too metallic": ("metallic", 7.0, "cut off", "metallic", 1),
     "clearcoat": ("clearcoat", 1.0, "has clearcoat, left out", "roughness", 0.5),
 }  # fmt: skip
