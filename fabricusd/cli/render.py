@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 EPILOG = """SCENE is .usd, .usda, .usdc or .usdz, or with --fabric an .obj, .glb or .ply
 
-OUT.exr gets every layer and a .png beside it; Ctrl-C keeps what is done
+OUT.exr gets beauty and each --aov, and a .png beside it; Ctrl-C keeps what is done
 
 example:
   fabricusd render garment.usda -o review.exr
