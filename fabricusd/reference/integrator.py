@@ -43,7 +43,7 @@ from fabricusd.reference.preview_surface import (
 from fabricusd.reference.scene import FabricSurface, Material, Scene
 from fabricusd.reference.shadow_rays import settle, thin_out
 from fabricusd.reference.sobol import new_numbers
-from fabricusd.reference.triangles import TriangleTables, build_tables
+from fabricusd.reference.triangles import build_tables
 from fabricusd.reference.wave import (
     BEAUTY_ROWS,
     FAR_LEVEL,
@@ -71,9 +71,10 @@ MOST_LAYERS = 32
 """See-through surfaces that one ray may pass before it is taken as blocked."""
 
 
-def _build_geometry(scene: Scene) -> tuple[TriangleTables, Accelerator]:
-    tables = build_tables(scene)
-    return tables, Accelerator(tables.points, tables.triangles)
+def _shaders(scene: Scene, shadow: str) -> list[FabricShader | None]:
+    """Of every material, once the kernels that they need are ready."""
+    compile_ahead(FAR).wait()
+    return [_shader(surface, shadow) for surface in scene.materials] or [None]
 
 
 def _shader(surface: Material, shadow: str) -> FabricShader | None:
@@ -107,12 +108,14 @@ class Tracer:
             raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
         if max_bounces < 0:
             raise FabricError("max bounces", f"is {max_bounces}; it must be at least 0")
-        # The triangles, while kernels are made ready and, by those, the laws of the cloths.
-        with ThreadPoolExecutor(1) as beside:
-            geometry = beside.submit(_build_geometry, scene)
-            compile_ahead(FAR).wait()
-            self.shaders = [_shader(surface, shadow) for surface in scene.materials] or [None]
-            self.tables, self.accelerator = geometry.result()
+        # The triangles, while kernels are made ready and, by those, the laws of the cloths. In this
+        # order: what triangles take by the way, another thread's heap would not give back.
+        beside = ThreadPoolExecutor(1)
+        shaders = beside.submit(_shaders, scene, shadow)
+        beside.shutdown(wait=False)
+        self.tables = build_tables(scene)
+        self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
+        self.shaders = shaders.result()
         self.lights, self.dome = build_lights(scene.lights, self.tables.centre)
         self.surfaces = build_surfaces(scene)
         shining = self.surfaces.table[:, [EMISSIVE, EMISSIVE + 1, EMISSIVE + 2]].any(axis=1)

@@ -395,7 +395,9 @@ def _sample(
         if not Batches(workers, task, stop).run(len(starts), report):
             return False
         done += samples
-        film.compare_halves()
+        # A picture of one pass has nothing to compare.
+        if done > samples or done < most:
+            film.compare_halves()
         if noise is not None:
             active = order[film.relative_error()[order] > noise]
     return True
