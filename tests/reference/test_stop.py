@@ -15,6 +15,17 @@ from tests.reference.scenes import grid, lambert
 from tests.reference.stages import new_stage, square
 
 
+@pytest.fixture(autouse=True)
+def handlers_of_a_terminal():
+    """What runs in the background of a script is started with Ctrl-C ignored."""
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 @pytest.mark.parametrize("number", SIGNALS)
 def test_a_signal_raises_until_it_is_held_and_is_remembered_then(number):
     with Stop() as stop:
