@@ -62,6 +62,7 @@ TILE = 16
 _FEWEST = TILE * TILE // 4
 """Pixels that a square needs to have its share renewed."""
 _LEAST_SHARE, _LARGEST_SHARE = 1.0 / 64.0, 2.0
+_BRIGHTEST = 1e15
 
 
 def require_aovs(names: tuple[str, ...]) -> None:
@@ -129,20 +130,24 @@ class Film:
 
     def _shares(self, part: slice, before: NDArray[np.float32]) -> NDArray[np.float32]:
         """Of one row of squares; as `before` where too few pixels have got a second half."""
-        n, m = self.samples[part], self._half_samples[part]
-        ready = (m > 0) & (3 * m <= 2 * n) & (self.groups[part] > 1)
-        n, m = np.maximum(n, 1), np.where(ready, m, 0)
+        counts, halves = self.samples[part], self._half_samples[part]
+        ready = (halves > 0) & (3 * halves <= 2 * counts) & (self.groups[part] > 1)
+        n = np.maximum(counts, 1).astype(np.float32)
+        m = np.where(ready, halves, 0).astype(np.float32)
         mean = _LUMINANCE @ self._total(part) / n
-        apart = mean - self._half[part] / np.maximum(m, 1)
-        halves = apart**2 * m / np.maximum(n - m, 1)
-        freedom = np.maximum(self.groups[part] - 1, 1) * n
-        groups = (_LUMINANCE @ np.sqrt(self.spread[:, part])) ** 2 / freedom
+        deviation = _LUMINANCE @ np.sqrt(self.spread[:, part])
+        # Beyond that squares leave the range of 32-bit numbers.
+        ready &= (np.abs(mean) < _BRIGHTEST) & (deviation < _BRIGHTEST)
+        mean, deviation = np.where(ready, mean, 0), np.where(ready, deviation, 0)
+        apart = np.where(ready, mean - self._half[part] / np.maximum(m, 1), 0)
+        seen = apart * apart * m / np.maximum(n - m, 1)
+        said = deviation * deviation / (np.maximum(self.groups[part] - 1, 1) * n)
         floor = max(0.01 * float(mean.mean()), 1e-12)
-        scale = np.where(ready, 1.0, 0.0) / (mean**2 + floor**2)
+        scale = ready / (mean * mean + np.float32(floor**2))
         columns = np.arange(0, self.width, TILE)
         seen, said, pixels = (
-            np.add.reduceat(x.reshape(-1, self.width).sum(axis=0), columns)
-            for x in (halves * scale, groups * scale, ready.astype(float))
+            np.add.reduceat(x.reshape(-1, self.width).sum(axis=0, dtype=np.float64), columns)
+            for x in (seen * scale, said * scale, ready)
         )
         share = np.clip(seen / np.maximum(said, 1e-30), _LEAST_SHARE, _LARGEST_SHARE)
         return np.where((pixels >= _FEWEST) & (said > 0), share, before).astype(np.float32)

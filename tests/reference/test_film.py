@@ -83,3 +83,16 @@ def test_pixels_that_stopped_early_leave_the_others_their_share():
     film.compare_halves()
     np.testing.assert_array_equal(film._share, before)
     assert np.isfinite(film.variance()).all()
+
+
+@pytest.mark.filterwarnings("error")
+def test_pixels_brighter_than_32_bits_can_square_do_not_spoil_their_square():
+    def glaring(n: int):
+        values = independent(n)
+        values[7] *= 1e25
+        values[9] *= 1e16
+        return values
+
+    with np.errstate(over="ignore"):
+        film = filled(glaring, 4)
+    assert film._share == pytest.approx(np.ones_like(film._share), rel=0.4)
