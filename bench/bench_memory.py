@@ -1,6 +1,6 @@
 """Memory that a picture of a million triangles takes at 2048 x 2048.
 
-    python bench/bench_memory.py
+    python bench/bench_memory.py [SAMPLES]
 
 Printed: the most memory that the process held, before and after rendering. Run it twice: the first
 run compiles kernels, which takes memory of its own.
@@ -51,7 +51,8 @@ def main() -> None:
         lights=[Light(path="sky", kind=DOME, radiance=(1.0, 1.0, 1.0))],
     )
     print(f"before: {most():.0f} MB")
-    render_scene(scene, width=2048, height=2048, spp=1, level="far")
+    samples = int(sys.argv[1]) if len(sys.argv) > 1 else 1
+    render_scene(scene, width=2048, height=2048, spp=samples, level="far")
     print(f"after: {most():.0f} MB")
 
 
