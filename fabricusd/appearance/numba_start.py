@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from typing import Any
 
 # Before the modules that overload indexing: numba asks in the order of import, and arrays, which
@@ -40,4 +41,10 @@ def load_as_they_are(kernels: Iterable[Any]) -> None:
         if isinstance(cache, FunctionCache):
             # For reference counts, which kernels that allocate arrays call by name.
             rtsys.initialize(kernel.targetctx)
-            cache.load_overload = cache._load_overload
+            cache.load_overload = partial(_load, cache)
+
+
+def _load(cache: FunctionCache, signature: Any, context: Any) -> Any:
+    """`FunctionCache.load_overload` after its first line, which refreshes `context`."""
+    with cache._guard_against_spurious_io_errors():
+        return cache._load_overload(signature, context)

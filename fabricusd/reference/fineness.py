@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
 from fabricusd.reference.scene import Camera
-from fabricusd.reference.subdivision import COMPLEXITIES
+from fabricusd.reference.subdivision import COMPLEXITIES, around_faces
 
 AUTO = "auto"
 OFF = 0.25
 """Pixels that triangles may be off from the surface where the mesh is nearest to the camera. An
 estimate: on cages of a few large faces three times as much was seen in places."""
-_MOST = 0.95
-"""Share of the edges that this is asked of: a few sharp ones, at a hem, do not refine all the
-rest."""
+_MOST, _WORST = 0.95, 4.0
+"""Share of the edges that this is asked of, and how many times as far off the others may be: a few
+sharp ones, at a hem, do not refine all the rest, and a small part that is coarse is not left so."""
 _LAST = 6
 """A cage of few large faces is refined further than `veryhigh`, but not without end."""
 
@@ -57,7 +57,8 @@ class Fineness:
         pixel = self._pixel(points[finite])
         if not pixel > 0 or not len(indices):
             return 0
-        bend = float(np.quantile(_bends(points, counts, indices), _MOST)) / (OFF * pixel)
+        bends = _bends(points, counts, indices)
+        bend = max(float(np.quantile(bends, _MOST)), float(bends.max()) / _WORST) / (OFF * pixel)
         # Of a cubic B-spline: the limit lies a sixth of the second difference beside its control
         # point, and an eighth beside the middle of a chord, which each halving makes a quarter.
         if bend <= 6.0:
@@ -83,13 +84,10 @@ def _bends(
 ) -> NDArray[np.float64]:
     """(h,) length of each corner's edge [m] times the angle that the normal turns along it; 0 where
     a point is not finite."""
-    starts = np.cumsum(counts) - counts
-    face = np.repeat(np.arange(len(counts)), counts)
-    after = np.arange(1, len(indices) + 1)
-    after[(starts + counts - 1)[counts > 0]] = starts[counts > 0]
+    face, after, _ = around_faces(counts)
     edge = points[indices[after]] - points[indices]
     # Newell's normal, about the face's own first corner, where products keep their digits.
-    own = points[indices] - points[indices[starts[face]]]
+    own = points[indices] - points[indices[(np.cumsum(counts) - counts)[face]]]
     part = np.cross(own, own[after])
     part[~np.isfinite(part).all(axis=1)] = 0.0
     whole = np.stack([np.bincount(face, part[:, k], len(counts)) for k in range(3)], axis=1)

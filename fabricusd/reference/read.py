@@ -30,7 +30,7 @@ def read_scene(
         picture of `width` pixels shows; by default not at all, since textures are baked and
         materials bound on the faces that their UVs were laid on
     """
-    Fineness(complexity=complexity)
+    fineness = Fineness(complexity=complexity, width=width)
     path = Path(source)
     suffix = path.suffix.lower()
     if suffix not in USD_SUFFIXES + MESH_SUFFIXES:
@@ -48,9 +48,8 @@ def read_scene(
     from fabricusd.reference.usd_scene import read_usd_scene
 
     return read_usd_scene(
-        path, binding=binding, camera=camera, time_code=time_code, complexity=complexity,
-        width=width,
-    )  # fmt: skip
+        path, binding=binding, camera=camera, time_code=time_code, fineness=fineness
+    )
 
 
 def as_binding(fabric: str | Fabric | Binding | None) -> Binding | None:

@@ -20,6 +20,17 @@ COMPLEXITIES = {"low": 0, "medium": 1, "high": 2, "veryhigh": 3}
 """Levels by the names of usdrecord and usdview: each halves the edges; `low` is the cage."""
 
 
+def around_faces(counts: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """(h,) of each corner of polygons with `counts` corners: its face, the next corner of that and
+    the one before."""
+    starts = np.cumsum(counts) - counts
+    face = np.repeat(np.arange(len(counts)), counts)
+    corner = np.arange(len(face))
+    first, size = starts[face], counts[face]
+    after = np.where(corner + 1 == first + size, first, corner + 1)
+    return face, after, np.where(corner == first, first + size - 1, corner - 1)
+
+
 class Topology:
     """Which corners, edges and points of polygons belong together.
 
@@ -31,12 +42,7 @@ class Topology:
 
     def __init__(self, counts: NDArray[Any], indices: NDArray[Any], count: int) -> None:
         self.counts, self.indices, self.count = counts, indices, count
-        starts = np.cumsum(counts) - counts
-        self.face = np.repeat(np.arange(len(counts)), counts)
-        corner = np.arange(len(indices))
-        first, size = starts[self.face], counts[self.face]
-        self.after = np.where(corner + 1 == first + size, first, corner + 1)
-        self.before = np.where(corner == first, first + size - 1, corner - 1)
+        self.face, self.after, self.before = around_faces(counts)
         a, b = indices, indices[self.after]
         self.forward = a < b
         key = np.minimum(a, b).astype(np.int64) * count + np.maximum(a, b)

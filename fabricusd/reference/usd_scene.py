@@ -48,16 +48,14 @@ def read_usd_scene(
     binding: Binding | None = None,
     camera: str | None = None,
     time_code: float | None = None,
-    complexity: str = "low",
-    width: int = 960,
+    fineness: Fineness = Fineness(),  # noqa: B008
 ) -> Scene:
     """Everything visible on the stage at `time_code`; its earliest time where that is None.
 
     binding : on meshes without a material of their own
     camera : prim path; the first camera on the stage where that is None
-    complexity, width : see `fineness.Fineness`
+    fineness : of subdivision surfaces; its camera is the one that is found
     """
-    fineness = Fineness(complexity=complexity, width=width)
     stage, notes = _open(path)
     # What USD has to say of a prim would be several lines on standard error.
     warnings = UsdUtils.CoalescingDiagnosticDelegate()

@@ -80,3 +80,21 @@ def test_auto_lives_with_points_that_are_not_finite(tmp_path):
     look(stage, 100)
     [mesh] = read(stage, complexity="auto", width=500).meshes
     assert len(mesh.triangles) >= 6 * 4
+
+
+def test_a_small_coarse_part_of_a_flat_mesh_is_refined_too(tmp_path):
+    """Fewer than one edge in twenty is a cube's; alone it would be refined as finely or finer."""
+    count = 24
+    line = np.linspace(-1, 1, count)
+    flat = [(x, 0.0, z) for x in line for z in line]
+    quads = [(count * i + j, count * i + 1 + j, count * i + count + 1 + j, count * i + count + j)
+             for i in range(count - 1) for j in range(count - 1)]  # fmt: skip
+    knob = [tuple(len(flat) + p for p in side) for side in SIDES]
+    assert len(knob) < 0.05 * len(quads)
+    stage = new_stage(tmp_path)
+    cage(stage, flat, quads, path="/flat")
+    cage(stage, [*flat, *CUBE], [*quads, *knob], path="/both")
+    look(stage, 100.0)
+    plain, both = read(stage, complexity="auto", width=500).meshes
+    assert len(plain.triangles) == 2 * len(quads)
+    assert len(both.triangles) >= 2 * 4 * (len(quads) + len(knob))
