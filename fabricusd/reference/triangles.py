@@ -26,6 +26,10 @@ RECORD = 36
 PART = 1 << 16
 """Triangles that are worked on together."""
 
+SAME = 2e-6
+"""Side of the cells, over a mesh's extent, in which points count as one place. Single precision
+moves a point by a twentieth of it."""
+
 CREASE = math.radians(40.0)
 """Below it, two faces around a point are one smooth surface: a fold of up to 80 degrees."""
 
@@ -207,12 +211,45 @@ def _face_normals(corners: NDArray[Any]) -> NDArray[Any]:
     return _unit(face, face)
 
 
-def _same_places(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(n,) number of each point's place, equal for points that coincide to 1e-6 of the extent."""
-    extent = float(np.ptp(points, axis=0).max()) if len(points) else 1.0
-    cells = np.round(points / max(extent * 1e-6, 1e-12)).astype(np.int64)
-    mixed = cells[:, 0] * 73856093 ^ cells[:, 1] * 19349663 ^ cells[:, 2] * 83492791
-    return np.unique(mixed, return_inverse=True)[1].reshape(-1)
+def _same_places(points: NDArray[Any]) -> NDArray[np.int64]:
+    """(n,) number of each point's place; points within a few millionths of the extent share one.
+
+    Two grids of cells, the second shifted by half a cell: coincident points that rounding puts on
+    either side of a border in one of them lie in one cell of the other.
+    """
+    extent = float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0
+    at = (points - points.min(axis=0, initial=np.inf)) / max(extent * SAME, 1e-12)
+    place, shifted = (
+        group_numbers(*np.floor(at + shift).astype(np.int64).T) for shift in (0.5, 1.0)
+    )
+    while True:
+        joined = _smallest_of_each(shifted, place)
+        joined = _smallest_of_each(place, joined)
+        if np.array_equal(joined, place):
+            return place
+        place = joined
+
+
+def _smallest_of_each(group: NDArray[np.int64], value: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n,) for each entry the smallest `value` of those in its `group`."""
+    smallest = np.full(int(group.max(initial=-1)) + 1, np.iinfo(np.int64).max)
+    np.minimum.at(smallest, group, value)
+    return smallest[group]
+
+
+def group_numbers(*columns: NDArray[Any]) -> NDArray[np.int64]:
+    """(n,) a number for each entry, equal exactly where all of the integer `columns` are."""
+    key = np.zeros(len(columns[0]), np.int64)
+    size = 1
+    for column in columns:
+        low = int(column.min(initial=0))
+        span = int(column.max(initial=0)) - low + 1
+        if size * span >= 1 << 63:
+            known, key = np.unique(key, return_inverse=True)
+            size = len(known)
+        key = key * span + (column - low)
+        size *= span
+    return np.unique(key, return_inverse=True)[1].reshape(-1)
 
 
 def weave_coordinates(
@@ -275,8 +312,8 @@ def _grain(
     """
     along = np.empty((len(tri), 3), np.float32)
     hand = np.empty(len(tri), np.float32)
-    key = np.empty((len(tri), 3), np.int64)
-    place = _same_places(points).astype(np.int64)
+    cells = np.empty((len(tri), 3, 2), np.int32)
+    low = st.min(axis=(0, 1), initial=np.inf)
     scale = max(float(np.ptp(st)) * 1e-6, 1e-12)
     for part in _parts(len(tri)):
         d1, d2 = st[part, 1] - st[part, 0], st[part, 2] - st[part, 0]
@@ -287,13 +324,12 @@ def _grain(
         helper = np.where(steep, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
         along[part] = _unit(direction, np.cross(np.cross(face, helper), face))
         hand[part] = np.where(det < 0, -1.0, 1.0)
-        # Corners share a grain when place, handedness and the coordinates there agree.
-        cells = np.round(st[part] / scale).astype(np.int64)
-        mixed = place[tri[part]] * 6364136223846793005 ^ cells[..., 0] * 1442695040888963407
-        mixed = mixed ^ cells[..., 1] * 3935559000370003845
-        key[part] = mixed ^ (det < 0)[:, None].astype(np.int64)
-    group = np.unique(key, return_inverse=True)[1].reshape(key.shape)
-    del key
+        cells[part] = np.round((st[part] - low) / scale)
+    # Corners share a grain when place, coordinates and handedness agree there.
+    place = _same_places(points)[tri].ravel()
+    left = np.repeat(hand < 0, 3)
+    group = group_numbers(place, cells[..., 0].ravel(), cells[..., 1].ravel(), left).reshape(-1, 3)
+    del cells, place, left
     total = np.zeros((int(group.max(initial=0)) + 1, 3), np.float32)
     for part in _parts(len(tri)):
         weighted = along[part] * _length(np.cross(e1[part], e2[part]))[:, None]
