@@ -176,8 +176,9 @@ def _parts(count: int) -> list[slice]:
 def smooth_normals(points: NDArray[Any], tri: NDArray[Any]) -> NDArray[np.float32]:
     """(m, 3, 3) unit normals at the corners: faces around a point, weighted by their angle there.
 
-    Points at one place are one point, so a seam of the UVs is no crease. A corner whose mean is
-    turned away from its own face by more than CREASE keeps that face's normal, as on a box.
+    Points at one place are one point, so a seam of the UVs is no crease. Where the faces around a
+    point do not make one smooth surface, as along the edge of a box or the rim of a cylinder, each
+    corner averages the faces that it can be reached from without crossing a crease.
     """
     place = _same_places(points)
     total = np.zeros((int(place.max(initial=0)) + 1, 3))
@@ -185,18 +186,61 @@ def smooth_normals(points: NDArray[Any], tri: NDArray[Any]) -> NDArray[np.float3
         corners, shared = points[tri[part]], place[tri[part]]
         face = _face_normals(corners)
         for k in range(3):
-            a = corners[:, (k + 1) % 3] - corners[:, k]
-            b = corners[:, (k + 2) % 3] - corners[:, k]
-            sine = _length(np.cross(a, b))
-            angle = np.arctan2(sine, np.einsum("ij,ij->i", a, b))
-            _add_at(total, shared[:, k], angle[:, None] * face)
+            _add_at(total, shared[:, k], _angle_at(corners, k)[:, None] * face)
     normals = np.empty((len(tri), 3, 3), np.float32)
+    creased = np.zeros(len(total), bool)
     for part in _parts(len(tri)):
-        face = _face_normals(points[tri[part]])
-        mean = _unit(total[place[tri[part]]], face[:, None])
+        face, shared = _face_normals(points[tri[part]]), place[tri[part]]
+        normals[part] = mean = _unit(total[shared], face[:, None])
         cosine = np.einsum("mkc,mc->mk", mean, face)
-        normals[part] = np.where((cosine < math.cos(CREASE))[..., None], face[:, None], mean)
+        creased[shared[cosine < math.cos(CREASE)]] = True
+    if creased.any():
+        corners = np.argwhere(creased[place[tri]])
+        normals[corners[:, 0], corners[:, 1]] = _between_creases(points, tri, place, corners)
     return normals
+
+
+def _between_creases(
+    points: NDArray[Any], tri: NDArray[Any], place: NDArray[np.int64], corners: NDArray[np.int64]
+) -> NDArray[Any]:
+    """(k, 3) unit normals at `corners`, (k, 2) rows of triangle and corner number.
+
+    All corners at a place must be given. Two of them are one surface where their triangles share an
+    edge and are folded there by less than twice CREASE.
+    """
+    which, k = corners.T
+    shape = points[tri[which]]
+    face = _face_normals(shape)
+    here = place[tri[which, k]]
+    group = np.arange(len(which))
+    edges = [(here, place[tri[which, (k + step) % 3]]) for step in (1, 2)]
+    edge = group_numbers(*(np.concatenate(ends) for ends in zip(*edges, strict=True)))
+    order = np.argsort(edge, kind="stable")
+    one, other = order[:-1], order[1:]
+    both = edge[one] == edge[other]
+    one, other = one[both] % len(which), other[both] % len(which)
+    smooth = np.einsum("ij,ij->i", face[one], face[other]) > math.cos(2 * CREASE)
+    one, other = one[smooth], other[smooth]
+    while (group[one] != group[other]).any():
+        # The smaller number passes to the neighbour, and to whatever has the neighbour's number.
+        least = np.minimum(group[one], group[other])
+        for end in (one, other):
+            np.minimum.at(group, group[end], least)
+        group = group[group]
+    angle = np.empty(len(which))
+    for corner in range(3):
+        mine = k == corner
+        angle[mine] = _angle_at(shape[mine], corner)
+    total = np.zeros((len(which), 3))
+    _add_at(total, group, angle[:, None] * face)
+    return _unit(total[group], face)
+
+
+def _angle_at(corners: NDArray[Any], k: int) -> NDArray[Any]:
+    """(n,) angle [rad] at corner `k` of triangles with (n, 3, 3) corners."""
+    a = corners[:, (k + 1) % 3] - corners[:, k]
+    b = corners[:, (k + 2) % 3] - corners[:, k]
+    return np.arctan2(_length(np.cross(a, b)), np.einsum("ij,ij->i", a, b))
 
 
 def _add_at(total: NDArray[Any], index: NDArray[np.int64], vectors: NDArray[Any]) -> None:
