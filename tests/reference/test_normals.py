@@ -56,7 +56,9 @@ def cone():
     side = (np.ptp(corners[..., 1], axis=1) > 0.1)[:, None, None]
     across = corners * [1, 0, 1]
     slant = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
-    truth = np.where(side, slant + [0, 0.4, 0], np.broadcast_to([0.0, -1, 0], corners.shape))
+    truth = np.where(
+        side, slant + np.array([0, 0.4, 0]), np.broadcast_to([0.0, -1, 0], corners.shape)
+    )
     return points, triangles, truth, True
 
 
@@ -94,7 +96,9 @@ def test_normals_survive_points_that_coincide_but_for_single_precision(shape):
 
 def test_normals_of_a_mesh_far_from_the_origin_are_those_at_the_origin():
     points, triangles, truth, counted = torus()
-    assert degrees_off(points + [300.0, -20.0, 7.0], triangles, truth, counted).max() < 1.0
+    assert (
+        degrees_off(points + np.array([300.0, -20.0, 7.0]), triangles, truth, counted).max() < 1.0
+    )
 
 
 @pytest.mark.parametrize(("fold", "smooth"), [(30, True), (75, True), (85, False), (120, False)])
