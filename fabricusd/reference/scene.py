@@ -37,7 +37,10 @@ class PreviewSurface:
     """A material of the UsdPreviewSurface kind: Lambert below GGX, metallic workflow.
 
     diffuse, emissive : (3,) float - linear Rec. 709
-    ior 1 removes the specular layer. Each texture multiplies nothing: it replaces its constant.
+    ior 1 removes the specular layer.
+    textures : of diffuse, emissive, metallic, roughness, opacity, normal. Each multiplies nothing:
+        it replaces its constant. Of `normal` the texels are normals in tangent space, see
+        `normal_map`; of any length, where 0 is the surface's own.
     """
 
     name: str = ""

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Usd, UsdShade
+from pxr import Sdf, Usd, UsdShade
 
 from fabricusd.errors import FabricError
 from fabricusd.images import read_alpha, read_image
@@ -21,27 +21,41 @@ _MOST_TRANSFORMS = 8
 """UsdTransform2d one behind another before they are taken for a cycle."""
 
 
+COLOR, NUMBER, VECTOR = "a colour", "a number", "a vector of three numbers"
+"""Kinds of input."""
+
+
 class _Input(NamedTuple):
     field: str
-    color: bool
+    kind: str
     low: float
     high: float
     textured: bool
 
+    @property
+    def size(self) -> int:
+        """How many numbers it has."""
+        return 1 if self.kind == NUMBER else 3
+
 
 _INPUTS = {
-    "diffuseColor": _Input("diffuse", True, 0.0, 100.0, True),
-    "emissiveColor": _Input("emissive", True, 0.0, 1e12, True),
-    "metallic": _Input("metallic", False, 0.0, 1.0, True),
-    "roughness": _Input("roughness", False, 0.0, 1.0, True),
-    "ior": _Input("ior", False, 0.01, 100.0, False),
-    "opacity": _Input("opacity", False, 0.0, 1.0, True),
-    "opacityThreshold": _Input("opacity_threshold", False, 0.0, 1.0, False),
+    "diffuseColor": _Input("diffuse", COLOR, 0.0, 100.0, True),
+    "emissiveColor": _Input("emissive", COLOR, 0.0, 1e12, True),
+    "metallic": _Input("metallic", NUMBER, 0.0, 1.0, True),
+    "roughness": _Input("roughness", NUMBER, 0.0, 1.0, True),
+    "ior": _Input("ior", NUMBER, 0.01, 100.0, False),
+    "opacity": _Input("opacity", NUMBER, 0.0, 1.0, True),
+    "opacityThreshold": _Input("opacity_threshold", NUMBER, 0.0, 1.0, False),
+    "normal": _Input("normal", VECTOR, -1e3, 1e3, True),
 }
-"""Between which bounds each is rendered; those of colours keep paths inside 32-bit numbers."""
+"""Between which bounds each is rendered; those of colours keep paths inside 32-bit numbers, those
+of normals their squares."""
 
-_LEFT_OUT = {"clearcoat": 0.0, "displacement": 0.0, "normal": Gf.Vec3f(0, 0, 1)}
+_LEFT_OUT = {"clearcoat": 0.0, "displacement": 0.0}
 """Inputs that are not rendered, and the value that says nothing."""
+
+_FLAT = (0.0, 0.0, 1.0)
+"""The normal that turns nothing."""
 
 _CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 
@@ -70,12 +84,21 @@ class PreviewNetwork:
                     textures[row.field] = texture
             elif source is not None:
                 values[row.field] = self._constant(name, row, source)
+        self._keep_normal(values, textures)
         self._note_left_out(shader)
         known = {field: value for field, value in values.items() if value is not None}
         return PreviewSurface(name=self.where, textures=textures, **known), self.uv_set
 
     def _note(self, problem: str) -> None:
         self.scene.note(self.where, problem)
+
+    def _keep_normal(self, values: dict[str, Any], textures: dict[str, Texture]) -> None:
+        """A constant normal becomes a texture of one texel: it needs the mesh's UVs as one does."""
+        constant = values.pop("normal", None) or _FLAT
+        if not any(constant):
+            self._note("has a normal of length 0; the surface's own is rendered")
+        elif constant != _FLAT:
+            textures["normal"] = Texture(pixels=np.array([[constant]], np.float32))
 
     def _note_left_out(self, shader: UsdShade.Shader) -> None:
         left_out = []
@@ -102,16 +125,15 @@ class PreviewNetwork:
 
     def _constant(self, name: str, row: _Input, given: Any) -> Any:
         """A number or three, inside what the input allows; None where it is neither."""
-        values = _numbers(given, 3 if row.color else 1)
+        values = _numbers(given, row.size)
         if values is None:
-            kind = "a colour" if row.color else "a number"
-            self._note(f"has {name} {given}; it must be {kind}, and its default is rendered")
+            self._note(f"has {name} {given}; it must be {row.kind}, and its default is rendered")
             return None
         inside = np.clip(values, row.low, row.high)
         if (inside != values).any():
             low, high = f"{row.low:g}", f"{row.high:g}"
             self._note(f"has {name} {given}; it must be from {low} to {high}, and is cut off there")
-        return tuple(float(x) for x in inside) if row.color else float(inside[0])
+        return tuple(float(x) for x in inside) if row.size == 3 else float(inside[0])
 
     def _texture(
         self, name: str, row: _Input, node: UsdShade.Shader, output: str
@@ -121,10 +143,10 @@ class PreviewNetwork:
         if kind != "UsdUVTexture" or not row.textured:
             self._note(f"reads {name} from a node of the kind '{kind}'; its default is rendered")
             return None
-        channel = _CHANNELS.get(output, None if row.color else 0)
+        channel = _CHANNELS.get(output, None if row.size == 3 else 0)
         place, wrap = self._coordinates(node), self._wrap(node)
         try:
-            pixels, tiles = self._pixels(node, row.color, channel)
+            pixels, tiles = self._pixels(node, row.kind == COLOR, channel)
         except FabricError as error:
             self._note(f"is rendered without a texture: {error}")
             fallback = self._four(node, "fallback", math.nan)
@@ -133,7 +155,13 @@ class PreviewNetwork:
                 return None
             pixels, tiles = picked.reshape(1, 1, -1), None
         else:
-            pixels = self._scaled(node, pixels, channel)
+            codes, pixels = pixels, self._scaled(node, pixels, channel)
+            if row.kind == VECTOR:
+                if codes.shape[2] != 3:
+                    self._note(f"reads {name} from one channel; it must have three (connect 'rgb' "
+                               "of a colour picture), and its default is rendered")  # fmt: skip
+                    return None
+                pixels = self._normals(node, codes, pixels)
         if tiles is not None:
             place, wrap = tiles @ place, ("black", "black")
         return Texture(
@@ -188,6 +216,23 @@ class PreviewNetwork:
             return pixels
         which = slice(0, 3) if channel is None else slice(channel, channel + 1)
         return pixels * scale[which] + bias[which]
+
+    def _normals(
+        self, node: UsdShade.Shader, codes: NDArray[np.float32], normals: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """`normals` with 0, no normal, where the picture is black: nothing was painted there, or a
+        UDIM tile is missing. What does not look like a normal map is noted.
+
+        codes : (h, w, 3) - the picture's values before scale and bias
+        """
+        if str(self._source(node, "sourceColorSpace")[0]) == "sRGB":
+            self._note("decodes its normal map as sRGB; normals are data, and should be 'raw'")
+        if (self._four(node, "bias", 0.0)[:3] == 0).all() and (normals >= 0).all() and (
+            normals[..., :2] > 0
+        ).any():  # fmt: skip
+            self._note("has a normal map without a bias that holds no negative number; codes need "
+                       "scale (2, 2, 2, 1) and bias (-1, -1, -1, 0)")  # fmt: skip
+        return np.where(codes.any(axis=2, keepdims=True), normals, np.float32(0))
 
     def _sound(self, name: str, row: _Input, pixels: NDArray[np.float32]) -> NDArray[np.float32]:
         finite = np.isfinite(pixels)
