@@ -254,6 +254,57 @@ def tiles_missing(stage, tmp_path):
     textured(stage, "diffuseColor", "rgb", "./lost.<UDIM>.png")
 
 
+def normal_map(stage, file="./n.png", output="rgb", **inputs):
+    """The square with a normal map of codes; `inputs` add to the texture's own."""
+    own = {
+        "scale": (TYPES.Float4, (2, 2, 2, 1)), "bias": (TYPES.Float4, (-1, -1, -1, 0)),
+        "sourceColorSpace": (TYPES.Token, "raw"),
+    }  # fmt: skip
+    textured(stage, "normal", output, file, **(own | inputs))
+
+
+def write_normals(path, *normals) -> None:
+    """A square picture of columns of unit normals, coded in 16 bits."""
+    codes = np.round((np.array([normals] * len(normals)) + 1) / 2 * 65535).astype(np.uint16)
+    write_16_bit(path, [codes], len(normals), 3, {})
+
+
+def normal_of_one_channel(stage, tmp_path):
+    write_normals(tmp_path / "n.png", (0, 0, 1))
+    normal_map(stage, output="g")
+
+
+def normal_of_a_grey_picture(stage, tmp_path):
+    write_16_bit(tmp_path / "n.png", [np.full((2, 2, 1), 40000, np.uint16)], 2, 1, {})
+    normal_map(stage)
+
+
+def normal_that_is_lost(stage, tmp_path):
+    normal_map(stage, "./lost.png")
+
+
+def normal_that_is_no_picture(stage, tmp_path):
+    (tmp_path / "n.png").write_bytes(b"\x89PNG\r\n\x1a\n but no more")
+    normal_map(stage)
+
+
+def normal_without_scale(stage, tmp_path):
+    write_normals(tmp_path / "n.png", (0.6, 0, 0.8))
+    normal_map(stage, scale=(TYPES.Float4, (1, 1, 1, 1)), bias=(TYPES.Float4, (0, 0, 0, 0)))
+
+
+def normal_as_srgb(stage, tmp_path):
+    write_normals(tmp_path / "n.png", (0.6, 0, 0.8))
+    normal_map(stage, sourceColorSpace=(TYPES.Token, "sRGB"))
+
+
+def normal_from_another_node(stage, tmp_path):
+    shader = surface(stage)
+    other = node(stage, "/m/reader", "UsdPrimvarReader_normal")
+    shader.CreateInput("normal", TYPES.Normal3f).ConnectToSource(other.ConnectableAPI(), "result")
+    bind(stage)
+
+
 FAULTS = {
     "a file named by a string": (file_is_a_string, "names no asset"),
     "a scale of one number": (scale_is_one_number, "scale 2.0"),
@@ -261,6 +312,13 @@ FAULTS = {
     "a colour from a primvar": (reader_of_a_colour, "UsdPrimvarReader_float3"),
     "a texture without UVs": (no_uvs, "/square has no UVs for its textures"),
     "tiles that are missing": (tiles_missing, "has no tiles"),
+    "a normal from one channel": (normal_of_one_channel, "reads normal from one channel"),
+    "a normal map in grey": (normal_of_a_grey_picture, "reads normal from one channel"),
+    "a normal map that is lost": (normal_that_is_lost, "lost.png"),
+    "a normal map that is damaged": (normal_that_is_no_picture, "n.png"),
+    "a normal map without scale and bias": (normal_without_scale, "without a bias"),
+    "a normal map in sRGB": (normal_as_srgb, "as sRGB"),
+    "a normal from a primvar": (normal_from_another_node, "UsdPrimvarReader_normal"),
     "a material that is nowhere": (
         lambda stage, _: UsdShade.MaterialBindingAPI.Apply(square(stage).GetPrim())
         .GetDirectBindingRel().SetTargets(["/lost"]),
@@ -279,6 +337,100 @@ def test_a_broken_network_is_one_line_and_rendered(tmp_path, name):
     found, scene = rendered(stage)
     assert len([note for note in scene.notes if words in note]) == 1, scene.notes
     assert all(np.isfinite(texture.pixels).all() for texture in found.textures.values())
+
+
+def shown_normal(stage) -> np.ndarray:
+    """The normal that a picture from above shows in the middle, but for the rest of the square."""
+    scene = read(stage)
+    camera = above(width=0.002)
+    r = picture(scene.meshes, scene.materials, [], camera, size=2, spp=4, aovs=("normal",))
+    return r.layers["normal"][0, 0]
+
+
+TILTED = (0.48, -0.36, 0.8)
+
+
+def test_a_normal_map_is_read_as_its_codes_say(tmp_path):
+    write_normals(tmp_path / "n.png", TILTED)
+    stage = new_stage(tmp_path)
+    normal_map(stage)
+    found, scene = rendered(stage)
+    assert scene.notes == []
+    assert found.textures["normal"].pixels.ravel() == pytest.approx(TILTED, abs=2e-5)
+
+
+# `square` lies in the plane y = 0: u grows along +x and v along +z at its points, seen from above
+# u to the right and v downwards, so its UVs are mirrored.
+SHELLS = {
+    # name: (st of the four corners, the normal in the world)
+    "mirrored": ([(0, 0), (0, 1), (1, 1), (1, 0)], (0.48, 0.8, -0.36)),
+    "as it lies": ([(0, 1), (0, 0), (1, 0), (1, 1)], (0.48, 0.8, 0.36)),
+    "u and v flipped": ([(1, 0), (1, 1), (0, 1), (0, 0)], (-0.48, 0.8, -0.36)),
+    "a quarter turn": ([(0, 0), (1, 0), (1, 1), (0, 1)], (-0.36, 0.8, 0.48)),
+}
+
+
+@pytest.mark.parametrize("name", SHELLS)
+def test_a_normal_map_follows_the_uvs_of_its_shell(tmp_path, name):
+    corners, expected = SHELLS[name]
+    write_normals(tmp_path / "n.png", TILTED)
+    stage = new_stage(tmp_path)
+    normal_map(stage)
+    UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/square")).GetPrimvar("st").Set(corners)
+    assert shown_normal(stage) == pytest.approx(expected, abs=5e-5)
+
+
+def test_a_transform_turns_the_relief_with_the_picture(tmp_path):
+    write_normals(tmp_path / "n.png", TILTED)
+    stage = new_stage(tmp_path)
+    reader = node(stage, "/m/st", "UsdPrimvarReader_float2", varname=(TYPES.String, "st"))
+    turned = node(stage, "/m/turn", "UsdTransform2d", rotation=(TYPES.Float, 90.0))
+    turned.CreateInput("in", TYPES.Float2).ConnectToSource(reader.ConnectableAPI(), "result")
+    normal_map(stage, st=(TYPES.Float2, turned))
+    corners, _ = SHELLS["as it lies"]
+    UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/square")).GetPrimvar("st").Set(corners)
+    # The picture's u is the mesh's -v, its v the mesh's u.
+    assert shown_normal(stage) == pytest.approx((-0.36, 0.8, 0.48), abs=5e-5)
+
+
+def test_a_missing_tile_and_black_texels_leave_the_surface_its_own_normal(tmp_path):
+    write_normals(tmp_path / "n.1001.png", TILTED, (-1, -1, -1))
+    write_normals(tmp_path / "n.1012.png", TILTED)
+    stage = new_stage(tmp_path)
+    normal_map(stage, "./n.<UDIM>.png")
+    found, scene = rendered(stage)
+    assert scene.notes == []
+    pixels = found.textures["normal"].pixels
+    assert pixels.shape == (4, 4, 3)
+    # The tile at the lower left with its black column, the missing ones, the one at the upper right.
+    assert pixels[2:, 0] == pytest.approx(np.array([TILTED] * 2), abs=2e-5)
+    assert not pixels[2:, 1:].any()
+    assert not pixels[:2, :2].any()
+    assert pixels[:2, 2:] == pytest.approx(np.full((2, 2, 3), TILTED), abs=2e-5)
+
+
+CONSTANT_NORMALS = {
+    # name: (normal, what is shown, words of the note)
+    "tilted": (Gf.Vec3f(0.48, -0.36, 0.8), (0.48, 0.8, 0.36), ""),
+    "of another length": (Gf.Vec3f(4.8, -3.6, 8), (0.48, 0.8, 0.36), ""),
+    "the surface's own": (Gf.Vec3f(0, 0, 1), (0, 1, 0), ""),
+    "of no length": (Gf.Vec3f(0, 0, 0), (0, 1, 0), "normal of length 0"),
+    "not finite": (Gf.Vec3f(math.nan, 0, 1), (0, 1, 0), "a vector of three numbers"),
+    "one number": (1.0, (0, 1, 0), "a vector of three numbers"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CONSTANT_NORMALS)
+def test_a_constant_normal_tilts_the_whole_surface(tmp_path, name):
+    value, expected, words = CONSTANT_NORMALS[name]
+    stage = new_stage(tmp_path)
+    surface(stage, normal=value)
+    bind(stage)
+    corners, _ = SHELLS["as it lies"]
+    UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/square")).GetPrimvar("st").Set(corners)
+    assert shown_normal(stage) == pytest.approx(expected, abs=1e-6)
+    notes = rendered(stage)[1].notes
+    assert (notes == []) if not words else (len(notes) == 1 and words in notes[0])
 
 
 @pytest.mark.parametrize("purpose", ["", "full", "preview"])
