@@ -402,7 +402,7 @@ def test_a_missing_tile_and_black_texels_leave_the_surface_its_own_normal(tmp_pa
     assert scene.notes == []
     pixels = found.textures["normal"].pixels
     assert pixels.shape == (4, 4, 3)
-    # The tile at the lower left with its black column, the missing ones, the one at the upper right.
+    # The tile at the lower left with its black column; missing ones; the one at the upper right.
     assert pixels[2:, 0] == pytest.approx(np.array([TILTED] * 2), abs=2e-5)
     assert not pixels[2:, 1:].any()
     assert not pixels[:2, :2].any()
