@@ -32,9 +32,11 @@ from fabricusd.reference.embree import (
 from fabricusd.reference.fabric_surface import FabricShader
 from fabricusd.reference.hits import add_emission, prepare
 from fabricusd.reference.lights import build_lights, share_out
+from fabricusd.reference.normal_map import shade_mapped
 from fabricusd.reference.preview_surface import (
     EMISSIVE,
     EMISSIVE_MAP,
+    NORMAL_MAP,
     OPACITY,
     OPACITY_MAP,
     build_surfaces,
@@ -120,6 +122,7 @@ class Tracer:
         self.surfaces = build_surfaces(scene)
         shining = self.surfaces.table[:, [EMISSIVE, EMISSIVE + 1, EMISSIVE + 2]].any(axis=1)
         self.shines = bool((shining | (self.surfaces.table[:, EMISSIVE_MAP] >= 0)).any())
+        self.mapped = self.surfaces.table[:, NORMAL_MAP] >= 0
         self.max_bounces = max_bounces
         self.level = LEVELS[level]
         self.estimator = ESTIMATORS[estimator]
@@ -225,7 +228,8 @@ class Tracer:
         """Fill the surface's rows of hits `start` to `end`."""
         shader = self.shaders[queue // QUEUES]
         if shader is None:
-            shade_preview(self.surfaces, wave.hits, wave.tags, start, end)
+            shade = shade_mapped if self.mapped[queue // QUEUES] else shade_preview
+            shade(self.surfaces, wave.hits, wave.tags, start, end)
         else:
             shader(queue // 2 % 3, queue % 2, wave, start, end)
 

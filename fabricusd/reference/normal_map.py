@@ -3,6 +3,9 @@
 A texel is a normal in tangent space: x along growing u of the *picture*, y along its growing v, z
 along the surface's normal. The tangent is the mesh's direction of growing u, the bitangent
 `handedness * cross(normal, tangent)`, both perpendicular to the normal [Mikkelsen2008].
+
+Light from below the surface itself counts for nothing, whatever the map says, and paths that would
+go there end: none leaks through, and none is reflected twice by one place.
 """
 
 from __future__ import annotations
@@ -13,31 +16,32 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.real import INLINE
+from fabricusd.appearance.real import INLINE, LEAN, whole
+from fabricusd.reference.preview_surface import NORMAL_MAP, Surfaces, shade_preview, texture_at
+from fabricusd.reference.wave import (
+    F_PDF,
+    GO,
+    GO_PDF,
+    MATERIAL,
+    PLACE,
+    SIDE,
+    WEIGHT,
+    WI,
+    WO,
+    F,
+    N,
+    U,
+    V,
+)
 
 R = np.float32
+
+Floats = NDArray[np.float32]
+Integers = NDArray[np.int32]
 
 LEAST_FACING = R(0.01)
 """Least cosine between a mapped normal and the direction to the viewer. What a map turns further
 away would be black from the front, and lit from behind."""
-
-
-def along_the_mesh(pixels: NDArray[np.float32], place: tuple[float, ...]) -> NDArray[np.float32]:
-    """(h, w, 3) normals along the picture's axes -> along the mesh's u and v.
-
-    place : `Texture.place`. Where it turns or mirrors the picture, the relief turns with it. A
-    place that squeezes the picture to a line leaves the normals as they are.
-    """
-    a, b, _, d, e, _ = place
-    mirrored = math.copysign(1.0, a * e - b * d)
-    # The direction of growing picture u in (u, v): the first column of the inverse.
-    along, up = e * mirrored, -d * mirrored
-    length = math.hypot(along, up)
-    if a * e - b * d == 0 or length == 0 or (up == 0 and along > 0 and mirrored > 0):
-        return pixels
-    along, up = along / length, up / length
-    x, y, z = np.moveaxis(pixels, -1, 0)
-    return np.stack([along * x - mirrored * up * y, up * x + mirrored * along * y, z], axis=-1)
 
 
 @njit(**INLINE)
@@ -68,3 +72,60 @@ def mapped_frame(x, y, z, side, ox, oy, oz):
     inverse = R(1) / math.sqrt(tx * tx + ty * ty + tz * tz)
     tx, ty, tz = tx * inverse, ty * inverse, tz * inverse
     return tx, ty, tz, y * tz - z * ty, z * tx - x * tz, x * ty - y * tx, x, y, z
+
+
+def shade_mapped(surfaces: Surfaces, hits: Floats, tags: Integers, first: int, last: int) -> None:
+    """`shade_preview` of a surface with a normal map, which also turns rows N, U, V, WO and WI."""
+    own = np.empty((3, last - first), np.float32)
+    turn_frames(surfaces, hits, tags, first, last, own)
+    shade_preview(surfaces, hits, tags, first, last)
+    end_below(hits, first, last, own)
+
+
+@njit(**INLINE)
+def _dot(hits, row, h, x, y, z):
+    return hits[row, h] * x + hits[row + 1, h] * y + hits[row + 2, h] * z
+
+
+@njit(**LEAN)
+def turn_frames(surfaces, hits, tags, first, last, own):
+    """Turn the frames of hits first..last, and the directions in them, as the normal map says.
+
+    own : (3, last - first) float32, filled with the surface's own normals in the turned frames
+    """
+    first, last = whole(first), whole(last)
+    index = int(surfaces.table[tags[MATERIAL, first], NORMAL_MAP])
+    for h in range(first, last):
+        a, b, c = texture_at(surfaces, index, hits[PLACE, h], hits[PLACE + 1, h])
+        tx, ty, tz, bx, by, bz, nx, ny, nz = mapped_frame(
+            a, b, c, hits[SIDE, h], hits[WO, h], hits[WO + 1, h], hits[WO + 2, h]
+        )
+        own[0, h - first], own[1, h - first], own[2, h - first] = tz, bz, nz
+        for row in (WO, WI):
+            along, across = _dot(hits, row, h, tx, ty, tz), _dot(hits, row, h, bx, by, bz)
+            hits[row + 2, h] = _dot(hits, row, h, nx, ny, nz)
+            hits[row, h], hits[row + 1, h] = along, across
+        for k in range(3):
+            u, v, n = hits[U + k, h], hits[V + k, h], hits[N + k, h]
+            hits[U + k, h] = tx * u + ty * v + tz * n
+            hits[V + k, h] = bx * u + by * v + bz * n
+            hits[N + k, h] = nx * u + ny * v + nz * n
+
+
+@njit(**LEAN)
+def end_below(hits, first, last, own):
+    """Drop the light from below the surface, and end the paths that go there.
+
+    own : (3, last - first) float32 - as `turn_frames` fills it
+    """
+    first, last = whole(first), whole(last)
+    for h in range(first, last):
+        x, y, z = own[0, h - first], own[1, h - first], own[2, h - first]
+        lit = R(1) if _dot(hits, WI, h, x, y, z) > R(0) else R(0)
+        out = R(1) if _dot(hits, GO, h, x, y, z) > R(0) else R(0)
+        for k in range(3):
+            hits[F + k, h] *= lit
+            hits[WEIGHT + k, h] *= out
+        hits[F_PDF, h] *= lit
+        pdf = hits[GO_PDF, h]
+        hits[GO_PDF, h] = pdf if pdf < R(0) else out * pdf

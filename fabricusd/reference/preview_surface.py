@@ -2,8 +2,7 @@
 
 [Walter2007] GGX, height-correlated masking, sampled by visible normals in the form of
 [Dupuy2023]. The diffuse part is scaled by the smaller of both directions' Fresnel transmittance,
-which keeps it reciprocal and passive. A normal map turns the frame in which all this happens; light
-that is below the surface itself counts for nothing, whatever the map says, so none leaks through.
+which keeps it reciprocal and passive. `normal_map` turns the frame in which all this happens.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.real import INLINE, KERNEL, PART, cos, sin
-from fabricusd.reference.normal_map import along_the_mesh, mapped_frame
 from fabricusd.reference.scene import PreviewSurface, Scene, Texture
 from fabricusd.reference.wave import (
     CHANCE,
@@ -26,15 +24,11 @@ from fabricusd.reference.wave import (
     KEEP,
     MATERIAL,
     PLACE,
-    SIDE,
     THREAD,
     WEIGHT,
     WI,
     WO,
     F,
-    N,
-    U,
-    V,
 )
 
 R = np.float32
@@ -101,6 +95,24 @@ def build_surfaces(scene: Scene) -> Surfaces:
 def _map_row(texture: Texture, start: int) -> list[int]:
     h, w, c = texture.pixels.shape
     return [start, h, w, c, _WRAPS.index(texture.wrap[0]), _WRAPS.index(texture.wrap[1])]
+
+
+def along_the_mesh(pixels: NDArray[np.float32], place: tuple[float, ...]) -> NDArray[np.float32]:
+    """(h, w, 3) normals along the picture's axes -> along the mesh's u and v.
+
+    place : `Texture.place`. Where it turns or mirrors the picture, the relief turns with it. A
+    place that squeezes the picture to a line leaves the normals as they are.
+    """
+    a, b, _, d, e, _ = place
+    mirrored = math.copysign(1.0, a * e - b * d)
+    # The direction of growing picture u in (u, v): the first column of the inverse.
+    along, up = e * mirrored, -d * mirrored
+    length = math.hypot(along, up)
+    if a * e - b * d == 0 or length == 0 or (up == 0 and along > 0 and mirrored > 0):
+        return pixels
+    along, up = along / length, up / length
+    x, y, z = np.moveaxis(pixels, -1, 0)
+    return np.stack([along * x - mirrored * up * y, up * x + mirrored * along * y, z], axis=-1)
 
 
 @njit(**INLINE)
@@ -228,22 +240,20 @@ BLOCK = 128
 _STEP = BLOCK + 16
 """Between rows of a block: a power of two would put all of them into the same few cache lines."""
 
-# Rows of a block: what `Wave.hits` brings, the surface's properties there, what is made; of a
-# surface with a normal map its own normal, in the frame that the map turned.
+# Rows of a block: what `Wave.hits` brings, the surface's properties there, what is made.
 (_O, _I, _CHANCE, _RED, _GREEN, _BLUE, _METALLIC, _ALPHA, _OPACITY, _F, _F_PDF, _GO, _WEIGHT,
- _GO_PDF, _OWN) = (
-    row * _STEP for row in (0, 3, 6, 10, 11, 12, 13, 14, 15, 16, 19, 20, 23, 26, 27)
+ _GO_PDF) = (
+    row * _STEP for row in (0, 3, 6, 10, 11, 12, 13, 14, 15, 16, 19, 20, 23, 26)
 )  # fmt: skip
-_ROWS = 30
+_ROWS = 27
 
 
 @njit(**KERNEL)
 def shade_preview(surfaces, hits, tags, first, last):
     """Evaluate and sample the surface of hits first..last, all of one material: rows F, F_PDF, GO,
-    WEIGHT, GO_PDF, KEEP, THREAD. A normal map also turns rows N, U, V, WO and WI."""
+    WEIGHT, GO_PDF, KEEP, THREAD."""
     block = np.empty(_ROWS * _STEP, np.float32)
     row = surfaces.table[tags[MATERIAL, first]]
-    normal_map = int(row[NORMAL_MAP])
     f0 = (row[IOR] - R(1)) / (row[IOR] + R(1))
     f0 = f0 * f0
     for start in range(first, last, BLOCK):
@@ -254,11 +264,7 @@ def shade_preview(surfaces, hits, tags, first, last):
                 for x in range(size):
                     block[place + k * _STEP + x] = source[x]
         _look_up(surfaces, tags[MATERIAL, first], hits, start, size, block)
-        if normal_map >= 0:
-            _turn(surfaces, normal_map, hits, start, size, block)
         _shade(f0, size, block)
-        if normal_map >= 0:
-            _let_nothing_through(size, block)
         for row, count, place in (
             (F, 3, _F), (GO, 3, _GO), (WEIGHT, 3, _WEIGHT), (F_PDF, 1, _F_PDF),
             (GO_PDF, 1, _GO_PDF), (KEEP, 1, _OPACITY), (CHANCE + 3, 1, _CHANCE + 3 * _STEP),
@@ -296,50 +302,6 @@ def _look_up(surfaces, material, hits, start, size, block):
             rough, _, _ = texture_at(surfaces, int(row[ROUGHNESS_MAP]), u, v)
             block[_ALPHA + x] = max(rough * rough, R(4e-4))
         block[_OPACITY + x] = opacity_at(surfaces, material, u, v)
-
-
-@njit(**INLINE)
-def _dot(block, at, x, y, z):
-    return block[at] * x + block[at + _STEP] * y + block[at + 2 * _STEP] * z
-
-
-@njit(**PART)
-def _turn(surfaces, index, hits, start, size, block):
-    """Turn the frames of a block's hits, and the directions in them, as the normal map says."""
-    for x in range(size):
-        h = start + x
-        a, b, c = texture_at(surfaces, index, hits[PLACE, h], hits[PLACE + 1, h])
-        tx, ty, tz, bx, by, bz, nx, ny, nz = mapped_frame(
-            a, b, c, hits[SIDE, h],
-            block[_O + x], block[_O + _STEP + x], block[_O + 2 * _STEP + x],
-        )  # fmt: skip
-        block[_OWN + x], block[_OWN + _STEP + x], block[_OWN + 2 * _STEP + x] = tz, bz, nz
-        for place, row in ((_O, WO), (_I, WI)):
-            along, across = _dot(block, place + x, tx, ty, tz), _dot(block, place + x, bx, by, bz)
-            up = _dot(block, place + x, nx, ny, nz)
-            block[place + x], hits[row, h] = along, along
-            block[place + _STEP + x], hits[row + 1, h] = across, across
-            block[place + 2 * _STEP + x], hits[row + 2, h] = up, up
-        for k in range(3):
-            u, v, n = hits[U + k, h], hits[V + k, h], hits[N + k, h]
-            hits[U + k, h] = tx * u + ty * v + tz * n
-            hits[V + k, h] = bx * u + by * v + bz * n
-            hits[N + k, h] = nx * u + ny * v + nz * n
-
-
-@njit(**PART)
-def _let_nothing_through(size, block):
-    """Drop the light from below the surface, and end the paths that a map sends there."""
-    for x in range(size):
-        a, b, c = block[_OWN + x], block[_OWN + _STEP + x], block[_OWN + 2 * _STEP + x]
-        lit = R(1) if _dot(block, _I + x, a, b, c) > R(0) else R(0)
-        out = R(1) if _dot(block, _GO + x, a, b, c) > R(0) else R(0)
-        for k in range(3):
-            block[_F + k * _STEP + x] *= lit
-            block[_WEIGHT + k * _STEP + x] *= out
-        block[_F_PDF + x] *= lit
-        pdf = block[_GO_PDF + x]
-        block[_GO_PDF + x] = pdf if pdf < R(0) else out * pdf
 
 
 @njit(**PART)
