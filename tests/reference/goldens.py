@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,29 +18,68 @@ import numpy as np
 from fabricusd.images import write_exr
 from fabricusd.reference.film import AOVS
 from fabricusd.reference.render import RenderResult
-from fabricusd.reference.scene import DOME, RECT, Camera, Light, PreviewSurface
+from fabricusd.reference.scene import DOME, RECT, Camera, Light, Mesh, PreviewSurface
 from fabricusd.schema import load
-from tests.reference.scenes import cloth, grid, lambert, looking, picture
+from tests.reference.scenes import cloth, grid, lambert, looking, picture, sphere
 
 FOLDER = Path(__file__).parent / "golden"
 SIZE = 24
 SAMPLES = 4096
 
 CASES: dict[str, dict[str, Any]] = {
-    # name: fabric and level; all on the same folds over a floor, under a picture and a lamp
+    # name: fabric, threads to a unit of UV, level, shadowing; the cloth, over a floor, under a
+    # picture and a lamp
     "satin_far": {"preset": "polyester_satin_charmeuse", "level": "far"},
     "silk_thread": {"preset": "silk_shot", "level": "thread", "threads": 12.0},
     "linen_auto": {"preset": "linen_plain", "level": "auto", "threads": 40.0},
     "velvet_weave": {"preset": "velvet", "level": "weave", "threads": 12.0},
-}
+    "satin_horizon": {"preset": "polyester_satin_charmeuse", "shadow": "horizon", "threads": 24.0},
+    "silk_ball": {"preset": "silk_shot", "shadow": "horizon", "threads": 12.0, "cloth": "ball"},
+    "linen_skirt": {"preset": "linen_plain", "shadow": "horizon", "threads": 24.0,
+                    "cloth": "skirt"},
+}  # fmt: skip
+
+
+def _folds() -> Mesh:
+    return grid(lambda x, z: 0.12 * np.sin(9 * x) * np.cos(5 * z), cells=40)
+
+
+def _ball() -> Mesh:
+    """A closed, symmetric mesh whose normals are left to the tracer; coarse, so that they show."""
+    return replace(sphere(cells=10, radius=0.35), normals=None)
+
+
+def _skirt() -> Mesh:
+    """A flared tube with a seam, whose normals are left to the tracer."""
+    around, up = np.meshgrid(np.linspace(0, 1, 25), np.linspace(0, 1, 7))
+    phi, radius = 2 * np.pi * around, 0.42 - 0.24 * up
+    radius = radius * (1 + 0.08 * (1 - up) * np.cos(6 * phi))
+    points = np.stack([radius * np.sin(phi), 0.6 * up - 0.3, radius * np.cos(phi)], axis=-1)
+    i = np.arange(points[..., 0].size).reshape(up.shape)
+    a, b, c, d = (k.ravel() for k in (i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]))
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    uv = np.stack([1.9 * around, 0.65 * up], axis=-1).reshape(-1, 2)[triangles]
+    return Mesh(
+        path="skirt", points=points.reshape(-1, 3), triangles=triangles, uv=uv,
+        material=np.zeros(len(triangles), int),
+    )  # fmt: skip
+
+
+CLOTHS: dict[str, Callable[[], Mesh]] = {"folds": _folds, "ball": _ball, "skirt": _skirt}
 
 
 def render_case(
-    name: str, *, spp: int, seed: int, brightness: float = 1.0, sampler: str = "sobol"
+    name: str,
+    *,
+    spp: int,
+    seed: int,
+    brightness: float = 1.0,
+    smooth: bool = True,
+    sampler: str = "sobol",
 ) -> RenderResult:
-    """One golden picture's scene; `brightness` scales its lamp."""
+    """One golden picture's scene; `brightness` scales its lamp, not `smooth` shows its facets."""
     case = CASES[name]
-    folds = grid(lambda x, z: 0.12 * np.sin(9 * x) * np.cos(5 * z), cells=40)
+    mesh = replace(CLOTHS[case.get("cloth", "folds")](), smooth=smooth)
     floor = replace(grid(size=3.0, material=1), path="floor")
     floor = replace(floor, points=floor.points - [0.0, 0.3, 0.0])
     plate = replace(grid(size=0.5, material=2), path="plate")
@@ -56,8 +96,9 @@ def render_case(
     material = cloth(load(case["preset"]), case.get("threads", 40.0))
     camera = Camera(frame=looking((0.7, 1.4, 1.0)), aperture=(0.03, 0.03))
     return picture(
-        [folds, floor, plate], [material, lambert(0.6), gloss], lights, camera, size=SIZE, spp=spp,
-        level=case["level"], shadow="none", seed=seed, sampler=sampler, pixel_filter="spline",
+        [mesh, floor, plate], [material, lambert(0.6), gloss], lights, camera, size=SIZE, spp=spp,
+        level=case.get("level", "auto"), shadow=case.get("shadow", "none"), seed=seed,
+        sampler=sampler, pixel_filter="spline",
     )  # fmt: skip
 
 

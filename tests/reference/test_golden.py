@@ -33,3 +33,8 @@ def test_a_picture_is_its_golden_but_for_chance(name):
 
 def test_golden_pictures_would_see_a_lamp_five_per_cent_brighter():
     assert not against_golden("satin_far", brightness=1.05)[0]
+
+
+@pytest.mark.parametrize("name", ["silk_ball", "linen_skirt"])
+def test_golden_pictures_would_see_facets_where_normals_are_smooth(name):
+    assert not against_golden(name, smooth=False)[0]
