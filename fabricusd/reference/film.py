@@ -46,7 +46,8 @@ AOVS: dict[str, tuple[str, ...]] = {
 """Layers and their channels. `albedo` is the surface's directional albedo towards the camera,
 estimated; `shadow` the share of direct light that arrives; `depth`, `uv` and `thread` (-1 for none)
 are those of a pixel's first sample that meets a surface, `level` (0 far, 1 weave, 2 thread),
-`normal` and `tangent` means; `variance` is that of the pixel's mean, see `Film.variance`."""
+`normal` and `tangent` means, of the frame that a normal map turned; `variance` is that of the
+pixel's mean, see `Film.variance`."""
 
 _ALWAYS = ("beauty", "direct", "indirect", "variance", "samples")
 _FIRST = (DEPTH_Z, UV, UV + 1, THREAD_ID)
