@@ -25,6 +25,7 @@ from fabricusd.preview.paths import asset_path
 from fabricusd.preview.wearers import Dressed, NewUV, Wearer
 from fabricusd.preview.write_usd import write_material
 from fabricusd.schema import export, write_binding, write_fabric
+from fabricusd.schema.access import BINDING_API
 from fabricusd.schema.names import prim_name
 from fabricusd.schema.source import usd_errors
 
@@ -163,7 +164,7 @@ def _fill(
         if not wearer.worn and lay.fabric is not None:
             write_binding(prim, scope.AppendChild(prim_name(lay.fabric.name)), binding_of(lay))
     elif wearer.worn:
-        prim.RemoveAPI("FabricBindingAPI")
+        prim.RemoveAppliedSchema(BINDING_API)
         prim.CreateRelationship("fabric:binding", custom=False).SetTargets([])
     if variant != "off":
         recipe = recipes[wearer.maps.name, wearer.lay, variant]

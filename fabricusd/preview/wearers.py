@@ -16,6 +16,7 @@ from fabricusd.preview.bake_folder import MapSet
 from fabricusd.reference.read import read_scene
 from fabricusd.reference.scene import Scene
 from fabricusd.schema import open_stage
+from fabricusd.schema.access import applies_binding, targets, value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,9 +119,9 @@ def _of(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
     found = []
     for one in (prim, *UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(prim))):
         one = one.GetPrim() if not isinstance(one, Usd.Prim) else one
-        if "FabricBindingAPI" in one.GetAppliedSchemas():
-            targets = one.GetRelationship("fabric:binding").GetForwardedTargets()
-            name = targets[0].name if targets else ""
+        if applies_binding(one):
+            found_at = targets(one, "fabric:binding")
+            name = found_at[0].name if found_at else ""
             lay = next((k for k, lay in enumerate(maps.lays) if lay.name == name), 0)
             found.append(Wearer(path=str(one.GetPath()), maps=maps, lay=lay, worn=True))
     return found or [Wearer(path=str(prim.GetPath()), maps=maps, lay=0, worn=False)]
@@ -142,8 +143,7 @@ def _instance(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
 
 def _uv_name(prim: Usd.Prim) -> str:
     """The UV set that the fabric lies in."""
-    attribute = prim.GetAttribute("fabric:binding:uvSet")
-    return str(attribute.Get() or "st") if attribute else "st"
+    return str(value(prim, "fabric:binding:uvSet") or "st")
 
 
 def _moved(prim: Usd.Prim, name: str, maps: MapSet, now: Garment) -> NewUV:

@@ -13,6 +13,7 @@ from fabricusd.fabric import Binding
 from fabricusd.reference.scene import FabricSurface, PreviewSurface, Scene
 from fabricusd.reference.usd_preview import PreviewNetwork
 from fabricusd.schema import read_binding
+from fabricusd.schema.access import applies_binding, targets
 
 _PURPOSES = (UsdShade.Tokens.full, UsdShade.Tokens.preview)
 """Material purposes in the order in which they are looked for; each falls back on bindings without
@@ -58,14 +59,14 @@ class Materials:
 
     def _bound_fabric(self, prim: Usd.Prim) -> Resolved | None:
         where = str(prim.GetPath())
-        if "FabricBindingAPI" not in prim.GetAppliedSchemas():
-            if prim.GetRelationship("fabric:binding").GetTargets():
+        if not applies_binding(prim):
+            if targets(prim, "fabric:binding"):
                 self.scene.note(
                     where, "has fabric:binding but not FabricBindingAPI applied, left out"
                 )
             return None
         try:
-            return self._fabric(read_binding(prim))
+            return self._fabric(read_binding(prim, lambda line: self.scene.note(where, line)))
         except (FabricError, IndexError) as error:
             words = str(error) if isinstance(error, FabricError) else "names no fabric"
             line = words if words.startswith(where) else f"{where} {words}"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 
-import fabricusd.schema  # registers the schema, before the first stage is opened
+import fabricusd.schema  # registers the schema
 from fabricusd.errors import FabricError, one_line
 from fabricusd.fabric import Binding
 from fabricusd.reference.fineness import Fineness
@@ -24,6 +24,7 @@ from fabricusd.reference.usd_camera import read_camera
 from fabricusd.reference.usd_light import is_light, read_light
 from fabricusd.reference.usd_material import Materials
 from fabricusd.reference.usd_mesh import read_mesh
+from fabricusd.schema.access import applies_binding
 from fabricusd.schema.source import compose_stage, usd_errors
 
 _PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
@@ -144,7 +145,7 @@ class _Reader:
                     self.scene.lights.append(light)
             elif prim.IsA(UsdGeom.Gprim) or prim.GetTypeName() == "Volume":
                 self.scene.note(where, f"is a {prim.GetTypeName()}, left out; only meshes are seen")
-            elif "FabricBindingAPI" in prim.GetAppliedSchemas():
+            elif applies_binding(prim):
                 self.scene.note(where, "binds a fabric, left out: only meshes and subsets wear one")
 
     def _mesh(self, prim: Usd.Prim, matrix: NDArray[np.float64]) -> None:

@@ -1,6 +1,7 @@
 """Fabrics as USD prims: the schema, reading, writing, checking, presets, weave importers.
 
-Importing this registers the schema with USD. Do it before the first stage is opened.
+Importing this registers the schema with USD. Where a stage was used before, fabricusd works all the
+same; for USD itself fallbacks are then missing, unless PXR_PLUGINPATH_NAME names `PLUGIN_PATH`.
 """
 
 from __future__ import annotations

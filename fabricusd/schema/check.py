@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass
 from pxr import Usd
 
 from fabricusd.schema.anysource import is_draft, load_any
-from fabricusd.schema.rules import RULES, applies, run
-from fabricusd.schema.source import find_prim, open_stage, split_source, usd_errors
+from fabricusd.schema.rules import PRESENT, RULES, applies, run
+from fabricusd.schema.source import find_prim, no_warnings, open_stage, split_source, usd_errors
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,11 @@ class Finding:
         return asdict(self)
 
 
-def check_prim(prim: Usd.Prim, file: str = "", severity: str = "") -> Iterator[Finding]:
-    """The findings on one prim; of one severity if it is given."""
+def check_prim(prim: Usd.Prim, file: str = "", *, fatal: bool = False) -> Iterator[Finding]:
+    """The findings on one prim; where `fatal`, those alone that keep it from being read."""
     for checked in RULES:
-        if severity in ("", checked.severity) and applies(checked, prim):
+        wanted = not fatal or (checked.fatal and checked.severity == "error")
+        if wanted and applies(checked, prim):
             for name, problem in run(checked, prim):
                 yield Finding(
                     checked.name, checked.severity, file, str(prim.GetPath()), name, problem
@@ -62,7 +63,9 @@ def check(source: str | os.PathLike[str]) -> list[Finding]:
     stage, file = open_stage(source)
     findings: list[Finding] = []
     top = find_prim(stage, file, split_source(source)[1] or "/")
-    with usd_errors(file, "checked"):
-        for prim in Usd.PrimRange(top, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
-            findings.extend(check_prim(prim, file))
+    with usd_errors(file, "checked"), no_warnings():
+        for prim in Usd.PrimRange(top, Usd.TraverseInstanceProxies(PRESENT)):
+            # A prim that is only overridden here is defined in a layer that is not.
+            if prim.IsDefined() or prim.HasDefiningSpecifier():
+                findings.extend(check_prim(prim, file))
     return findings

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pxr import Tf, Usd
 
 from fabricusd.errors import one_line
+from fabricusd.schema.access import applies_binding
 
 Fault = tuple[str, str]
 RuleFunction = Callable[[Usd.Prim], Iterable[Fault]]
@@ -17,37 +18,49 @@ FABRIC, THREAD, BINDING = "FabricusdFabric", "FabricusdFabricThread", "Fabricusd
 
 @dataclass(frozen=True)
 class Rule:
-    """One rule: its name, its severity, the schema types of the prims it looks at; () for all."""
+    """One rule.
+
+    severity : "error" or "warning"
+    schema_types : of the prims it looks at; () for all
+    fatal : whether a prim with an error of this rule cannot be read
+    undefined : whether it looks only at prims that USD does not take for defined
+    """
 
     name: str
     severity: str
     schema_types: tuple[str, ...]
     doc: str
     function: RuleFunction
+    fatal: bool
+    undefined: bool
 
 
 RULES: list[Rule] = []
 
 
-def rule(*schema_types: str, severity: str = "error") -> Callable[[RuleFunction], RuleFunction]:
+def rule(
+    *schema_types: str, severity: str = "error", fatal: bool = True, undefined: bool = False
+) -> Callable[[RuleFunction], RuleFunction]:
     """Register a function as the rule whose name is the function's in CamelCase."""
 
     def register(function: RuleFunction) -> RuleFunction:
         name = "".join(word.capitalize() for word in function.__name__.split("_"))
         doc = " ".join((function.__doc__ or "").split())
-        RULES.append(Rule(name, severity, schema_types, doc, function))
+        RULES.append(Rule(name, severity, schema_types, doc, function, fatal, undefined))
         return function
 
     return register
 
 
 def applies(checked: Rule, prim: Usd.Prim) -> bool:
-    """Whether `prim` is of a type that the rule looks at."""
+    """Whether `prim` is one that the rule looks at."""
+    if checked.undefined and prim.IsDefined():
+        return False
     type_name = f"Fabricusd{prim.GetTypeName()}"
     if not checked.schema_types or type_name in checked.schema_types:
         return True
     return BINDING in checked.schema_types and (
-        prim.HasAPI("FabricBindingAPI") or prim.HasRelationship("fabric:binding")
+        applies_binding(prim) or prim.HasRelationship("fabric:binding")
     )
 
 

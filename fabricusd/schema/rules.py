@@ -17,6 +17,16 @@ from pxr import Sdf, Usd, UsdGeom
 from fabricusd.errors import FabricError
 from fabricusd.fabric import describe_limits, within_limits
 from fabricusd.schema import attributes, weave_rows
+from fabricusd.schema.access import (
+    allowed_tokens,
+    applies_binding,
+    definitions,
+    lost_targets,
+    next_targets,
+    over_above,
+    targets,
+    value,
+)
 from fabricusd.schema.attributes import Attribute
 from fabricusd.schema.rule_table import (
     BINDING,
@@ -32,23 +42,18 @@ from fabricusd.schema.rule_table import (
 
 __all__ = ["RULES", "Rule", "applies", "run", "thread_prims"]
 
+PRESENT = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
+"""Prims whose opinions count, defined or not."""
+
 # ---- any of the three ---------------------------------------------------------------------------
-
-
-def _definitions(prim: Usd.Prim) -> Iterator[Usd.PrimDefinition]:
-    registry = Usd.SchemaRegistry()
-    if prim.GetTypeName() in ("Fabric", "FabricThread"):
-        yield registry.FindConcretePrimDefinition(str(prim.GetTypeName()))
-    if prim.HasAPI("FabricBindingAPI") or prim.HasRelationship("fabric:binding"):
-        yield registry.FindAppliedAPIPrimDefinition("FabricBindingAPI")
 
 
 @rule(FABRIC, THREAD, BINDING)
 def property_type_matches(prim: Usd.Prim) -> Iterator[Fault]:
     """Every property has the type that the schema gives it, in every layer."""
-    for definition in _definitions(prim):
-        for name in definition.GetPropertyNames():
-            wants_attribute = definition.GetSpecType(name) == Sdf.SpecTypeAttribute
+    for definition in definitions(prim):
+        for name, wanted in definition.items():
+            wants_attribute = isinstance(wanted, Sdf.AttributeSpec)
             for spec in prim.GetProperty(name).GetPropertyStack():
                 where = f"in {spec.layer.GetDisplayName()}"
                 if isinstance(spec, Sdf.AttributeSpec) != wants_attribute:
@@ -56,19 +61,17 @@ def property_type_matches(prim: Usd.Prim) -> Iterator[Fault]:
                     if not wants_attribute:
                         wrong, right = right, wrong
                     yield name, f"is {wrong}, {where}; it must be {right}"
-                elif wants_attribute:
-                    wanted = definition.GetAttributeDefinition(name).GetTypeName()
-                    if spec.typeName != wanted:
-                        yield name, f"is of type {spec.typeName}, {where}; it must be {wanted}"
+                elif wants_attribute and spec.typeName != wanted.typeName:
+                    yield name, f"is of type {spec.typeName}, {where}; it must be {wanted.typeName}"
 
 
 @rule(FABRIC, THREAD, BINDING)
 def value_at_rest(prim: Usd.Prim) -> Iterator[Fault]:
     """Every attribute has a value of its own at the default time, which is what is read."""
-    for definition in _definitions(prim):
-        for name in definition.GetPropertyNames():
+    for definition in definitions(prim):
+        for name, wanted in definition.items():
             attribute = prim.GetAttribute(name)
-            if not attribute or definition.GetSpecType(name) != Sdf.SpecTypeAttribute:
+            if not attribute or not isinstance(wanted, Sdf.AttributeSpec):
                 continue
             at_rest = attribute.GetResolveInfo(Usd.TimeCode.Default())
             if attribute.HasAuthoredConnections():
@@ -82,10 +85,36 @@ def value_at_rest(prim: Usd.Prim) -> Iterator[Fault]:
 @rule(FABRIC, THREAD, BINDING, severity="warning")
 def property_known(prim: Usd.Prim) -> Iterator[Fault]:
     """Every property in the fabric: and thread: namespaces is in the schema."""
-    known = {name for definition in _definitions(prim) for name in definition.GetPropertyNames()}
+    known = {name for definition in definitions(prim) for name in definition}
     for name in prim.GetAuthoredPropertyNames():
         if name.startswith(("fabric:", "thread:")) and name not in known:
             yield name, f"is not in the schema of {prim.GetTypeName()}; it is not read"
+
+
+@rule(FABRIC, BINDING)
+def targets_kept(prim: Usd.Prim) -> Iterator[Fault]:
+    """Every target of a relationship lies inside what a reference brings along."""
+    for definition in definitions(prim):
+        for name, wanted in definition.items():
+            if isinstance(wanted, Sdf.RelationshipSpec):
+                for path, layer in lost_targets(prim, name):
+                    yield (
+                        name,
+                        f"loses its target {path} of {layer}, which is outside of what is "
+                        "referenced; it must be below the referenced prim, or be named anew here",
+                    )
+
+
+@rule(FABRIC, THREAD, BINDING, severity="warning", undefined=True)
+def below_defs_alone(prim: Usd.Prim) -> Iterator[Fault]:
+    """A fabric, a thread of a library and what wears a fabric lie below no `over`."""
+    above = prim.GetParent()
+    while above and above.GetTypeName() != "Fabric":
+        above = above.GetParent()
+    over = over_above(prim)
+    # The threads and the back of a fabric are told with it.
+    if over and not above and prim.HasDefiningSpecifier():
+        yield "", f"is not defined, as {over.GetPath()} is an over; it must lie below defs alone"
 
 
 def _numbers(prim: Usd.Prim) -> tuple[Attribute, ...]:
@@ -101,10 +130,10 @@ def _numbers(prim: Usd.Prim) -> tuple[Attribute, ...]:
 def number_in_range(prim: Usd.Prim) -> Iterator[Fault]:
     """Every number is finite and inside its range."""
     for entry in _numbers(prim):
-        value = prim.GetAttribute(entry.name).Get()
-        if value is None or (entry.sentinel is not None and value == entry.sentinel):
+        held = value(prim, entry.name)
+        if entry.sentinel is not None and held == entry.sentinel:
             continue
-        for number in tuple(value) if hasattr(value, "__len__") else (value,):
+        for number in tuple(held) if hasattr(held, "__len__") else (held,):
             # Compared in SI, where the bounds are; told in the file's unit.
             if not within_limits(number * entry.scale, entry.limits):
                 accepted = describe_limits(entry.limits, 1.0 / entry.scale, entry.unit)
@@ -118,11 +147,10 @@ def number_in_range(prim: Usd.Prim) -> Iterator[Fault]:
 def model_allowed(prim: Usd.Prim) -> Iterator[Fault]:
     """The scattering model is an allowed token."""
     name = "fabric:model" if prim.GetTypeName() == "Fabric" else "thread:model"
-    attribute = prim.GetAttribute(name)
     # USD stores any token; the allowed ones are advice to user interfaces.
-    allowed = attribute.GetMetadata("allowedTokens") or ()
-    if attribute.Get() not in allowed:
-        yield name, f"is '{attribute.Get()}'; it must be one of {', '.join(allowed)}"
+    allowed, token = allowed_tokens(prim, name), value(prim, name)
+    if token not in allowed:
+        yield name, f"is '{token}'; it must be one of {', '.join(allowed)}"
 
 
 # ---- Fabric -------------------------------------------------------------------------------------
@@ -132,11 +160,10 @@ def thread_prims(prim: Usd.Prim) -> list[Usd.Prim]:
     """The fabric's thread prims in index order; an invalid prim where a target is missing."""
     relationship = prim.GetRelationship("fabric:threads")
     if relationship and relationship.HasAuthoredTargets():
-        targets = relationship.GetForwardedTargets()
-        return [prim.GetStage().GetPrimAtPath(path) for path in targets]
-    # An instance shows its children to those who ask for them alone.
-    children = prim.GetFilteredChildren(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
-    return [child for child in children if child.GetTypeName() == "FabricThread"]
+        return [prim.GetStage().GetPrimAtPath(path) for path in targets(prim, "fabric:threads")]
+    # An instance shows its children to those who ask for them alone; below an over none is defined.
+    children = prim.GetFilteredChildren(Usd.TraverseInstanceProxies(PRESENT))
+    return [c for c in children if c.HasDefiningSpecifier() and c.GetTypeName() == "FabricThread"]
 
 
 def _forwarding_cycle(relationship: Usd.Relationship) -> list[str]:
@@ -149,7 +176,7 @@ def _forwarding_cycle(relationship: Usd.Relationship) -> list[str]:
         forwarded = stage.GetRelationshipAtPath(path) if path.IsPropertyPath() else None
         if not forwarded:
             return []
-        for target in forwarded.GetTargets():
+        for target in next_targets(forwarded):
             found = follow(target, [*chain, path])
             if found:
                 return found
@@ -168,25 +195,22 @@ def relationship_acyclic(prim: Usd.Prim) -> Iterator[Fault]:
         cycle = _forwarding_cycle(relationship)
         if cycle:
             yield name, f"leads in a circle, {' -> '.join(cycle)}; it must end at a prim"
-        elif prim.GetPath() in relationship.GetForwardedTargets():
+        elif prim.GetPath() in targets(prim, name):
             yield name, f"targets {prim.GetPath()}, its own prim; it must target another"
 
 
 @rule(FABRIC)
 def threads_exist(prim: Usd.Prim) -> Iterator[Fault]:
     """A fabric has at least one thread, and every target of its thread list is a FabricThread."""
-    relationship = prim.GetRelationship("fabric:threads")
-    targets = relationship.GetForwardedTargets() if relationship else []
     if not thread_prims(prim):
         yield "fabric:threads", "names no thread; it must name at least one FabricThread prim"
-    if relationship and relationship.HasAuthoredTargets():
-        for path in targets:
-            target = prim.GetStage().GetPrimAtPath(path)
-            if not target:
-                yield "fabric:threads", f"targets {path}, which is no prim; it must be one"
-            elif target.GetTypeName() != "FabricThread" and target != prim:
-                kind = target.GetTypeName() or "an untyped prim"
-                yield "fabric:threads", f"targets {path}, {kind}; it must be a FabricThread"
+    for path in targets(prim, "fabric:threads"):
+        target = prim.GetStage().GetPrimAtPath(path)
+        if not target:
+            yield "fabric:threads", f"targets {path}, which is no prim; it must be one"
+        elif target.GetTypeName() != "FabricThread" and target != prim:
+            kind = target.GetTypeName() or "an untyped prim"
+            yield "fabric:threads", f"targets {path}, {kind}; it must be a FabricThread"
 
 
 @rule(FABRIC)
@@ -195,7 +219,7 @@ def thread_indices_in_range(prim: Usd.Prim) -> Iterator[Fault]:
     count = len(thread_prims(prim))
     for which in ("warp", "weft"):
         name = f"fabric:{which}:threads"
-        sequence = np.asarray(prim.GetAttribute(name).Get() or (), dtype=np.int64)
+        sequence = np.asarray(value(prim, name) or (), dtype=np.int64)
         if sequence.size == 0:
             yield name, "is empty; it must name at least one thread"
             continue
@@ -211,7 +235,7 @@ def thread_indices_in_range(prim: Usd.Prim) -> Iterator[Fault]:
 @rule(FABRIC)
 def coverage_at_most_one(prim: Usd.Prim) -> Iterator[Fault]:
     """Authored coverages of warp and weft add up to at most 1."""
-    values = [prim.GetAttribute(f"fabric:{w}:coverage").Get() for w in ("warp", "weft")]
+    values = [value(prim, f"fabric:{w}:coverage") for w in ("warp", "weft")]
     total = sum(v for v in values if v is not None and math.isfinite(v) and v > 0)
     if total > 1.0 + 1e-9:
         yield "fabric:weft:coverage", f"and the warp's add up to {total:g}; it must be at most 1"
@@ -220,7 +244,7 @@ def coverage_at_most_one(prim: Usd.Prim) -> Iterator[Fault]:
 @rule(FABRIC)
 def weave_is_a_grid(prim: Usd.Prim) -> Iterator[Fault]:
     """The weave has at least one row, rows of one length, and no character but 0 and 1."""
-    problem = weave_rows.fault(prim.GetAttribute("fabric:weave:rows").Get() or ())
+    problem = weave_rows.fault(value(prim, "fabric:weave:rows") or ())
     if problem:
         yield "fabric:weave:rows", problem
 
@@ -228,11 +252,10 @@ def weave_is_a_grid(prim: Usd.Prim) -> Iterator[Fault]:
 @rule(FABRIC)
 def back_is_a_fabric(prim: Usd.Prim) -> Iterator[Fault]:
     """The back, where there is one, is one Fabric prim."""
-    relationship = prim.GetRelationship("fabric:back")
-    targets = relationship.GetForwardedTargets() if relationship else []
-    if len(targets) > 1:
-        yield "fabric:back", f"has {len(targets)} targets; it must have at most 1"
-    for path in targets[:1]:
+    found = targets(prim, "fabric:back")
+    if len(found) > 1:
+        yield "fabric:back", f"has {len(found)} targets; it must have at most 1"
+    for path in found[:1]:
         target = prim.GetStage().GetPrimAtPath(path)
         if not target:
             yield "fabric:back", f"targets {path}, which is no prim; it must be a Fabric"
@@ -246,7 +269,7 @@ def threads_used(prim: Usd.Prim) -> Iterator[Fault]:
     """Every thread of a fabric is in its warp or its weft."""
     used: set[int] = set()
     for which in ("warp", "weft"):
-        used.update(prim.GetAttribute(f"fabric:{which}:threads").Get() or ())
+        used.update(value(prim, f"fabric:{which}:threads") or ())
     for index, thread in enumerate(thread_prims(prim)):
         if thread and index not in used:
             yield "fabric:threads", f"[{index}], {thread.GetName()}, is in neither warp nor weft"
@@ -281,8 +304,8 @@ def albedo_is_safe(prim: Usd.Prim) -> Iterator[Fault]:
 @rule(THREAD)
 def curve_points_match(prim: Usd.Prim) -> Iterator[Fault]:
     """A curve has as many positions as angles, and at least two."""
-    positions = prim.GetAttribute("thread:curve:positions").Get() or ()
-    angles = prim.GetAttribute("thread:curve:angles").Get() or ()
+    positions = value(prim, "thread:curve:positions") or ()
+    angles = value(prim, "thread:curve:angles") or ()
     if len(positions) != len(angles):
         yield (
             "thread:curve:angles",
@@ -297,7 +320,7 @@ def curve_points_match(prim: Usd.Prim) -> Iterator[Fault]:
 def curve_positions_rise(prim: Usd.Prim) -> Iterator[Fault]:
     """A curve's positions are finite, never decrease, and span a length above 0."""
     name = "thread:curve:positions"
-    positions = list(prim.GetAttribute(name).Get() or [])
+    positions = list(value(prim, name) or [])
     for k, x in enumerate(positions):
         if not math.isfinite(x):
             yield name, f"[{k}] is {x:g}; it must be finite"
@@ -313,7 +336,7 @@ def curve_positions_rise(prim: Usd.Prim) -> Iterator[Fault]:
 def curve_angles_in_range(prim: Usd.Prim) -> Iterator[Fault]:
     """A curve's angles are from -90 to 90 degrees."""
     name = "thread:curve:angles"
-    for k, x in enumerate(prim.GetAttribute(name).Get() or ()):
+    for k, x in enumerate(value(prim, name) or ()):
         if not (math.isfinite(x) and -90.0 <= x <= 90.0):
             yield name, f"[{k}] is {x:g}; it must be from -90 to 90 degrees"
             return
@@ -326,16 +349,30 @@ def curve_angles_in_range(prim: Usd.Prim) -> Iterator[Fault]:
 def binding_names_a_fabric(prim: Usd.Prim) -> Iterator[Fault]:
     """A binding targets exactly one prim, a Fabric."""
     name = "fabric:binding"
-    targets = prim.GetRelationship(name).GetForwardedTargets()
-    if len(targets) != 1:
-        yield name, f"has {len(targets)} targets; it must have 1, a Fabric prim"
+    found = targets(prim, name)
+    if len(found) != 1:
+        yield name, f"has {len(found)} targets; it must have 1, a Fabric prim"
         return
-    target = prim.GetStage().GetPrimAtPath(targets[0])
+    target = prim.GetStage().GetPrimAtPath(found[0])
     if not target:
-        yield name, f"targets {targets[0]}, which is no prim; it must be a Fabric"
+        yield name, f"targets {found[0]}, which is no prim; it must be a Fabric"
     elif target.GetTypeName() != "Fabric":
         kind = target.GetTypeName() or "an untyped prim"
-        yield name, f"targets {targets[0]}, {kind}; it must be a Fabric"
+        yield name, f"targets {found[0]}, {kind}; it must be a Fabric"
+
+
+@rule(BINDING, fatal=False)
+def bound_fabric_defined(prim: Usd.Prim) -> Iterator[Fault]:
+    """A fabric that is bound lies below no `over`, where programs that list fabrics miss it."""
+    for path in targets(prim, "fabric:binding")[:1]:
+        target = prim.GetStage().GetPrimAtPath(path)
+        over = over_above(target) if target and prim.IsDefined() else None
+        if over:
+            yield (
+                "fabric:binding",
+                f"targets {path}, which is not defined, as {over.GetPath()} is an over; "
+                "it must lie below defs alone",
+            )
 
 
 @rule(BINDING)
@@ -350,7 +387,7 @@ def binding_on_mesh_or_subset(prim: Usd.Prim) -> Iterator[Fault]:
 def binding_uv_set_exists(prim: Usd.Prim) -> Iterator[Fault]:
     """The UV set that a binding names is a primvar of the mesh."""
     mesh = prim.GetParent() if prim.GetTypeName() == "GeomSubset" else prim
-    wanted = prim.GetAttribute("fabric:binding:uvSet").Get()
+    wanted = value(prim, "fabric:binding:uvSet")
     if mesh and mesh.IsA(UsdGeom.Mesh) and wanted:
         primvars = UsdGeom.PrimvarsAPI(mesh)
         if not primvars.FindPrimvarWithInheritance(wanted).HasValue():
@@ -366,7 +403,7 @@ def binding_uv_set_exists(prim: Usd.Prim) -> Iterator[Fault]:
 def threads_per_unit_both(prim: Usd.Prim) -> Iterator[Fault]:
     """Threads per UV unit are given for both axes or for neither."""
     name = "fabric:binding:threadsPerUnit"
-    pair = prim.GetAttribute(name).Get()
+    pair = value(prim, name)
     u, v = (float(x) for x in pair) if pair is not None else (0.0, 0.0)
     if (u == 0) != (v == 0):
         yield name, f"is ({u:g}, {v:g}); both must be 0, or both above 0"
@@ -377,6 +414,7 @@ def binding_api_applied(prim: Usd.Prim) -> Iterator[Fault]:
     """A prim with a fabric:binding relationship has FabricBindingAPI applied."""
     relationship = prim.GetRelationship("fabric:binding")
     # A stronger layer unbinds a fabric by leaving no target.
-    bound = relationship and (relationship.GetTargets() or not relationship.HasAuthoredTargets())
-    if bound and not prim.HasAPI("FabricBindingAPI"):
+    name = "fabric:binding"
+    bound = relationship and (targets(prim, name) or not relationship.HasAuthoredTargets())
+    if bound and not applies_binding(prim):
         yield "fabric:binding", "is authored, but FabricBindingAPI is not in the prim's apiSchemas"

@@ -12,7 +12,6 @@ from pxr import Sdf, Tf, Usd, UsdUtils
 
 from fabricusd.errors import FabricError, one_line
 from fabricusd.files import readable_file
-from fabricusd.schema.plugin import require_schema
 
 PRESETS = Path(__file__).resolve().parent / "presets"
 
@@ -55,7 +54,6 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
     with usd_errors(str(path)):
         if Sdf.FileFormat.FindByExtension(str(path)) is None:
             raise FabricError(str(path), "is not USD; it must be .usda, .usdc, .usd or .usdz")
-        require_schema()
         stage = compose_stage(str(path))
         errors = stage.GetCompositionErrors()
         if errors:
@@ -66,8 +64,7 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
 def compose_stage(path: str) -> Usd.Stage:
     """The stage of a file as it is on disk now; composition errors are the caller's to look at."""
     # USD also prints them as warnings.
-    silence = UsdUtils.CoalescingDiagnosticDelegate()
-    try:
+    with no_warnings():
         layer = Sdf.Layer.FindOrOpen(path)
         if layer is None:
             raise FabricError(path, "is not USD; it cannot be parsed")
@@ -78,6 +75,14 @@ def compose_stage(path: str) -> Usd.Stage:
             if not used.expired and not used.dirty and not used.anonymous:
                 used.Reload()
         return stage
+
+
+@contextmanager
+def no_warnings() -> Iterator[None]:
+    """Keep USD from printing warnings in the block."""
+    silence = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        yield
     finally:
         silence.TakeUncoalescedDiagnostics()
         del silence
@@ -151,7 +156,13 @@ def find_fabric(stage: Usd.Stage, file: str, prim_path: str = "") -> Usd.Prim:
     if default and default.GetTypeName() == "Fabric":
         return default
     every = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
-    found = [prim for prim in every if prim.GetTypeName() == "Fabric"]
+    found = []
+    walk = iter(every)
+    for prim in walk:
+        if prim.GetTypeName() == "Fabric":
+            found.append(prim)
+            # A fabric below is its back.
+            walk.PruneChildren()
     if not found:
         raise FabricError(file, "holds no Fabric prim")
     if len(found) > 1:

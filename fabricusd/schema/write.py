@@ -11,6 +11,7 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric, Thread
 from fabricusd.files import whole_file
 from fabricusd.schema import attributes, weave_rows
+from fabricusd.schema.access import BINDING_API
 from fabricusd.schema.attributes import DEGREE, Attribute, from_si, unscale
 from fabricusd.schema.names import free_name, prim_name
 from fabricusd.schema.source import usd_errors
@@ -65,10 +66,10 @@ def _layer(fabrics: Sequence[Fabric]) -> Sdf.Layer:
 
 
 def write_fabric(stage: Usd.Stage, path: Sdf.Path | str, fabric: Fabric) -> Usd.Prim:
-    """Define a Fabric prim with its threads as children, and its back as a sibling.
+    """Define a Fabric prim with its threads and its back as children, which a reference brings.
 
     A name that is no prim's becomes the nearest; threads of one name, and a back that is called
-    as its front, have a number put after theirs.
+    as a thread, have a number put after theirs.
     """
     path = Sdf.Path(path)
     prim = stage.DefinePrim(path, "Fabric")
@@ -91,8 +92,8 @@ def write_fabric(stage: Usd.Stage, path: Sdf.Path | str, fabric: Fabric) -> Usd.
         _set(prim, "fabric:opaque", "bool", True)
     _set_numbers(prim, attributes.FABRIC, fabric)
     if fabric.back is not None:
-        name = free_name(prim_name(fabric.back.name), (path.name,))
-        back = write_fabric(stage, path.ReplaceName(name), fabric.back)
+        name = free_name(prim_name(fabric.back.name), names)
+        back = write_fabric(stage, path.AppendChild(name), fabric.back)
         prim.CreateRelationship("fabric:back", custom=False).SetTargets([back.GetPath()])
     return prim
 
@@ -111,7 +112,8 @@ def write_thread(stage: Usd.Stage, path: Sdf.Path | str, thread: Thread) -> Usd.
 
 def write_binding(prim: Usd.Prim, fabric_path: Sdf.Path | str, binding: Binding) -> None:
     """Apply FabricBindingAPI to a mesh or subset, bound to the Fabric prim at `fabric_path`."""
-    prim.ApplyAPI("FabricBindingAPI")
+    # Not `ApplyAPI`, which asks for a schema that USD knows.
+    prim.AddAppliedSchema(BINDING_API)
     prim.CreateRelationship("fabric:binding", custom=False).SetTargets([Sdf.Path(fabric_path)])
     _set(prim, "fabric:binding:uvSet", "token", binding.uv_set, uniform=True)
     _set_numbers(prim, attributes.BINDING, binding)
