@@ -85,6 +85,7 @@ class "Sheet"
     texCoord2f[] primvars:st = [(0, 0), (1, 0), (1, 1), (0, 1)] (
         interpolation = "vertex"
     )
+    uniform token subdivisionScheme = "none"
 }
 def Mesh "Applied" (
     inherits = </Sheet>
