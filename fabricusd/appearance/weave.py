@@ -288,6 +288,25 @@ def lookup(cloth: Fabric | CompiledFabric, uv_threads: ArrayLike) -> WeaveHit:
     return WeaveHit(sets, threads, s, w, angle, height, crown, sets == GAP)
 
 
+NO_THREAD = -1
+"""Number of a place where no thread is seen, or none alone."""
+
+
+def thread_number(
+    which: NDArray[Any], thread: NDArray[Any], types: int
+) -> NDArray[np.int64]:
+    """(n,) number of the thread that is seen, which tells sets apart that share a yarn: the index of
+    its type for weft, that plus `types` for warp, NO_THREAD for a gap.
+
+    which, thread : (n,) set and type, as `WeaveHit` has them
+    types : how many threads the fabric on that side has
+
+    Map `thread_id` of a bake and layer `thread` of a picture hold this number.
+    """
+    number = thread.astype(np.int64) + types * (which == WARP)
+    return np.where(which == GAP, NO_THREAD, number)
+
+
 def back_of(fabric: Fabric) -> Fabric:
     """The other side of the cloth, as a fabric that is looked up at (u, -v).
 

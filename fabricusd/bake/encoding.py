@@ -1,7 +1,7 @@
 """Maps as whole numbers of 16 bits, for PNG and TIFF.
 
-Colours take the sRGB curve, directions and angles lie about the middle, ids are the numbers
-themselves, and what has no bounds of its own is scaled from its least value to its greatest. The
+Colours take the sRGB curve, directions and angles lie about the middle, ids are the numbers plus
+one, since -1 is none, and what has no bounds of its own is scaled from its least value to its greatest. The
 manifest says which, so that `decoded` gives the values back.
 """
 
@@ -53,7 +53,7 @@ _FIXED = {
     "direction": (2.0, -1.0),
     "axis": (2.0, -1.0),
     "angle": (math.pi, -0.5 * math.pi),
-    "id": (float(GREATEST), 0.0),
+    "id": (float(GREATEST), -1.0),
 }
 """Scale and offset by kind of map; others take what they span."""
 

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.coverage import GAP, WARP, WEFT
+from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.weave import NO_THREAD, thread_number
 from fabricusd.bake import planes as m
 from fabricusd.bake.garment import Lay
 from fabricusd.bake.recipe import Recipe
@@ -23,8 +24,8 @@ from fabricusd.errors import FabricError
 
 Planes = NDArray[np.float32]
 
-GAP_ID = NO_LAY = 255
-"""Thread id of a texel whose centre shows no thread, and lay of one outside the layout."""
+NO_LAY = 255
+"""Lay of a texel outside the layout."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -160,12 +161,10 @@ def _whole(t: Texels) -> NDArray[Any]:
     return np.ones(t.planes.shape[1])
 
 
-@texture_map("thread_id", "Y", (GAP_ID,), exact=True, kind_of="id", weight=_whole)
+@texture_map("thread_id", "Y", (NO_THREAD,), exact=True, kind_of="id", weight=_whole)
 def thread_id(t: Texels) -> NDArray[Any]:
-    """Thread type at the texel's centre: its index for weft, index + types for warp, 255 for gap"""
-    which, thread = t.hit
-    number = np.where(which == WARP, thread + t.types, thread)
-    return np.where(which == GAP, GAP_ID, number)[:, None]
+    """Thread at the texel's centre: its type's index for weft, index + types for warp, -1 for none"""
+    return thread_number(*t.hit, t.types)[:, None]
 
 
 @texture_map("lay", "Y", (NO_LAY,), exact=True, kind_of="id", weight=_whole)

@@ -25,9 +25,9 @@ from fabricusd.appearance.real import KERNEL
 from fabricusd.appearance.segment import along_set, seen_along, segment
 from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.appearance.thread_terms import GAMMA_SURFACE, MODEL, THESIS
+from fabricusd.appearance.weave import NO_THREAD
 from fabricusd.bake.angle_shape import COUNTS, angle_shapes
 from fabricusd.bake.encoding import Encoding
-from fabricusd.bake.maps import GAP_ID
 from fabricusd.bake.planes import PARTS
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -131,7 +131,8 @@ def relight(
     if "weft_share" not in maps:
         # The one part is the whole set.
         shapes = np.repeat(shapes[:, PARTS:], PARTS + 1, axis=1)
-    kinds = np.where(ids == GAP_ID, -1, ids).astype(np.int64)
+    # Bakes of earlier versions have 255 for none.
+    kinds = np.where((ids >= 0) & (ids < 2 * types), ids, NO_THREAD).astype(np.int64)
     out = np.zeros((len(ids), 3))
     i, o = (np.asarray(w, np.float64) for w in (wi, wo))
     _relight(surface_tables(fabric), share, shapes, types, sets, kinds, i, o, out)

@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from fabricusd.appearance.weave import NO_THREAD
 from fabricusd.fabric import Fabric
 from fabricusd.preview.judge import Judge, albedo, direction_pairs
 from fabricusd.preview.look import Look
 from fabricusd.preview.models import Surface, evaluate
-from fabricusd.preview.target import NO_THREAD, Target, TexelSample, target_of
+from fabricusd.preview.target import Target, TexelSample, target_of
 
 Floats = NDArray[np.float64]
 

@@ -10,15 +10,11 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance import surface
 from fabricusd.appearance.compiled import true_repeat
-from fabricusd.appearance.coverage import WARP
-from fabricusd.appearance.weave import lookup
+from fabricusd.appearance.weave import NO_THREAD, lookup, thread_number
 from fabricusd.fabric import Fabric
 from fabricusd.preview.judge import direction_pairs
 
 Floats = NDArray[np.float64]
-
-NO_THREAD = -1
-"""Number of texels that belong to no thread alone."""
 
 PLACES = 24
 """Along a thread's curve, that its mean radiance is taken from."""
@@ -32,7 +28,7 @@ class TexelSample:
     normal : (k, 3) unit; tangent : (k, 3) unit, along the rougher axis, across `normal`
     weight : (k,) share of the lay that each stands for
     tint : (k, 3) factor on the reflection, or 1
-    thread : (k,) number of the thread in map `thread_id`, or NO_THREAD
+    thread : (k,) number of the thread in map `thread_id`, NO_THREAD for texels of none alone
     """
 
     base: Floats
@@ -103,7 +99,7 @@ def of_thread(fabric: Fabric, number: int, wi: Floats, wo: Floats) -> Floats:
     rng = np.random.default_rng(0)
     places = rng.random((8192, 2)) * np.array(true_repeat(fabric))
     hit = lookup(fabric, places)
-    mine = np.flatnonzero(~hit.gap & (thread_numbers(fabric, hit) == number))
+    mine = np.flatnonzero(thread_number(hit.set, hit.thread, len(fabric.threads)) == number)
     if not len(mine):
         return np.zeros_like(wi)
     # A place matters by its tangent angle alone: even quantiles of it stand for all.
@@ -113,8 +109,3 @@ def of_thread(fabric: Fabric, number: int, wi: Floats, wo: Floats) -> Floats:
     for place in places[chosen]:
         total += surface.evaluate(fabric, wi, wo, place, "weave")
     return total / PLACES
-
-
-def thread_numbers(fabric: Fabric, hit: Any) -> NDArray[np.int64]:
-    """(n,) numbers as in map `thread_id`: type for weft, type + types for warp."""
-    return np.asarray(hit.thread + len(fabric.threads) * (hit.set == WARP), np.int64)

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 
+from fabricusd.appearance.weave import NO_THREAD
 from fabricusd.bake.bake import FEWEST
-from fabricusd.bake.maps import GAP_ID
 from fabricusd.images import read_mip_level
 from fabricusd.preview.bake_folder import BakedLay, MapSet
-from fabricusd.preview.target import NO_THREAD, TexelSample
+from fabricusd.preview.target import TexelSample
 
 DRAWN, KINDS = 2048, 12
 """Texels drawn of each lay, and the kinds that they are sorted into, each standing for its share:
@@ -58,7 +58,8 @@ def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
     )  # fmt: skip
     numbers = np.full(len(chosen), NO_THREAD)
     if resolved(maps, lay):
-        numbers = _threads(read_mip_level(maps.textures["thread_id"][tile]).ravel()[chosen])
+        ids = read_mip_level(maps.textures["thread_id"][tile]).ravel()[chosen]
+        numbers = _threads(ids, len(lay.fabric.threads) if lay.fabric else 0)
     shown = np.unique(numbers)
     most = max(KINDS // len(shown), 4)
     groups = [_kinds(rows[numbers == one], most) for one in shown]
@@ -85,10 +86,11 @@ def resolved(maps: MapSet, lay: BakedLay) -> bool:
     return bool(np.abs(lay.matrix).sum(axis=1).max() / width <= 1.0 / FEWEST)
 
 
-def _threads(ids: NDArray[np.float32]) -> NDArray[np.int64]:
+def _threads(ids: NDArray[np.float32], types: int) -> NDArray[np.int64]:
     """Numbers of the threads, NO_THREAD for gaps and for threads that hardly show; for all where
     but one thread shows."""
-    numbers = np.where(ids == GAP_ID, NO_THREAD, ids).astype(np.int64)
+    # Bakes of earlier versions have 255 for none.
+    numbers = np.where((ids >= 0) & (ids < 2 * types), ids, NO_THREAD).astype(np.int64)
     shown, counts = np.unique(numbers[numbers != NO_THREAD], return_counts=True)
     kept = shown[counts >= LEAST * len(ids)][:MOST]
     return np.where(np.isin(numbers, kept) & (len(kept) > 1), numbers, NO_THREAD)

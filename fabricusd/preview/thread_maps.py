@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.weave import NO_THREAD
 from fabricusd.images import read_mip_level, write_mip_exr
 from fabricusd.preview.bake_folder import MapSet
-from fabricusd.preview.target import NO_THREAD
 
 Floats = NDArray[np.float64]
 Factors = Mapping[int, Floats]

@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.coverage import GAP
+from fabricusd.appearance.coverage import GAP, WARP
 from fabricusd.appearance.law import (
     PUBLISHED_ONLY,
     SurfaceLaw,
@@ -74,6 +74,7 @@ class _Side:
 
     def __init__(self, fabric: Fabric, shadow: str, make_ready: Callable[[], None]) -> None:
         self.fabric, self.method, self.make_ready = fabric, shadow, make_ready
+        self.types = len(fabric.threads)
         self._law: SurfaceLaw | None = None
         self._near: dict[int, tuple[CompiledFabric, Shadow]] = {}
 
@@ -174,8 +175,8 @@ class FabricShader:
         else:
             _by_law(R, law, level, hits, first, *vectors, sets, threads, psi0, across)
         finish_point(
-            R, cloth, shadow, v_sign, R(0 if self.gap == 0 else 1), hits, first, wi, go,
-            towards, onwards, *found,
+            R, cloth, shadow, v_sign, R(0 if self.gap == 0 else 1), side.types, hits, first, wi,
+            go, towards, onwards, *found,
         )  # fmt: skip
 
 
@@ -236,7 +237,7 @@ def look_up(R, cloth, v_sign, hits, first, sets, threads, along, across, psi0, l
 
 @njit(**LEAN)
 def finish_point(
-    R, cloth, shadow, v_sign, open_gap, hits, first, wi, go, towards, onwards,
+    R, cloth, shadow, v_sign, open_gap, types, hits, first, wi, go, towards, onwards,
     sets, threads, along, across, psi0, length,
 ):  # fmt: skip
     """Shadow the values by the neighbouring threads; in a gap the path goes straight on or ends."""
@@ -263,5 +264,7 @@ def finish_point(
         for row in range(3):
             hits[F + row, h] = light * towards[row, k]
             onwards[row, k] = bounce * onwards[row, k]
-        hits[KEEP, h], hits[THREAD, h] = R(1), R(threads[k])
+        # As `weave.thread_number` has it.
+        hits[KEEP, h] = R(1)
+        hits[THREAD, h] = R(threads[k] + (types if sets[k] == WARP else 0))
         _finish(hits, h, R(1), k, go, onwards)

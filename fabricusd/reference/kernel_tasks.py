@@ -174,7 +174,7 @@ def _point_values() -> None:
 
 def _finish_point() -> None:
     vectors = [np.zeros((3, 0), np.float32)] * 4
-    finish_point(R, *_woven(), R(1), R(0), _sample().wave.hits, 0, *vectors, *_scratch())
+    finish_point(R, *_woven(), R(1), R(0), 1, _sample().wave.hits, 0, *vectors, *_scratch())
 
 
 FAR, NEAR = "far", "near"

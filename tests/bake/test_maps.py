@@ -12,7 +12,7 @@ from fabricusd.appearance.compiled import true_repeat
 from fabricusd.appearance.coverage import coverage
 from fabricusd.appearance.shadow import shadowing
 from fabricusd.appearance.surface import evaluate
-from fabricusd.appearance.weave import lookup
+from fabricusd.appearance.weave import NO_THREAD, lookup
 from fabricusd.bake.accuracy import (
     PAIRS,
     display,
@@ -98,7 +98,7 @@ def test_normals_are_those_of_the_height_map():
     ids = maps["thread_id"][0][..., 0]
     full = maps["opacity"][0][..., 0] == 1
     middle = (slice(1, -1), slice(1, -1))
-    same = full[middle] & (ids[middle] != 255)
+    same = full[middle] & (ids[middle] != NO_THREAD)
     for shift in (-1, 1):
         for axis in (0, 1):
             same &= (np.roll(ids, shift, axis) == ids)[middle]
@@ -200,7 +200,7 @@ def test_the_coarsest_level_relit_is_level_far(name):
     fabric = load(name)
     maps, _ = baked(fabric, names=NEEDED, resolution=64, threads=float(2 * true_repeat(fabric)[0]))
     top = {k: maps[k][-1].reshape(1, -1) for k in NEEDED}
-    top["thread_id"] = np.full_like(top["thread_id"], 255)
+    top["thread_id"] = np.full_like(top["thread_id"], NO_THREAD)
     found = [
         delta_e_2000(
             display(relight(top, fabric, wi, wo), wi),
@@ -222,7 +222,7 @@ def test_ids_and_coordinates_are_those_of_the_texels_centre_at_every_level():
         assert np.allclose(weave, np.mod(true, 5.0), atol=1e-5)
         hit = lookup(fabric, true.reshape(-1, 2))
         ids = maps["thread_id"][level].ravel()
-        expected = np.where(hit.gap, 255, hit.thread + 2 * (hit.set == 1))
+        expected = np.where(hit.gap, NO_THREAD, hit.thread + 2 * (hit.set == 1))
         assert (ids == expected).mean() > 0.995
 
 

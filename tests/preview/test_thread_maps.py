@@ -9,9 +9,10 @@ import pytest
 from preview.scenes import write_shirt
 from pxr import Sdf, Usd, UsdShade
 
+from fabricusd.appearance.weave import NO_THREAD
 from fabricusd.bake.bake import Settings as BakeSettings
 from fabricusd.bake.bake import bake
-from fabricusd.bake.maps import GAP_ID
+from fabricusd.bake.maps import NO_LAY
 from fabricusd.images import read_mip_level
 from fabricusd.preview.bake_folder import read_bake_folder
 from fabricusd.preview.materials import write_materials
@@ -41,7 +42,7 @@ def test_a_texel_takes_its_threads_factors_and_other_lays_stay(baked, tmp_path):
     lay = read_mip_level(maps.textures["lay"][1001])[..., 0]
     before = read_mip_level(maps.textures["base_color"][1001])
     after = read_mip_level(made.textures["base_color"][1001])
-    for number, factor in ((0, 0.5), (1, 0.25), (GAP_ID, 0.4)):
+    for number, factor in ((0, 0.5), (1, 0.25), (NO_THREAD, 0.4)):
         mine = (lay == 0) & (ids == number)
         assert mine.any()
         assert np.allclose(after[mine], factor * before[mine], rtol=2e-3)
@@ -59,7 +60,7 @@ def test_levels_are_means_of_colours_and_the_bakes_own_roughness(baked, tmp_path
     colors = made.textures["base_color"][1001]
     fine = read_mip_level(colors).reshape(64, 2, 64, 2, 3).mean(axis=(1, 3))
     assert np.allclose(read_mip_level(colors, 1), fine, atol=1e-3)
-    inside = read_mip_level(maps.textures["lay"][1001], 3)[..., 0] != GAP_ID
+    inside = read_mip_level(maps.textures["lay"][1001], 3)[..., 0] != NO_LAY
     rough = read_mip_level(made.textures["roughness_across"][1001], 3)[inside]
     own = read_mip_level(maps.textures["roughness_across"][1001], 3)[inside]
     within = np.isclose(rough, 0.5 * own, rtol=2e-3)
