@@ -292,11 +292,9 @@ NO_THREAD = -1
 """Number of a place where no thread is seen, or none alone."""
 
 
-def thread_number(
-    which: NDArray[Any], thread: NDArray[Any], types: int
-) -> NDArray[np.int64]:
-    """(n,) number of the thread that is seen, which tells sets apart that share a yarn: the index of
-    its type for weft, that plus `types` for warp, NO_THREAD for a gap.
+def thread_number(which: NDArray[Any], thread: NDArray[Any], types: int) -> NDArray[np.int64]:
+    """(n,) number of the thread that is seen: the index of its type for weft, that plus `types` for
+    warp, NO_THREAD for a gap. It tells the sets apart where they share a yarn.
 
     which, thread : (n,) set and type, as `WeaveHit` has them
     types : how many threads the fabric on that side has

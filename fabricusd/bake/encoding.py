@@ -1,8 +1,8 @@
 """Maps as whole numbers of 16 bits, for PNG and TIFF.
 
 Colours take the sRGB curve, directions and angles lie about the middle, ids are the numbers plus
-one, since -1 is none, and what has no bounds of its own is scaled from its least value to its greatest. The
-manifest says which, so that `decoded` gives the values back.
+one, since -1 is none, and what has no bounds of its own is scaled from its least value to its
+greatest. The manifest says which, so that `decoded` gives the values back.
 """
 
 from __future__ import annotations

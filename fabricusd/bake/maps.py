@@ -163,7 +163,7 @@ def _whole(t: Texels) -> NDArray[Any]:
 
 @texture_map("thread_id", "Y", (NO_THREAD,), exact=True, kind_of="id", weight=_whole)
 def thread_id(t: Texels) -> NDArray[Any]:
-    """Thread at the texel's centre: its type's index for weft, index + types for warp, -1 for none"""
+    """Thread at the texel's centre: index of type for weft, index + types for warp, -1 for none"""
     return thread_number(*t.hit, t.types)[:, None]
 
 

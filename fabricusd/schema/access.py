@@ -80,7 +80,7 @@ def next_targets(relationship: Usd.Relationship) -> list[Sdf.Path]:
 
 
 def _has_targets(relationship: Usd.Relationship) -> bool:
-    """Whether to ask USD for targets, which warns of each that it drops; `lost_targets` does too."""
+    """Whether to ask USD for targets: it warns of each that it drops, as `lost_targets` does."""
     if not relationship:
         return False
     kept, lost = _by_fate(relationship.GetPrim(), relationship.GetName())

@@ -17,7 +17,7 @@ from fabricusd.fabric import Binding, Fabric, Thread, ThreadSet
 from fabricusd.reference import render
 from fabricusd.schema import load, preset_names
 
-TEXELS, PIXELS = 128, 96
+TEXELS, PIXELS = 64, 64
 
 SQUARE = """#usda 1.0
 (
@@ -74,14 +74,18 @@ def one_repeat(fabric: Fabric) -> Binding:
     return Binding(fabric=fabric, threads_per_uv=(float(ends), float(picks)))
 
 
-def baked(square: Path, fabric: Fabric, folder: Path, file_format: str = "exr") -> NDArray[np.int64]:
+def baked(
+    square: Path, fabric: Fabric, folder: Path, file_format: str = "exr"
+) -> NDArray[np.int64]:
     """(TEXELS, TEXELS) map `thread_id` of the square, its first row at v = 1."""
     settings = Settings(resolution=TEXELS, maps=("thread_id",), file_format=file_format)
     bake(square, folder, settings, fabric=one_repeat(fabric))
     return BakedSet.load(folder).read("Square", "thread_id")[..., 0].astype(np.int64)
 
 
-def seen(square: Path, fabric: Fabric, camera: str) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+def seen(
+    square: Path, fabric: Fabric, camera: str
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """Layers `thread` and `uv` of a picture of the square."""
     layers = render(
         square, None, fabric=one_repeat(fabric), camera=camera, width=PIXELS, height=PIXELS, spp=1,
@@ -118,9 +122,7 @@ def test_a_yarn_in_both_sets_has_two_numbers(square, tmp_path):
 
 
 def test_files_without_negative_numbers_hold_none_too(square, tmp_path):
-    found = {
-        kind: baked(square, ONE_YARN_IN_BOTH_SETS, tmp_path / kind, kind) for kind in FORMATS
-    }
+    found = {kind: baked(square, ONE_YARN_IN_BOTH_SETS, tmp_path / kind, kind) for kind in FORMATS}
     for kind in FORMATS:
         assert np.array_equal(found[kind], found["exr"])
 
