@@ -211,6 +211,18 @@ def test_the_coarsest_level_relit_is_level_far(name):
     assert np.mean(found) < 0.5
 
 
+def test_255_which_stood_for_no_thread_once_is_relit_as_none():
+    fabric = load("linen_plain")
+    maps, _ = baked(fabric, names=NEEDED, resolution=64, threads=4.0)
+    top = {k: maps[k][-1].reshape(1, -1) for k in NEEDED}
+    found = [
+        relight({**top, "thread_id": np.full_like(top["thread_id"], none)}, fabric, *[(0, 0, 1)] * 2)
+        for none in (NO_THREAD, 255)
+    ]
+    assert np.array_equal(*found)
+    assert found[0].max() > 0
+
+
 def test_ids_and_coordinates_are_those_of_the_texels_centre_at_every_level():
     fabric = load("polyester_satin_charmeuse")
     maps, _ = baked(fabric, threads=10.0)

@@ -17,7 +17,8 @@ from fabricusd.fabric import Binding, Fabric, Thread, ThreadSet
 from fabricusd.reference import render
 from fabricusd.schema import load, preset_names
 
-TEXELS, PIXELS = 64, 64
+TEXELS, PIXELS = 128, 64
+"""Of the map and the picture. At half as many texels the satin's weft lies between their centres."""
 
 SQUARE = """#usda 1.0
 (
