@@ -9,8 +9,10 @@ from dataclasses import asdict, dataclass
 from pxr import Usd
 
 from fabricusd.schema.anysource import is_draft, load_any
-from fabricusd.schema.rules import PRESENT, RULES, applies, run
+from fabricusd.schema.rules import PRESENT, RULES, applies, kinds, run
 from fabricusd.schema.source import find_prim, no_warnings, open_stage, split_source, usd_errors
+
+_OF_ANY_PRIM = [rule for rule in RULES if not rule.schema_types]
 
 
 @dataclass(frozen=True)
@@ -42,9 +44,11 @@ class Finding:
 
 def check_prim(prim: Usd.Prim, file: str = "", *, fatal: bool = False) -> Iterator[Finding]:
     """The findings on one prim; where `fatal`, those alone that keep it from being read."""
-    for checked in RULES:
+    of = kinds(prim)
+    # Most prims of a garment are none of ours.
+    for checked in RULES if of else _OF_ANY_PRIM:
         wanted = not fatal or (checked.fatal and checked.severity == "error")
-        if wanted and applies(checked, prim):
+        if wanted and applies(checked, prim, of):
             for name, problem in run(checked, prim):
                 yield Finding(
                     checked.name, checked.severity, file, str(prim.GetPath()), name, problem

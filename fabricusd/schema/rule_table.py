@@ -52,16 +52,21 @@ def rule(
     return register
 
 
-def applies(checked: Rule, prim: Usd.Prim) -> bool:
-    """Whether `prim` is one that the rule looks at."""
-    if checked.undefined and prim.IsDefined():
+def kinds(prim: Usd.Prim) -> frozenset[str]:
+    """The schema types that a prim is of: FABRIC or THREAD, and BINDING."""
+    found = {f"Fabricusd{prim.GetTypeName()}"} & {FABRIC, THREAD}
+    if applies_binding(prim) or prim.HasRelationship("fabric:binding"):
+        found.add(BINDING)
+    return frozenset(found)
+
+
+def applies(checked: Rule, prim: Usd.Prim, of: frozenset[str] | None = None) -> bool:
+    """Whether `prim` is one that the rule looks at; `of` is its `kinds`, where they are known."""
+    if checked.schema_types and (kinds(prim) if of is None else of).isdisjoint(
+        checked.schema_types
+    ):
         return False
-    type_name = f"Fabricusd{prim.GetTypeName()}"
-    if not checked.schema_types or type_name in checked.schema_types:
-        return True
-    return BINDING in checked.schema_types and (
-        applies_binding(prim) or prim.HasRelationship("fabric:binding")
-    )
+    return not (checked.undefined and prim.IsDefined())
 
 
 def run(checked: Rule, prim: Usd.Prim) -> list[Fault]:

@@ -36,11 +36,12 @@ from fabricusd.schema.rule_table import (
     Fault,
     Rule,
     applies,
+    kinds,
     rule,
     run,
 )
 
-__all__ = ["RULES", "Rule", "applies", "run", "thread_prims"]
+__all__ = ["RULES", "Rule", "applies", "kinds", "run", "thread_prims"]
 
 PRESENT = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
 """Prims whose opinions count, defined or not."""
@@ -202,7 +203,7 @@ def relationship_acyclic(prim: Usd.Prim) -> Iterator[Fault]:
 @rule(FABRIC)
 def threads_exist(prim: Usd.Prim) -> Iterator[Fault]:
     """A fabric has at least one thread, and every target of its thread list is a FabricThread."""
-    if not thread_prims(prim):
+    if not thread_prims(prim) and not lost_targets(prim, "fabric:threads"):
         yield "fabric:threads", "names no thread; it must name at least one FabricThread prim"
     for path in targets(prim, "fabric:threads"):
         target = prim.GetStage().GetPrimAtPath(path)
@@ -350,6 +351,8 @@ def binding_names_a_fabric(prim: Usd.Prim) -> Iterator[Fault]:
     """A binding targets exactly one prim, a Fabric."""
     name = "fabric:binding"
     found = targets(prim, name)
+    if not found and lost_targets(prim, name):
+        return  # another rule tells why
     if len(found) != 1:
         yield name, f"has {len(found)} targets; it must have 1, a Fabric prim"
         return
@@ -412,9 +415,11 @@ def threads_per_unit_both(prim: Usd.Prim) -> Iterator[Fault]:
 @rule(severity="warning")
 def binding_api_applied(prim: Usd.Prim) -> Iterator[Fault]:
     """A prim with a fabric:binding relationship has FabricBindingAPI applied."""
+    if not prim.HasRelationship("fabric:binding"):
+        return
     relationship = prim.GetRelationship("fabric:binding")
     # A stronger layer unbinds a fabric by leaving no target.
     name = "fabric:binding"
-    bound = relationship and (targets(prim, name) or not relationship.HasAuthoredTargets())
+    bound = targets(prim, name) or not relationship.HasAuthoredTargets()
     if bound and not applies_binding(prim):
         yield "fabric:binding", "is authored, but FabricBindingAPI is not in the prim's apiSchemas"

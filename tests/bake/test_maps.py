@@ -216,7 +216,9 @@ def test_255_which_stood_for_no_thread_once_is_relit_as_none():
     maps, _ = baked(fabric, names=NEEDED, resolution=64, threads=4.0)
     top = {k: maps[k][-1].reshape(1, -1) for k in NEEDED}
     found = [
-        relight({**top, "thread_id": np.full_like(top["thread_id"], none)}, fabric, *[(0, 0, 1)] * 2)
+        relight(
+            {**top, "thread_id": np.full_like(top["thread_id"], none)}, fabric, *[(0, 0, 1)] * 2
+        )
         for none in (NO_THREAD, 255)
     ]
     assert np.array_equal(*found)

@@ -18,7 +18,7 @@ from fabricusd.reference import render
 from fabricusd.schema import load, preset_names
 
 TEXELS, PIXELS = 128, 64
-"""Of the map and the picture. At half as many texels the satin's weft lies between their centres."""
+"""Of map and picture. With half as many texels the satin's weft lies between their centres."""
 
 SQUARE = """#usda 1.0
 (
