@@ -148,8 +148,8 @@ def read_binding(prim: Usd.Prim, note: Note | None = None) -> Binding:
     over = over_above(fabric)
     if over and note is not None:
         note(
-            f"wears {fabric.GetPath()}, which is not defined, as {over.GetPath()} is an over; "
-            "other programs may miss it"
+            f"wears {fabric.GetPath()}, which lies below {over.GetPath()}, an 'over' that no layer "
+            "defines: other programs do not see it and show a grey; make it a 'def'"
         )
     return Binding(
         fabric=read_fabric(fabric, note),

@@ -219,8 +219,8 @@ def test_a_fabric_below_an_over_is_worn_and_told_of(tmp_path):
     fabric, notes = worn(scene)
     assert (list(fabric.threads), fabric.back.name) == (["Silk"], "Back")
     assert notes == [
-        "/Sheet wears /Looks/Satin, which is not defined, as /Looks is an over; "
-        "other programs may miss it"
+        "/Sheet wears /Looks/Satin, which lies below /Looks, an 'over' that no layer defines: "
+        "other programs do not see it and show a grey; make it a 'def'"
     ]
     assert [(f.rule, f.severity, f.prim) for f in check(scene)] == [
         ("BoundFabricDefined", "error", "/Sheet"),

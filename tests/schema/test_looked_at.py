@@ -45,7 +45,7 @@ def test_a_fabric_below_an_over_is_worn_with_a_note_and_a_finding(folder):
     (surface,) = read.materials
     assert surface.binding.fabric == load("linen_plain")
     assert len(read.notes) == 1
-    assert "/World/Looks is an over" in read.notes[0]
+    assert "/World/Looks, an 'over'" in read.notes[0]
     assert "BoundFabricDefined" in {f.rule for f in check(scene) if f.severity == "error"}
 
 
