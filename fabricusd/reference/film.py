@@ -47,10 +47,10 @@ AOVS: dict[str, tuple[str, ...]] = {
 estimated; `shadow` the share of direct light that arrives. `level` (0 far, 1 weave, 2 thread),
 `normal` and `tangent`, of the frame that a normal map turned, are means over a pixel's samples.
 `depth`, `uv` and `thread` are those of one sample, the pixel's first that meets a surface, which
-lies anywhere in the pixel filter: they are not anti-aliased, and not of the pixel's centre. `depth` is planar: metres along the camera's
-axis, not along the ray. `thread` is the number that map `thread_id` of a bake has, see
-`weave.thread_number`; -1 where no thread is seen and at level far. `variance` is that of the
-pixel's mean, see `Film.variance`."""
+lies anywhere in the pixel filter: they are not anti-aliased, and not of the pixel's centre. `depth`
+is planar: metres along the camera's axis, not along the ray. `thread` is the number that map
+`thread_id` of a bake has, see `weave.thread_number`; -1 where no thread is seen and at level far.
+`variance` is that of the pixel's mean, see `Film.variance`."""
 
 _ALWAYS = ("beauty", "direct", "indirect", "variance", "samples")
 _FIRST = (DEPTH_Z, UV, UV + 1, THREAD_ID)
