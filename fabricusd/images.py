@@ -11,7 +11,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from fabricusd.errors import FabricError, one_line
+from fabricusd.errors import FabricError, one_line, reads
 from fabricusd.files import readable_file, whole_file
 from fabricusd.srgb import linear_from_srgb
 
@@ -105,6 +105,7 @@ def _write(path: str | os.PathLike[str], spec: Any, data: NDArray[Any]) -> None:
             raise FabricError(str(path), f"cannot be written: {reason}")
 
 
+@reads("a picture")
 def read_flat(
     path: str | os.PathLike[str], largest: int
 ) -> tuple[NDArray[np.uint8] | NDArray[np.float32], int]:
@@ -140,6 +141,7 @@ def read_flat(
     return np.asarray(pixels).reshape(spec.height, spec.width, used), alpha
 
 
+@reads("a picture")
 def read_image(
     path: str | os.PathLike[str], *, color_space: str = "auto", most: int = 0
 ) -> NDArray[np.float32]:
@@ -158,6 +160,7 @@ def read_image(
     return np.ascontiguousarray(pixels, np.float32)
 
 
+@reads("a picture")
 def read_alpha(path: str | os.PathLike[str], *, most: int = 0) -> NDArray[np.float32]:
     """(h, w, 1) float32 opacity of a picture, 1 where it has none; otherwise as `read_image`."""
     pixels, spec = _stored_pixels(path)
@@ -190,6 +193,7 @@ def _shrunk(pixels: NDArray[np.float32], most: int) -> NDArray[np.float32]:
     return np.asarray(blocks.mean(axis=(1, 3)))
 
 
+@reads("a picture")
 def read_exr_layers(
     path: str | os.PathLike[str],
 ) -> tuple[dict[str, NDArray[np.float32]], dict[str, Any]]:
@@ -290,6 +294,7 @@ def write_16_bit(
             raise FabricError(str(path), f"cannot be written: {reason}")
 
 
+@reads("a picture")
 def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.float32]:
     """(h, w, c) float32 pixels of one mip level, values as they are in the file."""
     plain = oiio.ImageSpec()
@@ -301,6 +306,7 @@ def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.f
     return np.asarray(buffer.get_pixels(oiio.FLOAT), np.float32)
 
 
+@reads("a picture")
 def read_middle(path: str | os.PathLike[str], most: int) -> NDArray[np.float32]:
     """(h, w, c) float32 middle of a square texture, at most `most` a side.
 

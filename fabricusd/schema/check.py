@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 
 from pxr import Usd
 
+from fabricusd.errors import reads
 from fabricusd.schema.anysource import is_draft, load_any
 from fabricusd.schema.rules import RULES, applies, run
 from fabricusd.schema.source import find_prim, open_stage, split_source, usd_errors
@@ -50,6 +51,7 @@ def check_prim(prim: Usd.Prim, file: str = "", severity: str = "") -> Iterator[F
                 )
 
 
+@reads("a fabric")
 def check(source: str | os.PathLike[str]) -> list[Finding]:
     """Every finding in a USD file or a preset, in stage order; of a draft, what its import assumed.
 

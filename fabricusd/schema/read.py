@@ -8,7 +8,7 @@ from typing import Any
 
 from pxr import Usd
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, reads
 from fabricusd.fabric import Binding, Fabric, TangentCurve, Thread, ThreadSet, Weave
 from fabricusd.schema import attributes, weave_rows
 from fabricusd.schema.attributes import DEGREE, Attribute, to_si
@@ -18,6 +18,7 @@ from fabricusd.schema.rules import thread_prims
 from fabricusd.schema.source import find_fabric, open_stage, split_source, usd_errors
 
 
+@reads("a fabric")
 def load(source: str | os.PathLike[str]) -> Fabric:
     """The fabric in `FILE[:/PRIM]`, or a preset by its name.
 

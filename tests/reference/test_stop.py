@@ -10,7 +10,7 @@ import pytest
 from fabricusd.images import read_exr_layers
 from fabricusd.reference.render import render
 from fabricusd.reference.scene import Scene
-from fabricusd.reference.stop import SIGNALS, Stop
+from fabricusd.stop import SIGNALS, Stop
 from tests.reference.scenes import grid, lambert
 from tests.reference.stages import new_stage, square
 
