@@ -84,7 +84,7 @@ def _start_of(process: int) -> tuple[str, str]:
 
 @cache
 def _machine() -> str:
-    """Eight hexadecimal digits for what numbers processes: a machine since its start, or part of it."""
+    """Eight hexadecimal digits for what numbers processes: a machine, since its start."""
     words = [socket.gethostname()]
     with suppress(OSError), open("/proc/sys/kernel/random/boot_id", encoding="ascii") as stream:
         words.append(stream.read())
