@@ -63,6 +63,7 @@ RANGES = {
     "ends_per_cm": Range(low=0.01, high=10000, unit="ends/cm"),
     "picks_per_cm": Range(low=0.01, high=10000, unit="picks/cm"),
     "thickness": Range(low=0, high=1000, unit="mm"),
+    "color": Range(low=0, high=1000),
     "difference": Range(low=0, high=1000),
 }
 """By the name of the setting. Beyond these a number is a slip, or asks for more than a machine has:

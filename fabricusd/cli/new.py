@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from fabricusd.cli.number import number
 from fabricusd.cli.stdout import write_utf8
 from fabricusd.errors import FabricError
+from fabricusd.ranges import RANGES
 
 if TYPE_CHECKING:
     from fabricusd.fabric import Fabric, Thread
@@ -162,7 +163,10 @@ def _color_order(items: list[str] | None, where: str) -> list[tuple[float, float
             raise FabricError(
                 where, f"has the count '{count}'; it must be from 1 to {LONGEST_ORDER}"
             )
-        order += [parse_color(color, where)] * (int(count) if star else 1)
+        rgb = parse_color(color, where)
+        for value in rgb:
+            RANGES["color"].require(where, value)
+        order += [rgb] * (int(count) if star else 1)
     return order
 
 

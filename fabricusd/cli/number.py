@@ -18,10 +18,10 @@ def number(setting: str) -> Callable[[str], Any]:
         try:
             value = int(text) if allowed.whole else float(text)
         except ValueError:
-            words = f"is '{one_line(text, 60)}'; it must be {allowed}"
-            raise argparse.ArgumentTypeError(words) from None
+            value = None
         if value not in allowed:
-            raise argparse.ArgumentTypeError(allowed.refusal(value))
+            words = f"is '{one_line(text, 60)}'; it must be {allowed}"
+            raise argparse.ArgumentTypeError(words)
         return value
 
     return parse
