@@ -7,7 +7,6 @@ import os
 import re
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -182,9 +181,7 @@ def _progress(
     bar = tqdm(total=1.0, bar_format="{percentage:3.0f} %|{bar}| {remaining} left", leave=False)
 
     def update(share: float, _seconds: float) -> None:
-        # A terminal that has been closed must not cost the picture.
-        with suppress(OSError):
-            bar.update(max(0.0, share - bar.n))
+        bar.update(max(0.0, share - bar.n))
 
     return bar.close, update
 
