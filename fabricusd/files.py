@@ -93,7 +93,7 @@ def _begin(path: str | os.PathLike[str], *, clobber: bool) -> tuple[Path, Path]:
         # The temporary name is shorter: a name that is too long would be refused after the work.
         with suppress(FileNotFoundError):
             os.lstat(target)
-        remove_partial_files_once(Path(os.path.abspath(target.parent)))
+        remove_partial_files_once(target.parent)
         handle, name = tempfile.mkstemp(
             prefix=partial_prefix(target.stem), suffix=target.suffix, dir=target.parent
         )

@@ -10,7 +10,6 @@ import sys
 import time
 from contextlib import suppress
 from functools import cache
-from pathlib import Path
 
 _MARK = ".partial-"
 
@@ -45,9 +44,28 @@ def remove_partial_files(folder: str | os.PathLike[str]) -> None:
 
 
 @cache
-def remove_partial_files_once(folder: Path) -> None:
+def _folders() -> set[str]:
+    """Where this process has written."""
+    return set()
+
+
+def remove_partial_files_once(folder: str | os.PathLike[str]) -> None:
     """`remove_partial_files`, the first time that this process writes into `folder`."""
-    remove_partial_files(folder)
+    name = os.path.abspath(folder)
+    if name not in _folders():
+        _folders().add(name)
+        remove_partial_files(name)
+
+
+def remove_own_partial_files() -> None:
+    """Remove this process's own, of writers that an interrupt has stopped wherever they were."""
+    own = partial_prefix("").removeprefix(".")
+    for folder in _folders():
+        with suppress(OSError), os.scandir(folder) as entries:
+            for entry in entries:
+                if own in entry.name:
+                    with suppress(OSError):
+                        os.unlink(entry.path)
 
 
 def _is_stale(entry: os.DirEntry[str]) -> bool:

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from fabricusd.errors import FabricError
-from fabricusd.files import remove_partial_files, require_writable, whole_file
+from fabricusd.files import _begin, remove_partial_files, require_writable, whole_file
+from fabricusd.partial_files import remove_own_partial_files
 
 ROOT = str(Path(__file__).resolve().parents[1])
 
@@ -63,7 +64,7 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
 
 HOLD = """
 import sys
-from fabricusd.files import whole_file
+from fabricusd.files import _begin, whole_file
 
 with whole_file(sys.argv[1]) as temporary:
     temporary.write_text(sys.argv[2])
@@ -153,6 +154,14 @@ def test_partial_files_of_other_machines_go_by_their_age(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(
         [young.name, "a.partial-mine.usda", ".a.usda"]
     )
+
+
+def test_what_an_interrupt_has_left_of_this_process_is_removed_and_nothing_else(tmp_path):
+    mine, _ = _begin(tmp_path / "a.usda", clobber=True)[1], write(tmp_path / "b.usda")
+    other = tmp_path / mine.name.replace(f"-{os.getpid()}-", "-1-")
+    other.write_text("half")
+    remove_own_partial_files()
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(["b.usda", other.name])
 
 
 def test_a_long_name_is_written_and_one_that_is_too_long_refused_before_the_work(tmp_path):

@@ -20,6 +20,7 @@ from typing import NoReturn
 from fabricusd import __version__
 from fabricusd.cli.stdout import drop_stdout, ready_stdout
 from fabricusd.errors import FabricError, debugging, described, one_line
+from fabricusd.partial_files import remove_own_partial_files
 from fabricusd.stop import Stop
 
 INTERNAL = "internal error"
@@ -89,6 +90,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
             return status
     except KeyboardInterrupt:
+        # An interrupt may have come between a file's beginning and the first chance to remove it.
+        remove_own_partial_files()
         _say("interrupted")
         return 130
     except Exception as error:
