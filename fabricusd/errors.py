@@ -93,6 +93,8 @@ def reads(kind: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
 def described(error: BaseException) -> str:
     """An exception's type and message on one line: `IndexError: list index out of range`."""
     name = type(error).__name__
+    if name == "error":  # zlib's, struct's
+        name = f"{type(error).__module__}.error"
     return one_line(f"{name}: {error}" if str(error) else name, 300)
 
 
