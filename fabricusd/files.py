@@ -51,9 +51,9 @@ def whole_file(
         temporary.unlink(missing_ok=True)
 
 
-def require_writable(path: str | os.PathLike[str]) -> None:
+def require_writable(path: str | os.PathLike[str], *, clobber: bool = True) -> None:
     """Raise now what `whole_file` would raise once the work is done."""
-    _begin(path, clobber=True)[1].unlink(missing_ok=True)
+    _begin(path, clobber=clobber)[1].unlink(missing_ok=True)
 
 
 def _sync(path: Path) -> None:

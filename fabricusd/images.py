@@ -97,10 +97,13 @@ def _write(path: str | os.PathLike[str], spec: Any, data: NDArray[Any]) -> None:
         output = oiio.ImageOutput.create(str(temporary))
         if output is None:
             raise FabricError(str(path), "is no picture format; it must end in .exr or .png")
-        good = output.open(str(temporary), spec) and output.write_image(data) and output.close()
-        reason = _reason(output)
-        # The file is complete only once the writer is gone.
-        del output
+        try:
+            good = output.open(str(temporary), spec) and output.write_image(data) and output.close()
+            reason = _reason(output)
+        finally:
+            # The file is complete only once the writer is gone. Of an interrupt libpng complains.
+            with _silence():
+                del output
         if not good:
             raise FabricError(str(path), f"cannot be written: {reason}")
 
@@ -282,14 +285,17 @@ def write_16_bit(
             spec.attribute(key, value)
         good = output is not None and output.open(str(temporary), spec)
         row = 0
-        for band in bands if good else ():
-            pixels = np.zeros((*band.shape[:2], kept), np.uint16)
-            pixels[..., :channels] = band
-            good = good and output.write_scanlines(row, row + len(band), 0, pixels)
-            row += len(band)
-        good = good and output.close()
-        reason = _reason(output) if output is not None else "no writer"
-        del output
+        try:
+            for band in bands if good else ():
+                pixels = np.zeros((*band.shape[:2], kept), np.uint16)
+                pixels[..., :channels] = band
+                good = good and output.write_scanlines(row, row + len(band), 0, pixels)
+                row += len(band)
+            good = good and output.close()
+            reason = _reason(output) if output is not None else "no writer"
+        finally:
+            with _silence():
+                del output
         if not good:
             raise FabricError(str(path), f"cannot be written: {reason}")
 

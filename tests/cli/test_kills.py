@@ -129,7 +129,7 @@ def require_readable(path: Path) -> None:
         assert read_image(path).size
     elif path.suffix in (".usda", ".usdc", ".usdz"):
         assert Usd.Stage.Open(str(path)).GetRootLayer()
-    elif path.suffix == ".json":
+    elif path.suffix in (".json", ".u3m"):
         json.loads(path.read_text())
     elif path.suffix == ".wif":
         read_wif(path)
