@@ -97,6 +97,8 @@ def test_under_nohup_the_terminals_end_is_none(tmp_path):
     require_picture(tmp_path)
 
 
+# The child becomes another program at once.
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 def test_a_terminal_that_is_closed_does_not_cost_the_picture(tmp_path):
     """With the bar of a terminal, which cannot be written any more."""
     import pty
