@@ -6,21 +6,32 @@ import os
 import stat
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from fabricusd.errors import FabricError
+from fabricusd.partial_files import (
+    partial_prefix,
+    remove_partial_files,
+    remove_partial_files_once,
+)
 
-_PARTIAL = ".partial-"
+__all__ = ["readable_file", "remove_partial_files", "require_writable", "whole_file"]
 
 
 @contextmanager
-def whole_file(path: str | os.PathLike[str], *, clobber: bool = True) -> Iterator[Path]:
+def whole_file(
+    path: str | os.PathLike[str], *, clobber: bool = True, durable: bool = True
+) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` if the block succeeds.
 
     The temporary name keeps the suffix, since many writers choose their format by it. An existing
     file is replaced in one step, or refused before anything is written when `clobber` is False. A
-    link stays, and what it points to is replaced; devices and pipes are refused.
+    link stays, and what it points to is replaced; devices and pipes are refused. What a killed
+    process left half-written in the folder is removed.
+
+    durable : wait until the content is on the disk before its name is, so that not even a power
+        failure leaves half a file; False for what is checked or made again in any case
     """
     target, temporary = _begin(path, clobber=clobber)
     try:
@@ -29,16 +40,39 @@ def whole_file(path: str | os.PathLike[str], *, clobber: bool = True) -> Iterato
         mask = os.umask(0)
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
+        if durable:
+            _sync(temporary)
         temporary.replace(target)
+        if durable:
+            _sync_folder(target.parent)
     except OSError as error:
         raise FabricError(str(target), f"cannot be written: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def require_writable(path: str | os.PathLike[str]) -> None:
+def require_writable(path: str | os.PathLike[str], *, clobber: bool = True) -> None:
     """Raise now what `whole_file` would raise once the work is done."""
-    _begin(path, clobber=True)[1].unlink(missing_ok=True)
+    _begin(path, clobber=clobber)[1].unlink(missing_ok=True)
+
+
+def _sync(path: Path) -> None:
+    """Wait until the file's content is on the disk."""
+    handle = os.open(path, os.O_RDWR | getattr(os, "O_BINARY", 0))
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Wait until the names in a folder are on the disk, where the system can do that."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def _begin(path: str | os.PathLike[str], *, clobber: bool) -> tuple[Path, Path]:
@@ -56,19 +90,19 @@ def _begin(path: str | os.PathLike[str], *, clobber: bool) -> tuple[Path, Path]:
             str(target), f"is in '{target.parent}', which is no directory; make it first"
         )
     try:
+        # The temporary name is shorter: a name that is too long would be refused after the work.
+        with suppress(FileNotFoundError):
+            os.lstat(target)
+        remove_partial_files_once(target.parent)
         handle, name = tempfile.mkstemp(
-            prefix=f".{target.stem}{_PARTIAL}", suffix=target.suffix, dir=target.parent
+            prefix=partial_prefix(target.stem), suffix=target.suffix, dir=target.parent
         )
     except OSError as error:
         raise FabricError(str(target), f"cannot be written: {error.strerror}") from error
+    except ValueError as error:
+        raise FabricError(repr(str(target)), f"is no file name: {error}") from None
     os.close(handle)
     return target, Path(name)
-
-
-def remove_partial_files(folder: Path) -> None:
-    """Remove what `whole_file` left in `folder` when its process was killed."""
-    for path in folder.glob(f".*{_PARTIAL}*"):
-        path.unlink(missing_ok=True)
 
 
 def readable_file(path: str | os.PathLike[str], missing: str = "") -> Path:

@@ -11,7 +11,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from fabricusd.errors import FabricError, one_line
+from fabricusd.errors import FabricError, one_line, reads
 from fabricusd.files import readable_file, whole_file
 from fabricusd.srgb import linear_from_srgb
 
@@ -97,14 +97,18 @@ def _write(path: str | os.PathLike[str], spec: Any, data: NDArray[Any]) -> None:
         output = oiio.ImageOutput.create(str(temporary))
         if output is None:
             raise FabricError(str(path), "is no picture format; it must end in .exr or .png")
-        good = output.open(str(temporary), spec) and output.write_image(data) and output.close()
-        reason = _reason(output)
-        # The file is complete only once the writer is gone.
-        del output
+        try:
+            good = output.open(str(temporary), spec) and output.write_image(data) and output.close()
+            reason = _reason(output)
+        finally:
+            # The file is complete only once the writer is gone. Of an interrupt libpng complains.
+            with _silence():
+                del output
         if not good:
             raise FabricError(str(path), f"cannot be written: {reason}")
 
 
+@reads("a picture")
 def read_flat(
     path: str | os.PathLike[str], largest: int
 ) -> tuple[NDArray[np.uint8] | NDArray[np.float32], int]:
@@ -140,6 +144,7 @@ def read_flat(
     return np.asarray(pixels).reshape(spec.height, spec.width, used), alpha
 
 
+@reads("a picture")
 def read_image(
     path: str | os.PathLike[str], *, color_space: str = "auto", most: int = 0
 ) -> NDArray[np.float32]:
@@ -158,6 +163,7 @@ def read_image(
     return np.ascontiguousarray(pixels, np.float32)
 
 
+@reads("a picture")
 def read_alpha(path: str | os.PathLike[str], *, most: int = 0) -> NDArray[np.float32]:
     """(h, w, 1) float32 opacity of a picture, 1 where it has none; otherwise as `read_image`."""
     pixels, spec = _stored_pixels(path)
@@ -190,6 +196,7 @@ def _shrunk(pixels: NDArray[np.float32], most: int) -> NDArray[np.float32]:
     return np.asarray(blocks.mean(axis=(1, 3)))
 
 
+@reads("a picture")
 def read_exr_layers(
     path: str | os.PathLike[str],
 ) -> tuple[dict[str, NDArray[np.float32]], dict[str, Any]]:
@@ -278,18 +285,22 @@ def write_16_bit(
             spec.attribute(key, value)
         good = output is not None and output.open(str(temporary), spec)
         row = 0
-        for band in bands if good else ():
-            pixels = np.zeros((*band.shape[:2], kept), np.uint16)
-            pixels[..., :channels] = band
-            good = good and output.write_scanlines(row, row + len(band), 0, pixels)
-            row += len(band)
-        good = good and output.close()
-        reason = _reason(output) if output is not None else "no writer"
-        del output
+        try:
+            for band in bands if good else ():
+                pixels = np.zeros((*band.shape[:2], kept), np.uint16)
+                pixels[..., :channels] = band
+                good = good and output.write_scanlines(row, row + len(band), 0, pixels)
+                row += len(band)
+            good = good and output.close()
+            reason = _reason(output) if output is not None else "no writer"
+        finally:
+            with _silence():
+                del output
         if not good:
             raise FabricError(str(path), f"cannot be written: {reason}")
 
 
+@reads("a picture")
 def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.float32]:
     """(h, w, c) float32 pixels of one mip level, values as they are in the file."""
     plain = oiio.ImageSpec()
@@ -301,6 +312,7 @@ def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.f
     return np.asarray(buffer.get_pixels(oiio.FLOAT), np.float32)
 
 
+@reads("a picture")
 def read_middle(path: str | os.PathLike[str], most: int) -> NDArray[np.float32]:
     """(h, w, c) float32 middle of a square texture, at most `most` a side.
 

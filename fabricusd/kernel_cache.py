@@ -37,9 +37,9 @@ def forget_stale_kernels(package: Path = PACKAGE) -> bool:
     stamp = package / "__pycache__" / STAMP
     now = fingerprint(folders)
     # Without a stamp, whatever is cached is of unknown age.
-    if stamp.exists() and stamp.read_text() == now:
-        return False
     try:
+        if stamp.exists() and stamp.read_bytes() == now.encode():
+            return False
         for folder in folders:
             for pattern in ("*.nbi", "*.nbc"):
                 for cached in (folder / "__pycache__").glob(pattern):

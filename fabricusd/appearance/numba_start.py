@@ -13,6 +13,10 @@ import numba.core.typing.arraydecl  # noqa: F401
 from numba.core.caching import FunctionCache
 from numba.core.runtime import rtsys
 
+from fabricusd.appearance.damaged_cache import forgive_damage
+
+forgive_damage()
+
 
 def load_without_blas() -> None:
     """Load numba's array functions without the linear algebra of scipy.

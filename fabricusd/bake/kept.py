@@ -144,7 +144,7 @@ class KeptLayout:
 def write_block(path: Path, parts: Sequence[NDArray[Any]]) -> None:
     """A block's file, whole or not at all, its checksum at the end."""
     digest = hashlib.blake2b(digest_size=DIGEST)
-    with whole_file(path) as temporary, temporary.open("wb") as stream:
+    with whole_file(path, durable=False) as temporary, temporary.open("wb") as stream:
         for part in parts:
             data = np.ascontiguousarray(part).tobytes()
             digest.update(data)

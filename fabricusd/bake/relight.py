@@ -29,7 +29,7 @@ from fabricusd.appearance.weave import NO_THREAD
 from fabricusd.bake.angle_shape import COUNTS, angle_shapes
 from fabricusd.bake.encoding import Encoding
 from fabricusd.bake.planes import PARTS
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, reads
 from fabricusd.fabric import Fabric
 from fabricusd.files import readable_file
 from fabricusd.images import read_mip_level
@@ -58,6 +58,7 @@ class BakedSet:
     manifest: dict[str, Any]
 
     @classmethod
+    @reads("a bake")
     def load(cls, folder: str | Path) -> BakedSet:
         """Read the manifest of `folder`; FabricError where there is none."""
         path = readable_file(Path(folder) / "manifest.json")

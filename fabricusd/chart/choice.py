@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from fabricusd.appearance.footprint import Limits
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, reads
 from fabricusd.files import readable_file, whole_file
 from fabricusd.reference.scene import FabricSurface, Scene
 
@@ -40,6 +40,7 @@ class Choice:
 
 
 @cache
+@reads("a table of choices")
 def read_table(path: Path = TABLE) -> dict[str, Front]:
     """Preset -> front of its shadowing methods; FabricError for a file that is no such table."""
     return {
@@ -49,6 +50,7 @@ def read_table(path: Path = TABLE) -> dict[str, Front]:
 
 
 @cache
+@reads("a table of choices")
 def read_limits(path: Path = TABLE) -> dict[str, dict[str, dict[float, float]]]:
     """Preset -> level -> bound -> limit, as `level_errors.coarsest` has them."""
     return {

@@ -6,6 +6,7 @@ import argparse
 import sys
 from typing import Any
 
+from fabricusd.cli.number import number
 from fabricusd.errors import FabricError
 
 EPILOG = """example:
@@ -57,7 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="EXR with half floats and mip levels; PNG and TIFF hold 16-bit integers",
     )
     parser.add_argument("--resume", action="store_true", help="go on with a bake that was stopped")
-    parser.add_argument("--workers", type=int, metavar="N", help="default: all processors")
+    parser.add_argument(
+        "--workers", type=number("workers"), metavar="N", help="default: all processors"
+    )
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
     parser.add_argument("--no-clobber", action="store_true", help="never bake into a full folder")
 

@@ -6,6 +6,9 @@ import argparse
 import sys
 from pathlib import Path
 
+from fabricusd.errors import FabricError
+from fabricusd.files import require_writable
+
 EPILOG = """writes charts.csv, charts.json, charts.md, and a PNG and an SVG of each panel into DIR;
 sheets are the thesis's pictures remade, and part of a chart that is neither quick nor partial
 
@@ -31,10 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure; print the names of the files."""
+    # Hours of measuring lie between here and the first file.
+    for target in filter(None, (options.choice, options.stability, options.page)):
+        require_writable(target)
     from fabricusd.chart.make import make_charts
     from fabricusd.chart.registry import PANELS
     from fabricusd.chart.sheets import SHEETS
-    from fabricusd.errors import FabricError
 
     if options.choice:
         from fabricusd.chart.choice import write_table

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from dataclasses import asdict
+
+from fabricusd.cli.number import number
 
 EPILOG = """A is measured against the reference B; EXR is radiance, the rest display colours
 
@@ -23,17 +24,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("b", metavar="B", help="reference")
     parser.add_argument("-o", "--output", metavar="PNG", help="draw where they differ, by FLIP")
     parser.add_argument("--json", action="store_true", help="figures as JSON")
-    parser.add_argument("--max-flip", type=_bound, metavar="X", help="status 1 above this mean")
     parser.add_argument(
-        "--max-error", type=_bound, metavar="DE", help="status 1 above this mean delta E 2000"
+        "--max-flip", type=number("difference"), metavar="X", help="status 1 above this mean"
     )
-
-
-def _bound(text: str) -> float:
-    value = float(text)
-    if not (math.isfinite(value) and value >= 0):
-        raise argparse.ArgumentTypeError(f"'{text}' must be a number of at least 0")
-    return value
+    parser.add_argument(
+        "--max-error",
+        type=number("difference"),
+        metavar="DE",
+        help="status 1 above this mean delta E 2000",
+    )
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,7 +1,9 @@
 """`fabricusd`: finds the command, runs it, turns its result into an exit status.
 
-0 done, 1 findings or short of the bound that was asked for, 2 bad input. Data goes to stdout,
-everything else to stderr. To add a command: a module in this folder with `HELP`, `add_arguments`
+0 done, 1 findings or short of the bound that was asked for, 2 bad input, in one line on stderr; 130
+interrupted. An error of fabricusd itself is one line and status 2 as well, and begins with the
+words "internal error"; FABRICUSD_DEBUG=1 shows where. Data goes to stdout, everything else to
+stderr. To add a command: a module in this folder with `HELP`, `add_arguments`
 and `run`, and its name in COMMANDS. Only the module of the command that is asked for is imported.
 """
 
@@ -9,13 +11,19 @@ from __future__ import annotations
 
 import argparse
 import sys
+import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from typing import NoReturn
 
 from fabricusd import __version__
 from fabricusd.cli.stdout import drop_stdout, ready_stdout
-from fabricusd.errors import FabricError, one_line
+from fabricusd.errors import FabricError, debugging, described, one_line
+from fabricusd.partial_files import remove_own_partial_files
+from fabricusd.stop import Stop
+
+INTERNAL = "internal error"
 
 COMMANDS = {
     "new": "make a fabric from a preset, a weave, an image or a WIF draft",
@@ -77,26 +85,46 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _Parser(prog=f"fabricusd {command}").error(f"unrecognized arguments: {' '.join(unknown)}")
     ready_stdout()
     try:
-        status: int = options.run(options)
-        sys.stdout.flush()
-        return status
-    except FabricError as error:
+        with Stop():
+            status: int = options.run(options)
+            sys.stdout.flush()
+            return status
+    except KeyboardInterrupt:
+        # An interrupt may have come between a file's beginning and the first chance to remove it.
+        remove_own_partial_files()
+        _say("interrupted")
+        return 130
+    except Exception as error:
+        if debugging():
+            traceback.print_exc()
+        return _status_of(error)
+
+
+def _status_of(error: Exception) -> int:
+    """Say in one line what a command raised; returns the status for it."""
+    if isinstance(error, FabricError):
         return refused(str(error))
-    except BrokenPipeError:
+    if isinstance(error, BrokenPipeError):
         # A reader such as `head` has had enough.
         drop_stdout()
         return 0
-    except OSError as error:
+    if isinstance(error, OSError):
         drop_stdout()
-        return refused(f"{error.filename or 'the output'} cannot be written: {error.strerror}")
-    except MemoryError:
+        where = error.filename or "the output"
+        return refused(f"{where} cannot be read or written: {error.strerror or described(error)}")
+    if isinstance(error, MemoryError):
         return refused("there is not memory enough for that")
-    except KeyboardInterrupt:
-        print("fabricusd: interrupted", file=sys.stderr)
-        return 130
+    hint = "" if debugging() else " with what FABRICUSD_DEBUG=1 shows of it"
+    return refused(f"{INTERNAL}: {described(error)}; please report it{hint}")
 
 
 def refused(line: str) -> int:
     """Say what was refused; returns the status for it."""
-    print(f"fabricusd: {one_line(line)}", file=sys.stderr)
+    _say(line)
     return 2
+
+
+def _say(line: str) -> None:
+    # The terminal may be gone.
+    with suppress(OSError, ValueError):
+        print(f"fabricusd: {one_line(line)}", file=sys.stderr)

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
+
+from fabricusd.errors import FabricError
+from fabricusd.files import require_writable
 
 EPILOG = """example:
   fabricusd material baked
@@ -37,10 +41,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-clobber", action="store_true", help="never overwrite a look")
 
 
+def _require_targets(options: argparse.Namespace) -> None:
+    """Refuse before the fits what could not be written after them."""
+    if options.usdz is not None:
+        if not options.usdz.endswith(".usdz"):
+            raise FabricError(f"--usdz '{options.usdz}'", "has another suffix; it must be .usdz")
+        require_writable(options.usdz, clobber=not options.no_clobber)
+    if options.u3m is not None and not os.path.isdir(options.u3m):
+        raise FabricError(f"--u3m '{options.u3m}'", "is no directory; make it first")
+
+
 def run(options: argparse.Namespace) -> int:
     """Write the look; print the names of the files."""
     from pathlib import Path
 
+    _require_targets(options)
     from fabricusd.preview.materials import write_materials
     from fabricusd.preview.recipes import Settings
 

@@ -6,8 +6,10 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
+from fabricusd.cli.number import number
 from fabricusd.cli.stdout import write_utf8
 from fabricusd.errors import FabricError
+from fabricusd.ranges import RANGES
 
 if TYPE_CHECKING:
     from fabricusd.fabric import Fabric, Thread
@@ -15,13 +17,6 @@ if TYPE_CHECKING:
 
 LONGEST_ORDER = 16384
 """Most threads of one colour in a row; also the largest draft that is read."""
-
-NUMBERS = {
-    "ends_per_cm": (0.01, 10000.0, "ends/cm"),
-    "picks_per_cm": (0.01, 10000.0, "picks/cm"),
-    "thickness": (0.0, 1000.0, "mm"),
-}
-"""Least and most that a number on the command line may be; more or less is a mistaken unit."""
 
 EPILOG = """WEAVE is a name (plain, basket 2/2, twill 2/1 S, satin 8 step 3, herringbone 2/2 8,
 houndstooth, ...) or an expression in end i and pick j (mod(2*i + j, 5) < 4).
@@ -60,8 +55,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             metavar="COLOR",
             help=f"colours of the {noun} in order: #rrggbb, linear r,g,b, or COUNT*COLOR",
         )
-        parser.add_argument(f"--{noun}-per-cm", type=float, metavar="N", help=f"{which} density")
-    parser.add_argument("--thickness", type=float, metavar="MM", help="of the threads")
+        density = f"{noun}_per_cm"
+        parser.add_argument(
+            f"--{noun}-per-cm", type=number(density), metavar="N", help=f"{which} density"
+        )
+    parser.add_argument(
+        "--thickness", type=number("thickness"), metavar="MM", help="of the threads"
+    )
     parser.add_argument("--invert", action="store_true", help="image: white is warp on top")
     parser.add_argument("-n", "--dry-run", action="store_true", help="write nothing")
     parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
@@ -86,7 +86,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
-    _require_numbers(options)
     if options.preset is not None:
         from fabricusd.schema.read import load
         from fabricusd.schema.source import preset_names
@@ -116,15 +115,6 @@ def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
 
 def _flag(option: str) -> str:
     return f"--{option.replace('_', '-')}"
-
-
-def _require_numbers(options: argparse.Namespace) -> None:
-    for option, (low, high, unit) in NUMBERS.items():
-        value = getattr(options, option)
-        if value is not None and not low <= value <= high:
-            raise FabricError(
-                _flag(option), f"is {value:g}; it must be from {low:g} to {high:g} {unit}"
-            )
 
 
 def _draft(options: argparse.Namespace) -> Draft:
@@ -173,7 +163,10 @@ def _color_order(items: list[str] | None, where: str) -> list[tuple[float, float
             raise FabricError(
                 where, f"has the count '{count}'; it must be from 1 to {LONGEST_ORDER}"
             )
-        order += [parse_color(color, where)] * (int(count) if star else 1)
+        rgb = parse_color(color, where)
+        for value in rgb:
+            RANGES["color"].require(where, value)
+        order += [rgb] * (int(count) if star else 1)
     return order
 
 

@@ -10,7 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fabricusd.errors import FabricError
+from fabricusd.cli.number import number
+from fabricusd.errors import FabricError, one_line
+from fabricusd.ranges import RANGES, require_picture
 
 if TYPE_CHECKING:
     from fabricusd.fabric import Fabric
@@ -34,20 +36,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fabric", metavar="FILE[:/PRIM]", help="fabric file, draft or preset")
     parser.add_argument("--camera", metavar="PATH", help="prim path (default: the first camera)")
     parser.add_argument(
-        "--width", type=int, default=960, help="the camera's horizontal aperture fills it"
+        "--width",
+        type=number("width"),
+        default=960,
+        help="the camera's horizontal aperture fills it",
     )
-    parser.add_argument("--height", type=int, default=540)
-    parser.add_argument("--spp", type=int, metavar="N", help="samples a pixel (default: 64)")
+    parser.add_argument("--height", type=number("height"), default=540)
     parser.add_argument(
-        "--noise", type=float, metavar="E", help="stop a pixel at this relative error"
+        "--spp", type=number("spp"), metavar="N", help="samples a pixel (default: 64)"
     )
-    parser.add_argument("--max-bounces", type=int, default=4, metavar="N")
+    parser.add_argument(
+        "--noise", type=number("noise"), metavar="E", help="stop a pixel at this relative error"
+    )
+    parser.add_argument("--max-bounces", type=number("max_bounces"), default=4, metavar="N")
     parser.add_argument("--level", choices=("auto", "far", "weave", "thread"), default="auto")
     parser.add_argument(
         "--shadow", choices=("none", "peak", "horizon", "traced"), help="default: horizon"
     )
     parser.add_argument(
-        "--max-error", type=float, metavar="E", help="choose --shadow, and --noise, by this bound"
+        "--max-error",
+        type=number("max_error"),
+        metavar="E",
+        help="choose --shadow, and --noise, by this bound",
     )
     parser.add_argument(
         "--complexity", choices=("auto", "low", "medium", "high", "veryhigh"), default="auto",
@@ -55,15 +65,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--aov", action="append", default=[], metavar="LAYER", help="or 'all'")
     parser.add_argument("--frames", metavar="A-B", help="time codes: 7, 1-10, 1-10x2, or a list")
-    parser.add_argument("--exposure", type=float, default=0.0, metavar="STOPS", help="of the .png")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--workers", type=int, metavar="N", help="CPU threads (default: all)")
+    parser.add_argument(
+        "--exposure", type=number("exposure"), default=0.0, metavar="STOPS", help="of the .png"
+    )
+    parser.add_argument("--seed", type=number("seed"), default=0)
+    parser.add_argument(
+        "--workers", type=number("workers"), metavar="N", help="CPU threads (default: all)"
+    )
     parser.add_argument("-n", "--dry-run", action="store_true", help="read the scene only")
     parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
 
 
 def run(options: argparse.Namespace) -> int:
     """Render, and say what was left out."""
+    require_picture(options.width, options.height)
     from fabricusd.reference import AOVS, read_scene, render
 
     frames = None if options.frames is None else parse_frames(options.frames)
@@ -184,7 +199,13 @@ def parse_frames(text: str) -> tuple[float, ...]:
             a, b, stride = float(first), float(last or first), float(step or 1)
         except ValueError:
             raise FabricError("--frames", f"is '{text}'; it must be as in 1-10 or 1-10x2") from None
-        if not (stride > 0 and b >= a and (b - a) / stride < MOST_FRAMES):
+        for code in (a, b):
+            RANGES["frame"].require(f"--frames '{one_line(text, 60)}':", code)
+        if not (stride > 0 and b >= a):
             raise FabricError("--frames", f"is '{text}'; it must rise, by steps above 0")
+        if len(codes) + (b - a) / stride >= MOST_FRAMES:
+            raise FabricError(
+                "--frames", f"is '{text}'; it must be at most {MOST_FRAMES} frames in all"
+            )
         codes += [a + k * stride for k in range(int((b - a) / stride + 1e-9) + 1)]
     return tuple(codes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 
 
 def ready_stdout() -> None:
@@ -16,7 +17,9 @@ def ready_stdout() -> None:
 
 def drop_stdout() -> None:
     """Keep Python from complaining at exit of an output that takes no more."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    # What a program has put in its place may have no descriptor.
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def can_show(text: str) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, reads
 from fabricusd.fabric import Fabric
 from fabricusd.files import readable_file
 
@@ -81,6 +81,7 @@ class BakeFolder:
         return tuple(pair for one in self.garments for pair in one.missing)
 
 
+@reads("a bake")
 def read_bake_folder(path: str | os.PathLike[str]) -> BakeFolder:
     """The bake in a folder, wherever the folder is now. `FabricError` where there is none."""
     folder = Path(path)

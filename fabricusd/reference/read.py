@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, reads
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.files import readable_file
 from fabricusd.reference.fineness import Fineness
@@ -15,6 +15,7 @@ USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 MESH_SUFFIXES = (".obj", ".glb", ".gltf", ".ply")
 
 
+@reads("a scene")
 def read_scene(
     source: str | os.PathLike[str],
     *,

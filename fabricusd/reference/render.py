@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import platform
 import time
@@ -22,6 +21,7 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.files import require_writable
 from fabricusd.images import write_exr, write_png
+from fabricusd.ranges import RANGES, require_picture, require_ranges
 from fabricusd.reference.camera import build_lens, default_camera
 from fabricusd.reference.compile_ahead import FAR, compile_ahead
 from fabricusd.reference.defaults import default_lights
@@ -29,10 +29,10 @@ from fabricusd.reference.film import AOVS, Film, require_aovs
 from fabricusd.reference.integrator import Tracer
 from fabricusd.reference.read import read_scene
 from fabricusd.reference.scene import Scene
-from fabricusd.reference.stop import Stop
 from fabricusd.reference.view_transform import view
 from fabricusd.reference.wave import Wave
 from fabricusd.reference.workers import Batches, pixels_along_z_curve, worker_count
+from fabricusd.stop import Stop
 
 BATCH = 1 << 13
 """Paths in a batch: enough that starting a stage costs little, few enough to stay in cache."""
@@ -118,11 +118,14 @@ def render(
     Raises `FabricError` for what cannot be rendered at all; what had to be left out is in the
     result's `notes`. On Ctrl-C what is done is written, and `complete` is False.
     """
-    _require_settings(width, height, spp, noise, exposure, seed)
+    _require_settings(width, height, spp, noise, max_bounces, seed, workers)
+    require_ranges(exposure=exposure)
     if shadow not in METHODS:
         raise FabricError("shadow", f"is '{shadow}'; it must be one of {', '.join(METHODS)}")
     layers = tuple(dict.fromkeys(("beauty", *aovs)))
     require_aovs(layers)
+    for code in frames or ():
+        RANGES["frame"].require("frames", code)
     targets = _targets(out, frames)
     compile_ahead(FAR)
     begun = time.perf_counter()
@@ -188,17 +191,18 @@ def _together(
 
 
 def _require_settings(
-    width: int, height: int, spp: int | None, noise: float | None, exposure: float, seed: int
+    width: int,
+    height: int,
+    spp: int | None,
+    noise: float | None,
+    max_bounces: int,
+    seed: int,
+    workers: int | None,
 ) -> None:
-    if not math.isfinite(exposure):
-        raise FabricError("exposure", f"is {exposure}; it must be a number of stops")
-    if not -(2**63) <= seed < 2**63:
-        raise FabricError("seed", f"is {seed}; it must fit into 64 bits")
-    for name, value in (("width", width), ("height", height), ("spp", spp)):
-        if value is not None and not 1 <= value <= 65536:
-            raise FabricError(name, f"is {value}; it must be from 1 to 65536")
-    if noise is not None and not 0 < noise < 10:
-        raise FabricError("noise", f"is {noise}; it must be above 0 and below 10")
+    require_picture(width, height)
+    require_ranges(max_bounces=max_bounces, seed=seed)
+    optional = {"spp": spp, "noise": noise, "workers": workers}
+    require_ranges(**{name: value for name, value in optional.items() if value is not None})
 
 
 def _targets(
@@ -278,6 +282,7 @@ def render_scene(
 
     stop : what asks for an end; it holds from the first sample on, and is the caller's to release
     """
+    _require_settings(width, height, spp, noise, max_bounces, seed, workers)
     begun = time.perf_counter()
     most = spp or (MOST_SAMPLES if noise else 64)
     if not scene.lights:

@@ -17,6 +17,9 @@ from fabricusd.srgb import linear_from_srgb, srgb_from_linear
 _A, _B, _C, _D, _E = 2.51, 0.03, 2.43, 0.59, 0.14
 GREY = 0.18
 
+MOST_STOPS = 500.0
+"""A factor whose product with any float32 is a finite float64."""
+
 
 def _grey_scale() -> float:
     """The exposure at which the curve maps GREY to GREY: the root of its quadratic."""
@@ -46,5 +49,7 @@ def srgb_decode(code: NDArray[Any]) -> NDArray[np.float64]:
 
 def view(radiance: NDArray[Any], exposure: float = 0.0) -> NDArray[np.uint8]:
     """(..., 3) radiance to 8-bit sRGB, `exposure` in stops."""
-    code = srgb_encode(tone_curve(np.asarray(radiance, np.float64) * 2.0**exposure))
+    # A camera in a file may have any; beyond these all is white, or black.
+    stops = min(max(exposure, -MOST_STOPS), MOST_STOPS)
+    code = srgb_encode(tone_curve(np.asarray(radiance, np.float64) * 2.0**stops))
     return np.asarray(np.round(code * 255.0), np.uint8)

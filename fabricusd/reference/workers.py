@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.errors import FabricError
-from fabricusd.reference.stop import Stop
+from fabricusd.ranges import require_ranges
+from fabricusd.stop import Stop
 
 
 def worker_count(workers: int | None) -> int:
@@ -21,8 +21,7 @@ def worker_count(workers: int | None) -> int:
             return len(os.sched_getaffinity(0))
         except AttributeError:
             return os.cpu_count() or 1
-    if workers < 1:
-        raise FabricError("workers", f"is {workers}; it must be at least 1")
+    require_ranges(workers=workers)
     return workers
 
 

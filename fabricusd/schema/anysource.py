@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from fabricusd.errors import reads
 from fabricusd.fabric import Fabric
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".gif", ".jpg", ".jpeg", ".exr", ".tga", ".webp")
@@ -15,6 +16,7 @@ def is_draft(source: str | os.PathLike[str]) -> bool:
     return Path(source).suffix.lower() in (".wif", *IMAGE_SUFFIXES)
 
 
+@reads("a fabric")
 def load_any(source: str | os.PathLike[str]) -> tuple[Fabric, tuple[str, ...]]:
     """(fabric, what was noticed on the way). FabricError as the reader of that kind raises it."""
     text = os.fspath(source)

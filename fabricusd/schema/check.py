@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 
 from pxr import Usd
 
+from fabricusd.errors import reads
 from fabricusd.schema.anysource import is_draft, load_any
 from fabricusd.schema.rules import PRESENT, RULES, applies, kinds, run
 from fabricusd.schema.source import find_prim, no_warnings, open_stage, split_source, usd_errors
@@ -55,6 +56,7 @@ def check_prim(prim: Usd.Prim, file: str = "", *, fatal: bool = False) -> Iterat
                 )
 
 
+@reads("a fabric")
 def check(source: str | os.PathLike[str]) -> list[Finding]:
     """Every finding in a USD file or a preset, in stage order; of a draft, what its import assumed.
 

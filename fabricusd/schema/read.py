@@ -10,7 +10,7 @@ from typing import Any
 
 from pxr import Usd
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, reads
 from fabricusd.fabric import Binding, Fabric, TangentCurve, Thread, ThreadSet, Weave
 from fabricusd.schema import attributes, weave_rows
 from fabricusd.schema.access import over_above, targets, value
@@ -31,6 +31,7 @@ Note = Callable[[str], None]
 _BACK = "fabric:back"
 
 
+@reads("a fabric")
 def load(source: str | os.PathLike[str]) -> Fabric:
     """The fabric in `FILE[:/PRIM]`, or a preset by its name.
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pxr import Sdf, Tf, Usd, UsdUtils
 
-from fabricusd.errors import FabricError, one_line
+from fabricusd.errors import FabricError, one_line, reads
 from fabricusd.files import readable_file
 
 PRESETS = Path(__file__).resolve().parent / "presets"
@@ -42,6 +42,7 @@ def split_source(source: str | os.PathLike[str]) -> tuple[Path, str]:
     return Path(file), prim
 
 
+@reads("USD")
 def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
     """Open the stage of a file or a preset, with every composition error raised.
 
@@ -88,6 +89,7 @@ def no_warnings() -> Iterator[None]:
         del silence
 
 
+@reads("USD")
 def flattened(source: str | os.PathLike[str]) -> str:
     """The composed stage of `source` as USD text; FabricError as from `open_stage`."""
     stage, file = open_stage(source)

@@ -168,6 +168,14 @@ BAD = {
     "check of a folder": ["check", "."],
     "check of a prim that is not there": ["check", "velvet:/Nowhere"],
     "flatten of a prim that is not there": ["cat", "velvet:/Nowhere", "--flatten"],
+    "a package of another kind": ["material", ".", "--usdz", "a.zip"],
+    "a package in no folder": ["material", ".", "--usdz", "nowhere/a.usdz"],
+    "a swatch in no folder": ["material", ".", "--u3m", "nowhere"],
+    "a page in no folder": ["chart", "-o", "out", "--page", "nowhere/a.md"],
+    "a table of choices in no folder": ["chart", "--choice", "nowhere/a.json"],
+    "a stability page in no folder": ["chart", "-o", "out", "--stability", "nowhere/a.md"],
+    "charts where a file is": ["chart", "-o", "taken", "--panel", "zoom"],
+    "charts of an unknown panel": ["chart", "-o", "out", "--panel", "nothing"],
     "a demo where a file is": ["demo", "-o", "taken"],
 }
 

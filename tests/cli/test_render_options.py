@@ -40,8 +40,6 @@ REFUSED = {
     "a picture beside it that is a folder": ("x.png/", [], "x.png is a directory"),
     "a name that is too long": ("", ["-o", "x" * 300 + ".exr"], "cannot be written: File name too"),
     "an empty list of frames": ("", ["--frames", ""], "--frames is ''"),
-    "a seed beyond 64 bits": ("", ["--seed", "99999999999999999999"], "seed is 99999999999999999"),
-    "an exposure that is no number": ("", ["--exposure", "nan"], "exposure is nan"),
 }  # fmt: skip
 
 
@@ -56,7 +54,7 @@ def test_what_cannot_be_done_is_refused_before_the_work(tmp_path, capsys, monkey
         (tmp_path / lies).write_text("kept")
     before = sorted(p.name for p in tmp_path.iterdir())
     out = str(tmp_path / "x.exr")
-    size = ["--width", "20000", "--height", "20000"]
+    size = ["--width", "16384", "--height", "16384"]
     assert main(["render", str(tmp_path / "x.obj"), "-o", out, *size, *arguments]) == 2
     assert words in capsys.readouterr().err
     assert sorted(p.name for p in tmp_path.iterdir()) == before

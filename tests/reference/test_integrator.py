@@ -20,6 +20,7 @@ from fabricusd.reference.scene import (
     PreviewSurface,
 )
 from fabricusd.schema import load
+from fabricusd.stop import Stop
 from tests.reference.scenes import (
     above,
     cloth,
@@ -276,8 +277,16 @@ def test_a_seed_repeats_and_another_one_does_not():
 
 
 def test_the_first_samples_of_a_long_picture_are_those_of_a_short_one():
-    short, long = _small(spp=16), _small(spp=32)
-    assert worst_z(short, long) < z_limit(48)
+    stop = Stop()
+
+    def after_the_first_samples(share, seconds):
+        stop.asked = share > 15.5 / 48
+
+    short = _small(spp=16)
+    long = _small(spp=48, stop=stop, progress=after_the_first_samples)
+    assert not long.complete
+    assert long.samples == short.samples == 16
+    assert np.array_equal(long.layers["beauty"], short.layers["beauty"])
 
 
 def _small(**settings):

@@ -155,13 +155,13 @@ def test_progress_is_that_of_all_frames_and_never_falls(tmp_path):
 BAD_SETTINGS = {
     "no width": ({"width": 0}, "width is 0"),
     "no samples": ({"spp": 0}, "spp is 0"),
-    "negative noise": ({"noise": -1.0}, "noise is -1.0"),
+    "negative noise": ({"noise": -1.0}, "noise is -1;"),
     "an unknown layer": ({"aovs": ("beuaty",)}, "aov is 'beuaty'"),
     "an unknown level": ({"level": "near"}, "level is 'near'"),
     "an unknown shadow": ({"shadow": "soft"}, "shadow is 'soft'"),
     "an unknown filter": ({"pixel_filter": "sinc"}, "pixel filter is 'sinc'"),
     "no worker": ({"workers": 0}, "workers is 0"),
-    "negative bounces": ({"max_bounces": -1}, "max bounces is -1"),
+    "negative bounces": ({"max_bounces": -1}, "max_bounces is -1"),
 }
 
 

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM, once and often: what is done is kept, and files are whole."""
+"""Ctrl-C, SIGTERM and SIGHUP, once and often: what is done is kept, and files are whole."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from fabricusd.images import read_exr_layers
 from fabricusd.reference.render import render
 from fabricusd.reference.scene import Scene
-from fabricusd.reference.stop import SIGNALS, Stop
+from fabricusd.stop import SIGNALS, Stop
 from tests.reference.scenes import grid, lambert
 from tests.reference.stages import new_stage, square
 
@@ -20,7 +20,8 @@ def handlers_of_a_terminal():
     """What runs in the background of a script is started with Ctrl-C ignored."""
     before = {number: signal.getsignal(number) for number in SIGNALS}
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    for number in SIGNALS[1:]:
+        signal.signal(number, signal.SIG_DFL)
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
@@ -92,3 +93,25 @@ def test_an_interrupt_in_a_frames_last_moments_leaves_out_the_next_ones(tmp_path
     )
     assert not r.complete
     assert [p.rsplit("/", 1)[1] for p in r.paths] == ["x.0001.exr", "x.0001.png"]
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows has no SIGHUP")
+def test_a_hangup_that_is_ignored_stays_ignored_as_under_nohup():
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    with Stop() as stop:
+        signal.raise_signal(signal.SIGHUP)
+        assert not stop.asked
+    assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+
+
+def test_of_two_the_inner_one_hears_and_the_outer_one_is_given_back():
+    with Stop() as outer:
+        handler = signal.getsignal(signal.SIGTERM)
+        with Stop() as inner:
+            inner.hold()
+            signal.raise_signal(signal.SIGTERM)
+            assert (inner.asked, outer.asked) == (True, False)
+        assert signal.getsignal(signal.SIGTERM) == handler
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        assert outer.asked

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from fabricusd.bake.btf.factors import Factors
 from fabricusd.bake.btf.interpolate import evaluate
 from fabricusd.bake.btf.matrix import Btf
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, reads
 from fabricusd.files import readable_file, whole_file
 from fabricusd.images import read_exr_layers, write_exr
 
@@ -65,6 +65,7 @@ def write_factored(path: str | os.PathLike[str], one: FactoredBtf) -> None:
         )
 
 
+@reads("a factored BTF")
 def read_factored(path: str | os.PathLike[str]) -> FactoredBtf:
     """Read what `write_factored` wrote; FabricError for anything else."""
     try:
@@ -113,6 +114,7 @@ def write_atlas(stem: str | os.PathLike[str], one: FactoredBtf) -> tuple[Path, P
     return places, angles
 
 
+@reads("an atlas of a BTF")
 def read_atlas(stem: str | os.PathLike[str]) -> FactoredBtf:
     """Read what `write_atlas` wrote."""
     places, said = read_exr_layers(Path(f"{stem}.components.exr"))

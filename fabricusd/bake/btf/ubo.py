@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fabricusd.bake.btf.factors import Factors
 from fabricusd.bake.btf.matrix import Btf
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, reads
 from fabricusd.files import readable_file, whole_file
 
 JOINT, PER_CHANNEL = b"!FMF06FC", b"!DFMF08FC"
@@ -94,6 +94,7 @@ def _angles(directions: NDArray[np.float64]) -> NDArray[np.float32]:
     return np.stack((np.arccos(np.clip(z, -1, 1)), np.arctan2(y, x)), axis=1).astype("<f4")
 
 
+@reads("a .btf file")
 def read_ubo(path: str | os.PathLike[str]) -> UboFile:
     """Read what `write_ubo` wrote; FabricError for anything else."""
     data = readable_file(path).read_bytes()

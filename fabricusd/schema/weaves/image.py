@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, reads
 from fabricusd.fabric import Weave
 from fabricusd.schema.weaves.color import (
     RGB,
@@ -40,6 +40,7 @@ MOST_COLORS = 64
 """More colours than this are a photograph, not threads."""
 
 
+@reads("a draft")
 def read_image(
     path: str | os.PathLike[str],
     *,

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, reads
 from fabricusd.fabric import Weave
 from fabricusd.schema.weaves.color import palette_from_codes
 from fabricusd.schema.weaves.draft import LIMIT, Draft, quoted
@@ -33,6 +33,7 @@ from fabricusd.schema.weaves.wif_syntax import (
 ColorTable = tuple[dict[int, int], NDArray[np.int64], tuple[int, int]]
 
 
+@reads("a WIF draft")
 def read_wif(path: str | os.PathLike[str]) -> Draft:
     """The draft in the WIF file `path`.
 

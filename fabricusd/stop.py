@@ -1,4 +1,4 @@
-"""Ctrl-C, and the signal by which other programs ask for an end, without losing a picture."""
+"""Ctrl-C, and the signals by which others ask for an end, without losing a picture."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ import threading
 from types import FrameType, TracebackType
 from typing import Any
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
+"""Ctrl-C, the end that other programs ask for, and that of the terminal. Windows has no SIGHUP."""
 
 
 class Stop:
@@ -15,7 +18,8 @@ class Stop:
 
     Between `hold` and `release` they only set `asked`, however often they come: a picture is being
     made or written, and whoever makes it looks at `asked`. Handlers that the caller has installed
-    are left alone, and so is every thread but the main one, which alone may have any.
+    are left alone, and so are signals that are ignored, as nohup ignores SIGHUP, and every thread
+    but the main one, which alone may have handlers. Inside another `Stop` the inner one hears.
     """
 
     def __init__(self) -> None:
@@ -27,7 +31,8 @@ class Stop:
         if threading.current_thread() is threading.main_thread():
             for number in SIGNALS:
                 before = signal.getsignal(number)
-                if before in (signal.default_int_handler, signal.SIG_DFL):
+                nobody = before in (signal.default_int_handler, signal.SIG_DFL)
+                if nobody or isinstance(getattr(before, "__self__", None), Stop):
                     signal.signal(number, self._hear)
                     self._before[number] = before
         return self
