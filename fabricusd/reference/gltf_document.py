@@ -83,7 +83,7 @@ class Document:
     def entry(
         self, holder: dict[str, Any], key: str, kind: type, where: str, default: Any = None
     ) -> Any:
-        """`holder[key]` if it is of the `kind`, whole numbers from 0; `default` where it is missing."""
+        """`holder[key]` if it is of the `kind`, numbers from 0; `default` where it is missing."""
         value = holder.get(key, default)
         if value is default:
             return default
@@ -229,17 +229,13 @@ class Document:
                 f"ends at byte {begin + length}; its buffer has {len(data)}",
             )
         if need > length:
-            self.refuse(
-                name, f"takes {need} bytes for {count} values; {where} has {length}"
-            )
+            self.refuse(name, f"takes {need} bytes for {count} values; {where} has {length}")
         if not count:
             return np.zeros((0, width), kind)
-        return np.ndarray(
-            (count, width), kind, data, begin + offset, (stride, kind.itemsize)
-        )
+        return np.ndarray((count, width), kind, data, begin + offset, (stride, kind.itemsize))
 
     def _buffer(self, view: dict[str, Any], where: str) -> bytes:
-        number = view.get("buffer")
+        number: Any = view.get("buffer")
         buffer = self.one("buffers", number, f"{where}.buffer")
         if number in self._buffers:
             return self._buffers[number]

@@ -111,10 +111,10 @@ def _matrix(file: Document, node: dict[str, Any], name: str) -> NDArray[np.float
     return matrix
 
 
-def inverse_binds(
+def joint_matrices(
     file: Document, skin: int, worlds: dict[int, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """(joints, 4, 4) what each joint of a skin does to the mesh: its place now, from that at rest."""
+    """(joints, 4, 4) what each joint of a skin does to the mesh, from its place at binding."""
     name = f"skins[{skin}]"
     one = file.one("skins", skin, "skin")
     joints = file.entry(one, "joints", list, name, [])
@@ -125,7 +125,8 @@ def inverse_binds(
         inverse = file.array(one["inverseBindMatrices"], f"{name}.inverseBindMatrices", ("MAT4",))
         if len(inverse) < len(joints):
             file.refuse(
-                f"{name}.inverseBindMatrices", f"holds {len(inverse)}; there are {len(joints)} joints"
+                f"{name}.inverseBindMatrices",
+                f"holds {len(inverse)}; there are {len(joints)} joints",
             )
         matrices = matrices @ inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
     return np.asarray(matrices)

@@ -48,8 +48,8 @@ def read_mesh_file(path: Path, binding: Binding | None, units: str | None = None
         scene.materials.append(FabricSurface(name=binding.fabric.name, binding=binding))
     else:
         scene.note(path.name, "is rendered grey: no fabric is named for it")
-    for piece, problem in file.notes:
-        scene.note(_place(path, piece), problem)
+    for where, problem in file.notes:
+        scene.note(_place(path, where), problem)
     pieces = [piece for piece in file.pieces if len(piece.triangles)]
     names = unique_names([_place(path, piece.name) for piece in pieces])
     for name, piece in zip(names, pieces, strict=True):
@@ -81,7 +81,8 @@ def _mesh(scene: Scene, name: str, piece: Piece, metres: float, *, bound: bool) 
     """A piece in metres and in its fabric, with notes of what it lacks."""
     with np.errstate(over="ignore", invalid="ignore"):
         points = piece.points * metres
-        far = (np.abs(points) > FARTHEST).any(axis=1) & np.isfinite(points).all(axis=1)
+        far = np.asarray((np.abs(points) > FARTHEST).any(axis=1))
+    far &= np.isfinite(points).all(axis=1)
     if far.any():
         scene.note(name, f"has {int(far.sum())} points beyond {FARTHEST:g} m, which do not count")
         points = np.where(far[:, None], np.nan, points)
@@ -99,7 +100,8 @@ def _mesh(scene: Scene, name: str, piece: Piece, metres: float, *, bound: bool) 
         broken = ~np.isfinite(uv).all(axis=(1, 2))
         if broken.any():
             scene.note(
-                name, f"has UVs that are not finite on {int(broken.sum())} triangles; they count as 0"
+                name,
+                f"has UVs that are not finite on {int(broken.sum())} triangles; they count as 0",
             )
     return Mesh(
         path=name,
@@ -123,7 +125,7 @@ def _normals(
     normals = np.asarray(piece.normals, np.float64)
     with np.errstate(all="ignore"):
         length = np.linalg.norm(normals, axis=2, keepdims=True)
-        given = (np.isfinite(length) & (length > 0)).all(axis=(1, 2))
+        given = np.asarray((np.isfinite(length) & (length > 0)).all(axis=(1, 2)))
         if not given.any():
             return None
         normals = normals / np.where(given[:, None, None], length, 1.0)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fabricusd.errors import one_line
 from fabricusd.reference.gltf_document import Document
-from fabricusd.reference.gltf_nodes import Placed, inverse_binds, placed_nodes
+from fabricusd.reference.gltf_nodes import Placed, joint_matrices, placed_nodes
 from fabricusd.reference.mesh_piece import MeshFile, Piece, renumbered, unique_names
 
 READ = ("KHR_mesh_quantization",)
@@ -75,7 +75,8 @@ def _refuse_extensions(file: Document) -> None:
             file.refuse("extensionsRequired", "must hold names")
         if name not in READ and not _LOOKS.match(name):
             file.refuse(
-                "", f"requires the extension {one_line(name, 60)}, which is not read; save it without"
+                "",
+                f"requires the extension {one_line(name, 60)}, which is not read; save it without",
             )
 
 
@@ -137,7 +138,9 @@ def _refuse_draco(
         if index is not None:
             accessor = file.one("accessors", index, "attributes")
             if "bufferView" not in accessor and "sparse" not in accessor:
-                file.refuse("", "needs KHR_draco_mesh_compression, which is not read; save it without")
+                file.refuse(
+                    "", "needs KHR_draco_mesh_compression, which is not read; save it without"
+                )
 
 
 def _shape(
@@ -193,9 +196,7 @@ def _shape(
     )
 
 
-def _material_name(
-    file: Document, primitive: dict[str, Any], where: str, number: int
-) -> str:
+def _material_name(file: Document, primitive: dict[str, Any], where: str, number: int) -> str:
     """What a primitive is called beside others of its mesh."""
     index = primitive.get("material")
     if index is None:
@@ -218,9 +219,7 @@ def _triangles(
     else:
         order = file.indices(index, f"{where}.indices")
         if len(order) and int(order.max()) >= count:
-            file.refuse(
-                f"{where}.indices", f"name vertex {int(order.max())}; POSITION has {count}"
-            )
+            file.refuse(f"{where}.indices", f"name vertex {int(order.max())}; POSITION has {count}")
     if mode == TRIANGLES:
         if len(order) % 3:
             file.refuse(
@@ -265,9 +264,7 @@ def _piece(
                 uv = uv + weight * slid[used]
     with np.errstate(all="ignore"):
         if node.skin is not None and shape.joints is not None and shape.weighed is not None:
-            matrices = _blended(
-                file, node.skin, shape.joints[used], shape.weighed[used], worlds
-            )
+            matrices = _blended(file, node.skin, shape.joints[used], shape.weighed[used], worlds)
         else:
             matrices = node.world[None]
         points = np.einsum("nij,nj->ni", matrices[:, :3, :3], points) + matrices[:, :3, 3]
@@ -299,7 +296,7 @@ def _blended(
     worlds: dict[int, NDArray[np.float64]],
 ) -> NDArray[np.float64]:
     """(n, 4, 4) of each vertex the mean of its joints' matrices, by weight."""
-    matrices = inverse_binds(file, skin, worlds)
+    matrices = joint_matrices(file, skin, worlds)
     if joints.size and int(joints.max()) >= len(matrices):
         file.refuse(
             "JOINTS_0", f"name joint {int(joints.max())}; skins[{skin}] has {len(matrices)}"

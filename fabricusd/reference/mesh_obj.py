@@ -7,7 +7,6 @@ lines, and so on, in blocks that stay small. Materials, curves and smoothing gro
 from __future__ import annotations
 
 import re
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
 from fabricusd.reference.mesh_piece import MeshFile, Polygons
+from fabricusd.reference.number_text import is_blank, parsed, word_starts, words_per_line
 
 BLOCK = 1 << 22
 """Bytes that are worked on together."""
@@ -96,11 +96,11 @@ class _Text:
         """(lines,) the kind of each line, 0 for those that hold no numbers."""
         first, second, third = (data[self._starts + k] for k in range(3))
         kinds = np.zeros(len(self._starts), np.int8)
-        kinds[(first == ord("v")) & _blank(second)] = V
-        kinds[(first == ord("f")) & _blank(second)] = F
+        kinds[(first == ord("v")) & is_blank(second)] = V
+        kinds[(first == ord("f")) & is_blank(second)] = F
         for letter, kind in ((b"t", VT), (b"n", VN)):
-            kinds[(first == ord("v")) & (second == ord(letter)) & _blank(third)] = kind
-        for line in np.flatnonzero(_blank(first) & (self._ends > self._starts)):
+            kinds[(first == ord("v")) & (second == ord(letter)) & is_blank(third)] = kind
+        for line in np.flatnonzero(is_blank(first) & (self._ends > self._starts)):
             words = self._line(line).split(None, 1)
             kinds[line] = WORDS.get(words[0], 0) if words else 0
         others = (kinds == 0) & (self._ends > self._starts) & (first != ord("#"))
@@ -111,10 +111,10 @@ class _Text:
         ]
         return kinds
 
-    def _line(self, line: int) -> bytes:
+    def _line(self, line: Any) -> bytes:
         return self._bytes[self._starts[line] : self._ends[line]]
 
-    def _where(self, line: int) -> str:
+    def _where(self, line: Any) -> str:
         return f"{self._path}:{self._original.count(10, 0, int(self._starts[line])) + 1}"
 
     def _blocks(self, kind: int) -> Any:
@@ -140,9 +140,9 @@ class _Text:
             joined = re.sub(rb"#[^\n]*", lambda m: b" " * len(m[0]), joined)
         data = np.frombuffer(bytearray(joined), np.uint8)
         begins = np.concatenate([[0], np.flatnonzero(data == 10)[:-1] + 1])
-        if _blank(data[begins]).any():
+        if is_blank(data[begins]).any():
             # Indented lines have blanks where the keyword would be.
-            words = np.flatnonzero(_word_starts(data))
+            words = np.flatnonzero(word_starts(data))
             begins = words[np.searchsorted(words, begins)]
         for k in range(keyword):
             data[begins + k] = 32
@@ -153,8 +153,8 @@ class _Text:
         width = 2 if kind == VT else 3
         parts = []
         for lines, data in self._blocks(kind):
-            counts = _words_per_line(data)
-            values = _parsed(data, np.float64)
+            counts = words_per_line(data)
+            values = parsed(data, np.float64)
             if values is None or len(values) != counts.sum() or (counts < FEWEST[kind]).any():
                 raise self._bad_number(lines, kind)
             begins = np.cumsum(counts) - counts
@@ -191,7 +191,7 @@ class _Text:
             if found is None:
                 raise self._bad_corner(part)
             lines.append(part)
-            counts.append(_words_per_line(data))
+            counts.append(words_per_line(data))
             index.append(found)
         if not lines:
             return _Faces(
@@ -205,7 +205,9 @@ class _Text:
     def _bad_corner(self, lines: NDArray[np.int64]) -> FabricError:
         for line in lines:
             for word in self._line(line).split(b"#")[0].split()[1:]:
-                zero = any(part.lstrip(b"+-").strip(b"0") == b"" for part in word.split(b"/") if part)
+                zero = any(
+                    part.lstrip(b"+-").strip(b"0") == b"" for part in word.split(b"/") if part
+                )
                 if not CORNER.fullmatch(word) or zero:
                     return FabricError(
                         self._where(line),
@@ -262,7 +264,7 @@ class _Text:
             else:
                 group = name
             together = ".".join(dict.fromkeys(n for n in (whole, group) if n))
-            begins.append(line)
+            begins.append(int(line))
             which.append(numbers.setdefault(together, len(numbers)))
         at = np.searchsorted(begins, lines, "right") - 1
         return list(numbers), np.array(which, np.int64)[at]
@@ -279,11 +281,6 @@ class _Text:
         return [("", f"has {count} {noun}, left out") for noun, count in found.items()]
 
 
-def _blank(data: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Where the bytes are white space as `bytes.split` has it."""
-    return np.asarray((data == 32) | ((data >= 9) & (data <= 13)))
-
-
 def _text(word: bytes) -> str:
     """Names and words, in UTF-8 or, where they are not, in Latin-1."""
     try:
@@ -292,39 +289,13 @@ def _text(word: bytes) -> str:
         return word.decode("latin-1")
 
 
-def _word_starts(data: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    blank = _blank(data)
-    starts = ~blank
-    starts[1:] &= blank[:-1]
-    return starts
-
-
-def _words_per_line(data: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """(lines,) words of each line of `data`, which ends with a line feed."""
-    total = np.cumsum(_word_starts(data), dtype=np.int32)
-    return np.diff(total[data == 10], prepend=0).astype(np.int64)
-
-
-def _parsed(data: NDArray[np.uint8], kind: Any) -> NDArray[Any] | None:
-    """All numbers of `data`, None where something in it is none."""
-    if not len(data) or _blank(data).all():
-        return np.zeros(0, kind)
-    with warnings.catch_warnings():
-        # Until numpy raises ValueError for what is no number, it warns.
-        warnings.simplefilter("error")
-        try:
-            return np.fromstring(data.tobytes(), kind, sep=" ")
-        except (DeprecationWarning, ValueError):
-            return None
-
-
 def _corners(data: NDArray[np.uint8]) -> NDArray[np.int64] | None:
     """(c, 3) int64 v, vt, vn of the corners in `data`, 0 for none; None where one is not as it
     must be."""
-    starts = _word_starts(data)
+    starts = word_starts(data)
     slash = data == 47
     digit = ((data >= 48) & (data <= 57)) | (data == 43) | (data == 45)
-    if not (slash | digit | _blank(data)).all():
+    if not (slash | digit | is_blank(data)).all():
         return None
     number = digit.copy()
     number[1:] &= ~digit[:-1]
@@ -332,11 +303,12 @@ def _corners(data: NDArray[np.uint8]) -> NDArray[np.int64] | None:
     word = np.cumsum(starts, dtype=np.int32)[at] - 1
     slashes = np.cumsum(slash, dtype=np.int32)
     slot = slashes[at] - slashes[starts][word] if slash.any() else np.zeros(len(at), np.int32)
-    values = _parsed(np.where(slash, np.uint8(32), data), np.int64)
+    values = parsed(np.where(slash, np.uint8(32), data), np.int64)
     words = int(starts.sum())
     # A word begins with its point's number.
-    bad = values is None or len(values) != len(at) or (slot > 2).any() or (values == 0).any()
-    if bad or not digit[starts].all():
+    if values is None or len(values) != len(at) or not digit[starts].all():
+        return None
+    if (slot > 2).any() or (values == 0).any():
         return None
     table = np.zeros((words, 3), np.int64)
     table[word, slot] = values
