@@ -74,14 +74,13 @@ def _placed(
     file: Document, node: dict[str, Any], number: int, name: str, world: NDArray[np.float64]
 ) -> Placed:
     mesh = file.entry(node, "mesh", int, name)
-    own = node.get("name")
-    if not isinstance(own, str) or not own.strip():
-        own = None
-        if mesh is not None:
-            own = file.one("meshes", mesh, f"{name}.mesh").get("name")
+    names = [node.get("name")]
+    if mesh is not None:
+        names.append(file.one("meshes", mesh, f"{name}.mesh").get("name"))
+    words = [one_line(own, 200) for own in names if isinstance(own, str) and own.strip()]
     return Placed(
         number=number,
-        name=one_line(own, 200) if isinstance(own, str) and own.strip() else f"node_{number}",
+        name=words[0] if words else f"node_{number}",
         world=world,
         mesh=mesh,
         skin=file.entry(node, "skin", int, name),

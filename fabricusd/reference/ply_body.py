@@ -60,16 +60,15 @@ class PlyBody:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._data = path.read_bytes()
-        found = re.search(rb"(?:^|[\r\n])end_header[ \t]*(\r\n|\n|\r)", self._data[:LONGEST_HEADER])
+        found = re.search(rb"(?:\r\n|\r|\n)end_header[ \t]*(\r\n|\n|\r)", self._data[:LONGEST_HEADER])
         if not re.match(rb"ply[ \t]*[\r\n]", self._data) or found is None:
             self.refuse("cannot be read as PLY: it must begin with 'ply' and have an end_header")
         self._at = found.end()
         lines = re.split(rb"\r\n|\n|\r", self._data[: found.start()])[1:]
         self.form, self.elements = self._header([line.decode("latin-1") for line in lines])
         self._order: Literal["<", ">"] = ">" if self.form == "binary_big_endian" else "<"
-        self._line = len(lines) + 2
         if self.form == "ascii":
-            self._lines = _Lines(self._data[self._at :], self._line)
+            self._lines = _Lines(self._data[self._at :], len(lines) + 3)
 
     def refuse(self, problem: str, where: str = "") -> NoReturn:
         """Raise `FabricError` about the file."""
