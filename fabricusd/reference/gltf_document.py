@@ -56,7 +56,7 @@ class Document:
 
     def refuse(self, where: str, problem: str) -> NoReturn:
         """Raise `FabricError` about an entry of the file."""
-        raise FabricError(f"{self._path} {where}".strip(), problem)
+        raise FabricError(f"{self._path} {where}".strip(), one_line(problem))
 
     def _unpacked(self, content: bytes) -> bytes:
         """The JSON of a binary file; its binary chunk is kept."""

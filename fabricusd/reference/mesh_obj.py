@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, one_line
 from fabricusd.reference.mesh_piece import MeshFile, Polygons
 from fabricusd.reference.number_text import is_blank, parsed, word_starts, words_per_line
 
@@ -258,7 +258,7 @@ class _Text:
         for line, (keyword, *rest) in self._others:
             if keyword not in (b"o", b"g"):
                 continue
-            name = " ".join(_text(rest[0] if rest else b"").split())
+            name = _text(rest[0] if rest else b"", 200)
             if keyword == b"o":
                 whole, group = name, ""
             else:
@@ -281,12 +281,12 @@ class _Text:
         return [("", f"has {count} {noun}, left out") for noun, count in found.items()]
 
 
-def _text(word: bytes) -> str:
-    """Names and words, in UTF-8 or, where they are not, in Latin-1."""
+def _text(word: bytes, longest: int = 60) -> str:
+    """Names and words, in UTF-8 or, where they are not, in Latin-1; on one line that prints."""
     try:
-        return word.decode("utf-8")
+        return one_line(word.decode("utf-8"), longest)
     except UnicodeDecodeError:
-        return word.decode("latin-1")
+        return one_line(word.decode("latin-1"), longest)
 
 
 def _corners(data: NDArray[np.uint8]) -> NDArray[np.int64] | None:

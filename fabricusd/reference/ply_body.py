@@ -72,7 +72,7 @@ class PlyBody:
 
     def refuse(self, problem: str, where: str = "") -> NoReturn:
         """Raise `FabricError` about the file."""
-        raise FabricError(f"{self._path}{where}", problem)
+        raise FabricError(f"{self._path}{where}", one_line(problem))
 
     def _header(self, lines: list[str]) -> tuple[str, list[Element]]:
         form = ""
