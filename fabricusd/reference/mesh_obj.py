@@ -42,7 +42,9 @@ def read_obj(path: Path) -> MeshFile:
     index = [text.resolved(faces, slot, kind, counts[kind]) for slot, kind in _SLOTS]
     notes = text.notes()
     if (faces.counts < 3).any():
-        notes.append(("", f"has {int((faces.counts < 3).sum())} faces below three corners, left out"))
+        notes.append(
+            ("", f"has {int((faces.counts < 3).sum())} faces below three corners, left out")
+        )
     uv, normals = (
         None if not (k >= 0).any() else values[np.maximum(k, 0)]
         for k, values in ((index[1], numbers[VT]), (index[2], numbers[VN]))

@@ -60,7 +60,9 @@ class PlyBody:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._data = path.read_bytes()
-        found = re.search(rb"(?:\r\n|\r|\n)end_header[ \t]*(\r\n|\n|\r)", self._data[:LONGEST_HEADER])
+        found = re.search(
+            rb"(?:\r\n|\r|\n)end_header[ \t]*(\r\n|\n|\r)", self._data[:LONGEST_HEADER]
+        )
         if not re.match(rb"ply[ \t]*[\r\n]", self._data) or found is None:
             self.refuse("cannot be read as PLY: it must begin with 'ply' and have an end_header")
         self._at = found.end()

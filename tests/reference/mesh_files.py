@@ -59,7 +59,8 @@ class Gltf:
         rows = array.reshape(len(array), -1)
         accessor = {
             "bufferView": self.view(rows.tobytes()), "count": len(rows),
-            "componentType": _COMPONENTS[array.dtype.str[1:]], "type": _TYPES[rows.shape[1]], **more,
+            "componentType": _COMPONENTS[array.dtype.str[1:]], "type": _TYPES[rows.shape[1]],
+            **more,
         }  # fmt: skip
         self.root["accessors"].append(accessor)
         return len(self.root["accessors"]) - 1

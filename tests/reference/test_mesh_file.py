@@ -54,7 +54,9 @@ def test_a_mesh_file_has_no_cameras(tmp_path):
         read_scene(tmp_path / "x.obj", camera="/c")
 
 
-@pytest.mark.parametrize(("units", "metres"), [("m", 1), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254)])
+@pytest.mark.parametrize(
+    ("units", "metres"), [("m", 1), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254)]
+)
 def test_units_are_what_the_numbers_are_in(tmp_path, units, metres):
     (tmp_path / "x.obj").write_text(OBJ)
     (tmp_path / "x.ply").write_bytes(ply("ascii", [[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 1, 2]]))
@@ -138,9 +140,7 @@ def test_a_gltf_of_60_m_is_told_so(tmp_path):
 
 
 def test_threads_across_are_those_of_the_fabric():
-    scene = read_scene(
-        CASES / "obj_centimetres/panel_cm.obj", fabric="linen_plain", units="cm"
-    )
+    scene = read_scene(CASES / "obj_centimetres/panel_cm.obj", fabric="linen_plain", units="cm")
     cloth = scene.materials[1].binding.fabric
     warp, weft = 0.6 * cloth.warp.density, 0.8 * cloth.weft.density
     assert mesh_words(scene, scene.meshes[0]) == (
@@ -150,7 +150,9 @@ def test_threads_across_are_those_of_the_fabric():
 
 
 def test_points_too_far_to_trace_do_not_count(tmp_path):
-    (tmp_path / "x.obj").write_text(OBJ + "v 1e30 0 0\nv nan 0 0\nf 1 2 4\nf 1 2 5\nf 1/1 2/2 3/3\n")
+    (tmp_path / "x.obj").write_text(
+        OBJ + "v 1e30 0 0\nv nan 0 0\nf 1 2 4\nf 1 2 5\nf 1/1 2/2 3/3\n"
+    )
     scene = read_scene(tmp_path / "x.obj", fabric="linen_plain")
     assert "x.obj has 1 points beyond 1e+09 m, which do not count" in scene.notes
     assert scene.bounds()[1].tolist() == [1, 1, 0]

@@ -24,10 +24,9 @@ TRIED = settings(
     suppress_health_check=list(HealthCheck),
 )  # fmt: skip
 
-OBJS = [
-    path.read_bytes()
-    for path in sorted(CASES.glob("*/*.obj"))
-] + [b"o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\ng b c\nf 1//1 2//1 -1//1\nf 1 2 \\\n3\nl 1 2\n"]
+OBJS = [path.read_bytes() for path in sorted(CASES.glob("*/*.obj"))] + [
+    b"o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\ng b c\nf 1//1 2//1 -1//1\nf 1 2 \\\n3\nl 1 2\n"
+]
 """Files that are read, or nearly."""
 
 
@@ -36,14 +35,17 @@ def _gltf_files() -> list[bytes]:
     attributes = skinned.root["meshes"][0]["primitives"][0]["attributes"]
     attributes["JOINTS_0"] = skinned.add(np.zeros((4, 4), "u1"))
     attributes["WEIGHTS_0"] = skinned.add(np.ones((4, 4), "u1"), normalized=True)
-    skinned.root["skins"] = [{"joints": [0], "inverseBindMatrices": skinned.add(np.eye(4, dtype="f4")[None])}]
+    skinned.root["skins"] = [
+        {"joints": [0], "inverseBindMatrices": skinned.add(np.eye(4, dtype="f4")[None])}
+    ]
     morphed = one_square(weights=[0.5], rotation=[0, 0, 0, 1], scale=[1, 2, 3])
     primitive = morphed.root["meshes"][0]["primitives"][0]
     primitive["attributes"]["NORMAL"] = morphed.add(np.ones((4, 3), "i1"), normalized=True)
     primitive["targets"] = [{"POSITION": morphed.add(np.ones((4, 3), "f4"))}]
     view = morphed.root["accessors"][0]["bufferView"]
     morphed.root["accessors"][0]["sparse"] = {
-        "count": 2, "indices": {"bufferView": morphed.view(b"\0\1"), "componentType": 5121},
+        "count": 2,
+        "indices": {"bufferView": morphed.view(b"\0\1"), "componentType": 5121},
         "values": {"bufferView": view},
     }
     strip = Gltf()
@@ -102,7 +104,9 @@ def objs(draw):
     for _ in range(draw(st.integers(1, 12))):
         word = draw(_WORDS)
         if word.strip() == "f":
-            parts = draw(st.lists(st.lists(_INDEX, min_size=1, max_size=4).map("/".join), max_size=7))
+            parts = draw(
+                st.lists(st.lists(_INDEX, min_size=1, max_size=4).map("/".join), max_size=7)
+            )
         elif word in ("o", "g", "usemtl", "#"):
             parts = [draw(st.text(max_size=8))]
         else:
@@ -123,7 +127,9 @@ def test_made_up_objs(tmp_path, content):
 _VALUE = (
     st.integers(-3, 9)
     | st.sampled_from([5120, 5121, 5122, 5123, 5125, 5126, 10**9, 10**18, 10**40, -1, 0.5, 1e308])
-    | st.sampled_from([None, True, "", "VEC3", "SCALAR", "MAT4", "../x", "data:,", {}, [], [0], [[]]])
+    | st.sampled_from(
+        [None, True, "", "VEC3", "SCALAR", "MAT4", "../x", "data:,", {}, [], [0], [[]]]
+    )
     | st.lists(st.floats(allow_nan=False, allow_infinity=False) | st.integers(), max_size=16)
 )
 
@@ -188,10 +194,22 @@ def test_made_up_gltfs(tmp_path, content):
 
 _COUNT = st.integers(0, 6) | st.sampled_from([10**6, 10**9, 10**17, 10**18, 10**30])
 _TYPE = st.sampled_from(
-    ["char", "uchar", "short", "ushort", "int", "uint", "float", "double", "int8", "float64", "bool"]
+    [
+        "char",
+        "uchar",
+        "short",
+        "ushort",
+        "int",
+        "uint",
+        "float",
+        "double",
+        "int8",
+        "float64",
+        "bool",
+    ]
 )
 _PLY_NAME = st.sampled_from(
-    "x y z nx ny nz s t u v vertex_indices vertex_index texcoord red flags".split()
+    [*"xyzstuv", "nx", "ny", "nz", "vertex_indices", "vertex_index", "texcoord", "red"]
 )
 
 

@@ -69,7 +69,13 @@ LOOKS = [
     "KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness", "KHR_lights_punctual",
     "EXT_lights_image_based", "KHR_xmp_json_ld", "KHR_mesh_quantization",
 ]  # fmt: skip
-SHAPES = ["KHR_node_visibility", "ACME_texturedGeometry", "FB_ngon_encoding", "KHR_gaussian_splat", ""]
+SHAPES = [
+    "KHR_node_visibility",
+    "ACME_texturedGeometry",
+    "FB_ngon_encoding",
+    "KHR_gaussian_splat",
+    "",
+]
 
 
 @pytest.mark.parametrize("extension", LOOKS)
@@ -224,9 +230,7 @@ def test_nodes_stand_below_their_parents(tmp_path):
     mesh = made.mesh(made.square())
     made.node(name="root", children=[1], translation=[1, 0, 0], scale=[2, 2, 2])
     made.node(name="turned", children=[2], rotation=[0, 0, HALF, HALF])
-    made.node(
-        name="leaf", mesh=mesh, matrix=[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.5, 0, 0, 1]
-    )
+    made.node(name="leaf", mesh=mesh, matrix=[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.5, 0, 0, 1])
     [one] = read(tmp_path, made).pieces
     # 0.5 to the right, turned by a quarter to the left, twice as large, 1 to the right.
     assert bounds(one) == [[0.8, 1, 0], [1, 1.2, 0]]
@@ -392,7 +396,9 @@ REFUSED = {
     "a node that is none": (
         lambda r: r["nodes"][0].update(children=[5]), r"nodes\[0\].children is 5; the file has 1",
     ),
-    "a mesh that is none": (lambda r: r["nodes"][0].update(mesh=1), r"nodes\[0\].mesh is 1; the file has 1"),
+    "a mesh that is none": (
+        lambda r: r["nodes"][0].update(mesh=1), r"nodes\[0\].mesh is 1; the file has 1",
+    ),
     "a scene that is none": (lambda r: r.update(scene=4), "scene is 4; the file has 1 scenes"),
     "an accessor that is none": (
         lambda r: _primitive(r)["attributes"].update(TEXCOORD_0=9), "TEXCOORD_0 is 9; the file",

@@ -73,17 +73,13 @@ def test_corners_have_uvs_of_their_own(tmp_path, form):
     faces = [([0, 1, 2], [0, 0, 1, 0, 1, 1]), ([0, 2, 3], [0, 0, 1, 1, 0, 1]), ([0, 1, 3], [])]
     if form == "ascii":
         lines = [" ".join(map(str, [*p, 7])) for p in SQUARE]
-        lines += [
-            " ".join(map(str, [0.5, len(f), *f, len(t), *t, 0])) for f, t in faces
-        ]
+        lines += [" ".join(map(str, [0.5, len(f), *f, len(t), *t, 0])) for f, t in faces]
         content = head + "\r\n".join(lines).encode()
     else:
         order = "<" if "little" in form else ">"
         content = head + b"".join(struct.pack(f"{order}3dB", *p, 7) for p in SQUARE)
         for f, t in faces:
-            content += struct.pack(
-                f"{order}fB3Ii{len(t)}di", 0.5, 3, *f, len(t), *t, 0
-            )
+            content += struct.pack(f"{order}fB3Ii{len(t)}di", 0.5, 3, *f, len(t), *t, 0)
     [one] = read(tmp_path, content).pieces
     assert one.textured.tolist() == [True, True, False]
     assert uv_area(one) == pytest.approx(1)
@@ -129,7 +125,14 @@ def test_other_elements_are_passed_over(tmp_path, form):
         },
     )
     if form == "ascii":
-        lines = ["1 0", "", "2 3 7 7 7", *(" ".join(map(str, p)) for p in SQUARE), "4 0 1 2 3", "0 1"]
+        lines = [
+            "1 0",
+            "",
+            "2 3 7 7 7",
+            *(" ".join(map(str, p)) for p in SQUARE),
+            "4 0 1 2 3",
+            "0 1",
+        ]
         content = head + "\n".join(lines).encode()
     else:
         order = "<" if "little" in form else ">"
@@ -194,7 +197,7 @@ REFUSED = {
     "a list counted by fractions": (
         _text().replace(b"list uchar", b"list float"), "counts a list by 'float'",
     ),
-    "a count that is a word": (_text().replace(b"vertex 4", b"vertex four"), "x.ply:4 says 'element"),
+    "a count that is a word": (_text().replace(b"vertex 4", b"vertex four"), "x.ply:4 says 'elem"),
     "a count of twenty digits": (_text(vertices=10**20), "x.ply:4 says 'element vertex 1000000"),
     "no end of the header": (_text().replace(b"end_header", b"header_end"), "have an end_header"),
     "another file": (b"polygon\nend_header\n", "must begin with 'ply'"),

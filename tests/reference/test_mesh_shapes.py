@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.read import read_scene
 from fabricusd.reference.render import render_scene
 from fabricusd.reference.scene import Camera
-from fabricusd.reference.triangles import N, P0, build_tables
+from fabricusd.reference.triangles import P0, N, build_tables
 
 AROUND, UP = 64, 32
 ROUND = 2 * np.pi * np.arange(AROUND + 1) / AROUND
@@ -115,7 +115,7 @@ def _write(folder, shape):
         ply("binary_little_endian", np.column_stack([points, uv]), faces, "x y z s t")
     )
     made = Gltf()
-    fans = [[face[0], b, c] for face in faces for b, c in zip(face[1:-1], face[2:], strict=True)]
+    fans = [[face[0], b, c] for face in faces for b, c in pairwise(face[1:])]
     place = {
         "POSITION": made.add(points.astype("f4")),
         "TEXCOORD_0": made.add((uv * (1, -1) + (0, 1)).astype("f4")),
