@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fabricusd.errors import one_line
 from fabricusd.reference.gltf_document import Document
 from fabricusd.reference.gltf_nodes import Placed, joint_matrices, placed_nodes
-from fabricusd.reference.mesh_piece import MeshFile, Piece, renumbered, unique_names
+from fabricusd.reference.mesh_piece import QUIET, MeshFile, Piece, renumbered, unique_names
 
 READ = ("KHR_mesh_quantization",)
 """Required extensions that are read."""
@@ -33,6 +33,7 @@ MOST_TRIANGLES = 10_000_000
 _VECTOR, _PAIR = ("VEC3",), ("VEC2",)
 
 
+@QUIET
 def read_gltf(path: Path) -> MeshFile:
     """The file's pieces in metres, +y up. Raises FabricError."""
     file = Document(path)
@@ -52,6 +53,8 @@ def read_gltf(path: Path) -> MeshFile:
                 (node.name, "is drawn once, without its EXT_mesh_gpu_instancing, which is not read")
             )
         for shape in shapes[node.mesh]:
+            if not len(shape.triangles):
+                continue
             name = node.name if len(shapes[node.mesh]) == 1 else f"{node.name}_{shape.name}"
             found.append((name, node, shape))
             total += len(shape.triangles)

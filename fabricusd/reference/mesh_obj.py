@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError, one_line
-from fabricusd.reference.mesh_piece import MeshFile, Polygons
+from fabricusd.reference.mesh_piece import QUIET, MeshFile, Polygons
 from fabricusd.reference.number_text import is_blank, parsed, word_starts, words_per_line
 
 BLOCK = 1 << 22
@@ -32,6 +32,7 @@ _NOT_A_SURFACE = {b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "c
 _FREE_FORM = (b"surf",)
 
 
+@QUIET
 def read_obj(path: Path) -> MeshFile:
     """The file's pieces, one for each name of an object or group. Raises FabricError."""
     text = _Text(path)

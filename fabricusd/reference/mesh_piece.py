@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 
 from fabricusd.reference.polygons import triangulate
 
+QUIET = np.errstate(all="ignore")
+"""Numbers that are not finite, or too large, are read as they are: whoever uses them judges them,
+and numpy need not warn on the way."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Piece:

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.reference.mesh_piece import MeshFile, Polygons
+from fabricusd.reference.mesh_piece import QUIET, MeshFile, Polygons
 from fabricusd.reference.ply_body import PlyBody, Table
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 INDEX_NAMES = ("vertex_indices", "vertex_index")
 
 
+@QUIET
 def read_ply(path: Path) -> MeshFile:
     """The file's one piece. Raises FabricError."""
     body = PlyBody(path)
