@@ -27,7 +27,9 @@ FEWEST = {V: 3, VT: 1, VN: 3}
 """Numbers that a line must have; `vt u` means (u, 0), as the format says."""
 
 NUMBER = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
-CORNER = re.compile(rb"[+-]?\d+(/([+-]?\d+)?(/([+-]?\d+)?)?)?")
+MOST_DIGITS = 18
+"""Of an index: beyond, 64 bits do not hold it, and what numpy makes of it is any number."""
+CORNER = re.compile(rb"N(/(N)?(/(N)?)?)?".replace(b"N", rb"[+-]?\d{1,%d}" % (MOST_DIGITS - 1)))
 _NOT_A_SURFACE = {b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "curves"}
 _FREE_FORM = (b"surf",)
 
@@ -303,6 +305,10 @@ def _corners(data: NDArray[np.uint8]) -> NDArray[np.int64] | None:
     number = digit.copy()
     number[1:] &= ~digit[:-1]
     at = np.flatnonzero(number)
+    ends = digit.copy()
+    ends[:-1] &= ~digit[1:]
+    if len(at) and int((np.flatnonzero(ends) - at).max()) >= MOST_DIGITS:
+        return None
     word = np.cumsum(starts, dtype=np.int32)[at] - 1
     slashes = np.cumsum(slash, dtype=np.int32)
     slot = slashes[at] - slashes[starts][word] if slash.any() else np.zeros(len(at), np.int32)
