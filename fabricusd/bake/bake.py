@@ -41,6 +41,7 @@ from fabricusd.bake.sheet import Sheet, sheets_of
 from fabricusd.bake.unwrap import unwrapped
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
+from fabricusd.reference.mesh_size import size_words, threads_words
 from fabricusd.reference.read import as_binding, read_scene
 from fabricusd.reference.scene import Scene
 from fabricusd.reference.workers import worker_count
@@ -129,6 +130,7 @@ def bake(
     *,
     fabric: str | Fabric | Binding | None = None,
     mesh: str | None = None,
+    units: str | None = None,
     resume: bool = False,
     workers: int | None = None,
     progress: Progress | None = None,
@@ -137,6 +139,7 @@ def bake(
 
     fabric : laid on everything that names none, as for `render`
     mesh : path of the one mesh to bake
+    units : of an .obj or .ply, see `read_scene`
     resume : go on with a bake of the same job that was stopped
 
     Raises FabricError for a scene, mesh or setting that cannot be baked, before anything is
@@ -144,7 +147,7 @@ def bake(
     """
     began = time.perf_counter()
     settings = settings or Settings()
-    read = read_scene(scene, fabric=fabric)
+    read = read_scene(scene, fabric=fabric, units=units)
     found = _garments(read, settings, mesh, fabric)
     maps = chosen_maps(settings.maps, light=settings.light is not None)
     if settings.file_format not in FORMATS:
@@ -244,22 +247,47 @@ def _sheets(
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What a bake would make, a line for each garment, and what had to be assumed or left out."""
+
+    lines: list[str]
+    notes: list[str]
+
+
 def plan(
     scene: str | os.PathLike[str],
     settings: Settings,
     *,
     fabric: str | Fabric | Binding | None = None,
     mesh: str | None = None,
-) -> list[str]:
-    """One line for each texture set that `bake` would make; the same errors, nothing written."""
-    found = _garments(read_scene(scene, fabric=fabric), settings, mesh, fabric)
+    units: str | None = None,
+) -> Plan:
+    """What `bake` would make, with the same errors, and nothing written."""
+    read = read_scene(scene, fabric=fabric, units=units)
+    found = _garments(read, settings, mesh, fabric)
     maps = chosen_maps(settings.maps, light=settings.light is not None)
     resolution = _resolution(settings, found)
-    return [
-        f"{one.name}: {len(maps)} maps, tiles {', '.join(map(str, tiles_of(one, settings.udim)))}, "
-        f"{resolution} x {resolution}, {resolution / threads_per_uv(one):.3g} texels per thread"
-        for one in found
-    ]
+    return Plan(
+        lines=[
+            f"{one.name}: {len(maps)} maps, tiles "
+            f"{', '.join(map(str, tiles_of(one, settings.udim)))}, {resolution} x {resolution}, "
+            f"{resolution / threads_per_uv(one):.3g} texels per thread; {_extent(one)}"
+            for one in found
+        ],
+        notes=[*read.notes, *(n for g in found for n in g.notes), *_coarse(found, resolution)],
+    )
+
+
+def _extent(one: Garment) -> str:
+    """A garment's size, and how many threads of each fabric run across it."""
+    corners = one.points[one.triangles].reshape(-1, 3)
+    words = size_words(corners.min(axis=0), corners.max(axis=0))
+    for k, lay in enumerate(one.lays):
+        threads = one.uv[one.lay == k].reshape(-1, 2) @ lay.matrix.T
+        if len(threads):
+            words += f"; {threads_words(threads)} of {lay.fabric.name} across"
+    return words
 
 
 def _garments(

@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 from fabricusd.cli.number import number
+from fabricusd.cli.units import add_units
 from fabricusd.errors import FabricError
 
 EPILOG = """example:
@@ -19,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to bake, how finely, into which maps."""
     parser.add_argument("scene", metavar="SCENE", nargs="?", help="USD, OBJ, GLB or PLY file")
     parser.add_argument("--fabric", metavar="FILE[:/PRIM]", help="for meshes that name none")
+    add_units(parser)
     parser.add_argument("--mesh", metavar="PATH", help="bake this mesh alone")
     parser.add_argument("-o", "--output", metavar="DIR", help="folder for the textures")
     finely = parser.add_mutually_exclusive_group()
@@ -97,12 +99,18 @@ def run(options: argparse.Namespace) -> int:
         file_format=options.format,
     )
     if options.dry_run:
-        for line in plan(options.scene, settings, fabric=options.fabric, mesh=options.mesh):
+        planned = plan(
+            options.scene, settings, fabric=options.fabric, mesh=options.mesh, units=options.units
+        )
+        for line in planned.lines:
             print(line)
+        for note in () if options.quiet else planned.notes:
+            print(f"fabricusd: {note}", file=sys.stderr)
         return 0
     result = bake(
         options.scene, out, settings, fabric=options.fabric, mesh=options.mesh,
-        resume=options.resume, workers=options.workers, progress=_progress(options),
+        units=options.units, resume=options.resume, workers=options.workers,
+        progress=_progress(options),
     )  # fmt: skip
     if not options.quiet:
         for note in result.notes:

@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fabricusd.cli.number import number
+from fabricusd.cli.units import add_units
 from fabricusd.errors import FabricError, one_line
 from fabricusd.ranges import RANGES, require_picture
 
 if TYPE_CHECKING:
     from fabricusd.fabric import Fabric
 
-EPILOG = """SCENE is .usd, .usda, .usdc or .usdz, or with --fabric an .obj, .glb or .ply
+EPILOG = """SCENE is .usd, .usda, .usdc or .usdz, or with --fabric an .obj, .glb, .gltf or .ply
 
 OUT.exr gets beauty and each --aov, and a .png beside it; Ctrl-C keeps what is done
 
@@ -28,12 +29,16 @@ example:
 
 MOST_FRAMES = 100_000
 
+MOST_TOLD = 50
+"""Meshes whose sizes a dry run prints."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to render, how well, and where to."""
     parser.add_argument("scene", metavar="SCENE")
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help=".exr or .png")
     parser.add_argument("--fabric", metavar="FILE[:/PRIM]", help="fabric file, draft or preset")
+    add_units(parser)
     parser.add_argument("--camera", metavar="PATH", help="prim path (default: the first camera)")
     parser.add_argument(
         "--width",
@@ -80,6 +85,7 @@ def run(options: argparse.Namespace) -> int:
     """Render, and say what was left out."""
     require_picture(options.width, options.height)
     from fabricusd.reference import AOVS, read_scene, render
+    from fabricusd.reference.mesh_size import mesh_words
 
     frames = None if options.frames is None else parse_frames(options.frames)
     output = Path(options.output)
@@ -98,12 +104,17 @@ def run(options: argparse.Namespace) -> int:
             camera=options.camera,
             complexity=options.complexity,
             width=options.width,
+            units=options.units,
         )
         _tell(scene.notes, options)
         triangles = sum(len(mesh.triangles) for mesh in scene.meshes)
         words = f"{len(scene.meshes)} meshes, {triangles} triangles, {len(scene.lights)} lights"
         print(f"fabricusd: would render {words} to {output}", file=sys.stderr)
-        return 0
+        for mesh in scene.meshes[:MOST_TOLD]:
+            print(f"fabricusd: {mesh.path}: {mesh_words(scene, mesh)}", file=sys.stderr)
+        if len(scene.meshes) > MOST_TOLD:
+            print(f"fabricusd: and {len(scene.meshes) - MOST_TOLD} more", file=sys.stderr)
+        return 0 if triangles else 1
     layers = tuple(AOVS) if "all" in options.aov else tuple(options.aov)
     bar, progress = _progress(options)
     try:
@@ -113,7 +124,7 @@ def run(options: argparse.Namespace) -> int:
             max_bounces=options.max_bounces, level=options.level, shadow=options.shadow,
             limits=options.limits, aovs=layers, frames=frames, seed=options.seed,
             workers=options.workers, exposure=options.exposure,
-            complexity=options.complexity, progress=progress,
+            complexity=options.complexity, units=options.units, progress=progress,
         )  # fmt: skip
     finally:
         bar()
@@ -128,7 +139,8 @@ def run(options: argparse.Namespace) -> int:
     if not result.complete:
         print("fabricusd: interrupted; what was done is kept", file=sys.stderr)
         return 130
-    return 1 if options.noise and result.noise > options.noise else 0
+    too_noisy = options.noise and result.noise > options.noise
+    return 1 if too_noisy or not result.met else 0
 
 
 def _refuse_existing(output: Path, frames: tuple[float, ...] | None) -> None:
@@ -151,7 +163,7 @@ def _choose(options: argparse.Namespace, fabric: Fabric | None) -> None:
     from fabricusd.chart.choice import choose_limits, choose_shadow, presets_in
     from fabricusd.reference import read_scene
 
-    scene = read_scene(options.scene, fabric=fabric, camera=options.camera)
+    scene = read_scene(options.scene, fabric=fabric, camera=options.camera, units=options.units)
     if options.shadow is None:
         choice = choose_shadow(presets_in(scene), options.max_error)
         options.shadow = choice.method

@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+PART = 1 << 20
+"""Corners that are looked at together."""
+
 
 def triangulate(
     points: NDArray[np.float64], counts: NDArray[np.int64], indices: NDArray[np.int64]
@@ -14,8 +17,8 @@ def triangulate(
     """Triangles of polygons with `counts` corners each, which are `indices` into `points`.
 
     Returns the polygon that each triangle comes from, (m,), and the positions of its corners in
-    `indices`, (m, 3), in the polygon's own winding. Triangles and quads fan out from their first
-    corner, a quad with a reflex corner from that one; larger polygons lose one ear after another.
+    `indices`, (m, 3), in the polygon's own winding. Triangles, quads and convex polygons fan out
+    from their first corner, a quad with a reflex corner from that one; others lose ear after ear.
     Polygons of fewer than three corners are left out.
     """
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
@@ -34,7 +37,12 @@ def triangulate(
                 fan = np.stack([turn, (turn + k) % 4, (turn + k + 1) % 4], axis=1)
                 corners.append(first[:, None] + fan)
         elif size > 4:
-            for polygon, begin in zip(which, first, strict=True):
+            convex = _are_convex(points, indices, first, int(size))
+            fan = np.arange(1, size - 1)
+            fan = np.stack([np.zeros_like(fan), fan, fan + 1], axis=1)
+            faces.append(np.repeat(which[convex], size - 2))
+            corners.append((first[convex][:, None, None] + fan).reshape(-1, 3))
+            for polygon, begin in zip(which[~convex], first[~convex], strict=True):
                 ears = _cut_ears(points[indices[begin : begin + size]])
                 faces.append(np.full(len(ears), polygon))
                 corners.append(begin + ears)
@@ -53,49 +61,90 @@ def _better_diagonal(quads: NDArray[np.float64]) -> NDArray[np.int64]:
     return ((first < 0) & (other > first)).astype(np.int64)
 
 
+def _are_convex(
+    points: NDArray[np.float64], indices: NDArray[np.int64], first: NDArray[np.int64], size: int
+) -> NDArray[np.bool_]:
+    """(n,) which polygons of `size` corners turn left at every corner, once around."""
+    convex = np.zeros(len(first), bool)
+    with np.errstate(all="ignore"):
+        for begin in range(0, len(first), max(PART // size, 1)):
+            part = slice(begin, begin + max(PART // size, 1))
+            at = points[indices[first[part, None] + np.arange(size)]]
+            along = np.roll(at, -1, axis=1) - at
+            turn = np.cross(np.roll(along, 1, axis=1), along)
+            normal = np.cross(at - at[:, :1], along).sum(axis=1)
+            normal /= np.linalg.norm(normal, axis=1)[:, None]
+            out = np.einsum("nki,ni->nk", turn, normal)
+            # Turns add up to one round, or to several where a polygon winds like a star.
+            ahead = np.einsum("nki,nki->nk", np.roll(along, 1, axis=1), along)
+            around = np.arctan2(out, ahead).sum(axis=1)
+            least = 1e-9 * np.square(along).sum(axis=2).max(axis=1)
+            convex[part] = (out > least[:, None]).all(axis=1) & (around < 3 * np.pi)
+    return convex
+
+
 def _cut_ears(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(k, 3) -> (k-2, 3) corner numbers: ears of the polygon in its mean plane."""
+    """(k, 3) -> (k-2, 3) corner numbers: ears of the polygon in its mean plane.
+
+    One ear after another on the way around. Where a whole round finds none, the polygon crosses
+    itself, and what is left is a fan.
+    """
+    n = len(polygon)
     if not np.isfinite(polygon).all():
-        n = len(polygon)
         return np.stack([np.zeros(n - 2, int), np.arange(1, n - 1), np.arange(2, n)], axis=1)
-    following = np.roll(polygon, -1, axis=0)
-    normal = np.cross(polygon, following).sum(axis=0)
+    centred = polygon - polygon[0]
+    normal = np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)
     axis = int(np.argmax(np.abs(normal)))
-    flat = np.delete(polygon, axis, axis=1)
+    flat = np.delete(centred, axis, axis=1)
     if (normal[axis] < 0) != (axis == 1):
         flat = flat * (1.0, -1.0)
-    left = list(range(len(polygon)))
+    places = flat.tolist()
+    before, after = [n - 1, *range(n - 1)], [*range(1, n), 0]
+    # Only corners that turn right, or not at all, can lie in an ear.
+    reflex = {k for k in range(n) if _turn(places[before[k]], places[k], places[after[k]]) <= 0}
+    array = np.array(sorted(reflex), np.int64)
     ears = []
-    while len(left) > 3:
-        for k in range(len(left)):
-            a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
-            if _is_ear(flat, a, b, c, left):
-                break
-        else:
-            # A polygon that crosses itself has no ear; any corner must do.
-            k = 0
-            a, b, c = left[-1], left[0], left[1]
-        ears.append((a, b, c))
-        del left[k]
-    ears.append((left[0], left[1], left[2]))
+    k, missed, left = 0, 0, n
+    while left > 3 and missed < left:
+        a, c = before[k], after[k]
+        if k in reflex or _holds_another(flat, array, a, k, c):
+            k, missed = c, missed + 1
+            continue
+        ears.append((a, k, c))
+        after[a], before[c] = c, a
+        left -= 1
+        for corner in (a, c):
+            if corner in reflex and (
+                _turn(places[before[corner]], places[corner], places[after[corner]]) > 0
+            ):
+                reflex.remove(corner)
+                array = array[array != corner]
+        # On to the corner after the next: ears that follow one another make slivers.
+        k, missed = after[c], 0
+    while left > 2:
+        a, c = before[k], after[k]
+        ears.append((a, k, c))
+        after[a], before[c] = c, a
+        k = c
+        left -= 1
     return np.array(ears, np.int64)
 
 
-def _is_ear(flat: NDArray[np.float64], a: int, b: int, c: int, left: list[int]) -> bool:
-    """Whether the triangle a, b, c is convex and holds no other corner."""
-    if _turn(flat[a], flat[b], flat[c]) <= 0:
-        return False
-    for p in left:
-        if p in (a, b, c):
-            continue
-        q = flat[p]
-        if (
-            _turn(flat[a], flat[b], q) >= 0
-            and _turn(flat[b], flat[c], q) >= 0
-            and _turn(flat[c], flat[a], q) >= 0
-        ):
-            return False
-    return True
+def _holds_another(
+    flat: NDArray[np.float64], others: NDArray[np.int64], a: int, b: int, c: int
+) -> bool:
+    """Whether one of the corners `others` lies in the triangle a, b, c or on its edges.
+
+    Corners at the places of a, b and c do not count: where a hole is cut open towards the outline,
+    the cut has two corners at each end.
+    """
+    q = flat[others]
+    inside = np.ones(len(others), bool)
+    for p, r in ((flat[a], flat[b]), (flat[b], flat[c]), (flat[c], flat[a])):
+        along = r - p
+        inside &= along[0] * (q[:, 1] - p[1]) - along[1] * (q[:, 0] - p[0]) >= 0
+        inside &= (q != p).any(axis=1)
+    return bool(inside.any())
 
 
 def _turn(a: Any, b: Any, c: Any) -> float:

@@ -24,12 +24,15 @@ def read_scene(
     time_code: float | None = None,
     complexity: str = "low",
     width: int = 960,
+    units: str | None = None,
 ) -> Scene:
     """The scene of a USD or mesh file, in metres. Raises `FabricError` where it has none.
 
     complexity : how finely subdivision surfaces are refined, "low" to "veryhigh", or "auto", as a
         picture of `width` pixels shows; by default not at all, since textures are baked and
         materials bound on the faces that their UVs were laid on
+    units : what the lengths of an .obj or .ply are in, "m", "cm", "mm" or "in"; None takes metres,
+        and a note tells the size
     """
     fineness = Fineness(complexity=complexity, width=width)
     path = Path(source)
@@ -45,7 +48,11 @@ def read_scene(
 
         if camera is not None:
             raise FabricError(f"{path}:{camera}", f"is no camera; {suffix} files have none")
-        return read_mesh_file(path, binding)
+        return read_mesh_file(path, binding, units)
+    if units is not None:
+        from fabricusd.reference.mesh_size import unit_length
+
+        unit_length(units, suffix)
     from fabricusd.reference.usd_scene import read_usd_scene
 
     return read_usd_scene(

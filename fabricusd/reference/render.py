@@ -27,10 +27,11 @@ from fabricusd.reference.compile_ahead import FAR, compile_ahead
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import AOVS, Film, require_aovs
 from fabricusd.reference.integrator import Tracer
+from fabricusd.reference.nothing_seen import reason_for_nothing
 from fabricusd.reference.read import read_scene
 from fabricusd.reference.scene import Scene
 from fabricusd.reference.view_transform import view
-from fabricusd.reference.wave import Wave
+from fabricusd.reference.wave import ALPHA, Wave
 from fabricusd.reference.workers import Batches, pixels_along_z_curve, worker_count
 from fabricusd.stop import Stop
 
@@ -63,6 +64,7 @@ class RenderResult:
     not_finite : values that were left out because they were not finite
     noise : the relative error that 99 % of the pixels' means stay below, estimated
     complete : False after Ctrl-C
+    met : whether a camera ray met a surface, in every picture
     """
 
     layers: dict[str, NDArray[np.float32]]
@@ -75,6 +77,7 @@ class RenderResult:
     samples: float = 0.0
     noise: float = 0.0
     complete: bool = True
+    met: bool = True
     metadata: dict[str, Any] = field(default_factory=dict)
 
 
@@ -100,6 +103,7 @@ def render(
     exposure: float = 0.0,
     estimator: str = "mis",
     complexity: str = "auto",
+    units: str | None = None,
     progress: Progress | None = None,
 ) -> RenderResult:
     """Path-trace `scene` (a USD, OBJ, GLB or PLY file, or a `Scene`) and write `out`.
@@ -114,6 +118,7 @@ def render(
     exposure : of the PNG, in stops, added to the camera's own
     complexity : how finely subdivision surfaces are refined: "low" (their cages), "medium", "high"
         or "veryhigh", as usdrecord and usdview have it, or "auto", as far as the picture shows
+    units : of an .obj or .ply, see `read_scene`
 
     Raises `FabricError` for what cannot be rendered at all; what had to be left out is in the
     result's `notes`. On Ctrl-C what is done is written, and `complete` is False.
@@ -143,6 +148,7 @@ def render(
                     time_code=time_code,
                     complexity=complexity,
                     width=width,
+                    units=units,
                 )
             )
             result = render_scene(
@@ -187,6 +193,7 @@ def _together(
         samples=float(np.mean([r.samples for r in results])),
         noise=max(r.noise for r in results),
         complete=complete and results[-1].complete,
+        met=all(r.met for r in results),
     )
 
 
@@ -310,6 +317,9 @@ def render_scene(
     rays, shadow_rays, not_finite = (int(x) for x in counters.sum(axis=0))
     if not_finite:
         scene.note("the picture", f"lost {not_finite} values that were not finite")
+    met = bool(film.sums[ALPHA].any()) or not complete
+    if not met and len(tracer.tables.triangles):
+        scene.note("the picture", reason_for_nothing(tracer, lens, width, height))
     embree, triangles = tracer.accelerator.version, len(tracer.tables.triangles)
     # Triangles and their hierarchy make room for the layers.
     del tracer
@@ -341,6 +351,7 @@ def render_scene(
         samples=float(film.samples.mean()),
         noise=_typical_worst(error),
         complete=complete,
+        met=met,
         metadata=metadata,
     )
 

@@ -330,7 +330,7 @@ def test_the_command_says_when_a_bound_is_not_reached(square, tmp_path, capsys):
 
 
 def test_a_dry_run_writes_nothing(square, linen, tmp_path, capsys):
-    assert "64 texels" not in plan(square, SMALL, fabric=linen)[0]
+    assert "64 texels" not in plan(square, SMALL, fabric=linen).lines[0]
     out = tmp_path / "out"
     assert main(["bake", str(square), "--fabric", "linen_plain", "-n", "-o", str(out)]) == 0
     assert "texels per thread" in capsys.readouterr().out

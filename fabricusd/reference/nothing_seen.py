@@ -1,0 +1,42 @@
+"""Why a picture is empty: whether the camera's clipping planes cut all that it would see."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fabricusd.reference.camera import FAR, Lens
+from fabricusd.reference.integrator import Tracer
+from fabricusd.reference.wave import ALPHA, Wave
+
+LOOKED = 1 << 14
+"""Pixels that are looked through again, evenly over the picture."""
+
+
+def reason_for_nothing(tracer: Tracer, lens: Lens, width: int, height: int) -> str:
+    """What is said of a picture in which no camera ray met anything.
+
+    Rays of the same camera are followed again without its near plane, then without its far one.
+    """
+    near, far = float(lens.near), float(lens.far)
+    if near > 0 and _meets(tracer, lens._replace(near=np.float32(0)), width, height):
+        return f"shows nothing: the near clipping plane, at {near:.4g} m, cuts everything away"
+    if lens.far < FAR and _meets(tracer, lens._replace(far=FAR), width, height):
+        return f"shows nothing: the far clipping plane, at {far:.4g} m, cuts everything away"
+    open_lens = lens._replace(near=np.float32(0), far=FAR)
+    if near > 0 and lens.far < FAR and _meets(tracer, open_lens, width, height):
+        return (
+            f"shows nothing: all that the camera would see is outside of its clipping range, "
+            f"{near:.4g} to {far:.4g} m"
+        )
+    return "shows nothing: no camera ray meets anything; turn the camera to the scene"
+
+
+def _meets(tracer: Tracer, lens: Lens, width: int, height: int) -> bool:
+    """Whether one sample of some pixels meets a surface."""
+    count = width * height
+    # Steps of the golden ratio fall into all rows and all columns.
+    steps = np.arange(min(count, LOOKED)) * 0.6180339887498949 % 1.0
+    pixels = (steps * count).astype(np.int32)
+    wave = Wave(len(pixels), aovs=False)
+    tracer.trace(wave, lens, width, pixels, 0, 1, np.zeros(3, np.int64))
+    return bool((wave.film[ALPHA, : len(pixels)] > 0).any())
