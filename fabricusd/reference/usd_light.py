@@ -14,6 +14,7 @@ from fabricusd.errors import FabricError
 from fabricusd.images import read_image
 from fabricusd.reference.scene import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE, Light, Scene
 from fabricusd.reference.usd_asset import asset_file
+from fabricusd.reference.usd_value import value_of
 
 _KINDS = {
     "DistantLight": DISTANT,
@@ -65,7 +66,7 @@ class _Inputs:
         if not (attribute and attribute.HasAuthoredValue()):
             older = self.prim.GetAttribute(name)
             attribute = older if older and older.HasAuthoredValue() else attribute
-        given = attribute.Get(self.time) if attribute else None
+        given = value_of(attribute, self.time, self.scene)
         return otherwise if given is None else given
 
     def numbers(self, name: str, otherwise: tuple[float, ...]) -> NDArray[np.float64]:

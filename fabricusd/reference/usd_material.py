@@ -12,6 +12,7 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
 from fabricusd.reference.scene import FabricSurface, PreviewSurface, Scene
 from fabricusd.reference.usd_preview import PreviewNetwork
+from fabricusd.reference.usd_value import value_of
 from fabricusd.schema import read_binding
 
 _PURPOSES = (UsdShade.Tokens.full, UsdShade.Tokens.preview)
@@ -58,19 +59,35 @@ class Materials:
 
     def _bound_fabric(self, prim: Usd.Prim) -> Resolved | None:
         where = str(prim.GetPath())
-        if "FabricBindingAPI" not in prim.GetAppliedSchemas():
+        if not binds_fabric(prim):
             if prim.GetRelationship("fabric:binding").GetTargets():
                 self.scene.note(
                     where, "has fabric:binding but not FabricBindingAPI applied, left out"
                 )
             return None
         try:
-            return self._fabric(read_binding(prim))
+            fabric = self._fabric(read_binding(prim))
+            self._note_undefined(prim)
+            return fabric
         except (FabricError, IndexError) as error:
             words = str(error) if isinstance(error, FabricError) else "names no fabric"
             line = words if words.startswith(where) else f"{where} {words}"
             self.scene.note(line, "- rendered without a fabric")
             return None
+
+    def _note_undefined(self, prim: Usd.Prim) -> None:
+        """Say where a fabric lies below an `over`, which is as good as absent to most programs."""
+        for target in prim.GetRelationship("fabric:binding").GetForwardedTargets():
+            fabric = prim.GetStage().GetPrimAtPath(target)
+            above = next(
+                (p for p in _ancestors(fabric)[::-1] if not p.HasDefiningSpecifier()), None
+            )
+            if above:
+                self.scene.note(
+                    str(prim.GetPath()),
+                    f"wears {target}, which lies below {above.GetPath()}, an 'over' that no layer "
+                    "defines: other programs do not see it and show a grey; make it a 'def'",
+                )
 
     def _bound_material(self, prim: Usd.Prim) -> tuple[UsdShade.Material, Usd.Relationship]:
         """The material that USD binds to `prim`, and by which relationship; none is noted where
@@ -108,8 +125,10 @@ class Materials:
     def _display(self, prim: Usd.Prim, name: str, count: int) -> tuple[float, ...] | None:
         """The mean of a display primvar of `count` channels; None where it has no usable value."""
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
-        given = primvar.Get(self.time) if primvar and primvar.HasValue() else None
-        if given is None or not len(given):
+        given = None
+        if primvar and primvar.HasValue():
+            given = value_of(primvar.GetAttr(), self.time, self.scene)
+        if given is None or not hasattr(given, "__len__") or not len(given):
             return None
         where = str(prim.GetPath())
         try:
@@ -148,6 +167,11 @@ class Materials:
         known = self._add(surface, binding.uv_set)
         self._known["fabric", known.index] = known
         return known
+
+
+def binds_fabric(prim: Usd.Prim) -> bool:
+    """Whether a prim asks to wear a fabric."""
+    return "FabricBindingAPI" in prim.GetAppliedSchemas()
 
 
 def _ancestors(prim: Usd.Prim) -> list[Usd.Prim]:
