@@ -20,6 +20,9 @@ from fabricusd.reference.usd_value import array_of, type_problem, value_of
 MOST_COPIES = 100_000
 """Instances that a scene may have, those inside others too: some minutes of reading."""
 
+_MOST_NAMED = 10 * MOST_COPIES
+"""Instances of one instancer above which nobody asks which of them are hidden."""
+
 MOST_TRIANGLES = 10_000_000
 """Triangles that a scene's instances may have together: some 8 GB when rendered."""
 
@@ -99,10 +102,13 @@ class Copies:
 
     def of_instancer(self, instancer: UsdGeom.PointInstancer) -> Count:
         """All that a point instancer places, without those that its mask hides."""
-        indices = array_of(instancer.GetProtoIndicesAttr(), self.time, self.scene, np.int64)
+        named = value_of(instancer.GetProtoIndicesAttr(), self.time, self.scene)
         targets = instancer.GetPrototypesRel().GetForwardedTargets()
-        if not len(indices) or not targets or array_problem(instancer, self.time):
+        if not named or not targets or array_problem(instancer, self.time):
             return Count()
+        if len(named) > _MOST_NAMED:
+            return Count(copies=len(named))
+        indices = np.array(named, np.int64)
         shown = shown_instances(instancer, self.time, len(indices))
         numbers, times = np.unique(indices[shown], return_counts=True)
         total = Count()

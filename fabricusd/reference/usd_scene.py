@@ -146,12 +146,8 @@ class _Reader:
             first, count = self.one_sided[0], len(self.one_sided)
             others = f" and {count - 1} more have" if count > 1 else " has"
             self.scene.note(f"{first}{others}", "doubleSided = false; both sides are rendered")
-        if self.refused:
-            self.scene.note(
-                "the scene",
-                f"has {self.refused} more instances, left out: {self.placed.copies:g} with "
-                f"{self.placed.triangles:g} triangles are placed",
-            )
+        if self.refused > 1:
+            self.scene.note("the scene", f"has {self.refused - 1} more prims left out for that")
         _note_small_meshes(self.scene)
 
     def _left_out(self, prim: Usd.Prim, error: Tf.ErrorException) -> None:
@@ -255,12 +251,11 @@ class _Reader:
         if math.isinf(count.copies):
             self.scene.note(str(prim.GetPath()), "instances itself, left out")
             return False
-        if count.too_many:
-            self.scene.note(str(prim.GetPath()), f"comes to {count.too_many}; left out")
-            return False
         total = self.placed + count
         if total.too_many:
-            self.refused += int(count.copies)
+            if not self.refused:
+                self.scene.note(str(prim.GetPath()), f"is left out: it leads to {total.too_many}")
+            self.refused += 1
             return False
         self.placed = total
         return True

@@ -113,8 +113,7 @@ class Skeletons:
         per_point = query.GetNumInfluencesPerComponent()
         if influences is None or len(influences[0]) != per_point * len(points) or not per_point:
             raise FabricError(where, f"its joint influences do not fit its {len(points)} points")
-        mapper = query.GetJointMapper()
-        mapped = mapper.RemapTransforms(joints) if mapper else joints
+        mapped = _in_order(query, joints)
         numbers = np.array(influences[0], np.int32).reshape(-1, per_point)
         if len(points) and not 0 <= numbers.min() <= numbers.max() < len(mapped):
             bad = int(numbers.max()) if numbers.min() >= 0 else int(numbers.min())
@@ -199,6 +198,15 @@ def _is_skinned(prim: Usd.Prim) -> bool:
         return True
     joints = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("skel:jointIndices")
     return bool(joints) and joints.HasAuthoredValue()
+
+
+def _in_order(query: UsdSkel.SkinningQuery, joints: Vt.Matrix4dArray) -> Vt.Matrix4dArray:
+    """A skeleton's transforms in the order in which the mesh numbers its joints."""
+    mapper = query.GetJointMapper()
+    if not mapper or mapper.IsIdentity():
+        return joints
+    still = Vt.Matrix4dArray([Gf.Matrix4d(1)] * len(query.GetJointOrder()))
+    return mapper.RemapTransforms(joints, still)
 
 
 def _for_normals(matrix: Gf.Matrix4d) -> Gf.Matrix3d:
