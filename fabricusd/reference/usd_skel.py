@@ -106,9 +106,11 @@ class Skeletons:
                 points=np.array(points, np.float64), skeleton=None, query=query, influences=None,
                 joints=[], bind=Gf.Matrix4d(1), keeps_normals=not blended,
             )  # fmt: skip
-        joints = skeletal.ComputeSkinningTransforms(self.time)
+        joints = skeletal.HasBindPose() and skeletal.ComputeSkinningTransforms(self.time)
         if not joints:
-            raise FabricError(where, f"its skeleton {skeleton.GetPath()} gives no transforms")
+            raise FabricError(
+                where, f"its skeleton {skeleton.GetPath()} has no bindTransforms for its joints"
+            )
         influences = query.ComputeVaryingJointInfluences(len(points), self.time)
         per_point = query.GetNumInfluencesPerComponent()
         if influences is None or len(influences[0]) != per_point * len(points) or not per_point:
