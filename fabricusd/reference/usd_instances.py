@@ -56,10 +56,15 @@ class Count:
     def too_many(self) -> str:
         """What is above its bound, in words; an empty string where nothing is."""
         if self.copies > MOST_COPIES:
-            return f"{self.copies:.3g} instances; at most {MOST_COPIES:g} are placed"
+            return f"{_told(self.copies)} instances; at most {MOST_COPIES} are placed"
         if self.triangles > MOST_TRIANGLES:
-            return f"{self.triangles:.3g} triangles; instances may have {MOST_TRIANGLES:g} together"
+            words = f"{_told(self.triangles)} triangles"
+            return f"{words}; instances may have {_told(MOST_TRIANGLES)} together"
         return ""
+
+
+def _told(number: float) -> str:
+    return f"{number:.0f}" if number < 1e6 else f"{number:.3g}"
 
 
 class Copies:
