@@ -123,10 +123,13 @@ class Copies:
         return total
 
     def _mesh(self, mesh: UsdGeom.Mesh) -> Count:
-        """Its faces as triangles, before they are refined."""
-        corners = value_of(mesh.GetFaceVertexIndicesAttr(), self.time, self.scene)
-        faces = value_of(mesh.GetFaceVertexCountsAttr(), self.time, self.scene)
-        return Count(triangles=max(len(corners or ()) - 2 * len(faces or ()), 0))
+        """Its faces as triangles, before they are refined; what is wrong with them is noted where
+        they are read."""
+        arrays = []
+        for attribute in (mesh.GetFaceVertexIndicesAttr(), mesh.GetFaceVertexCountsAttr()):
+            value = attribute.Get(self.time)
+            arrays.append(() if value is None or type_problem(attribute, value) else value)
+        return Count(triangles=max(len(arrays[0]) - 2 * len(arrays[1]), 0))
 
 
 def is_invisible(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
@@ -144,7 +147,7 @@ def array_problem(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode) -> str:
         value = attribute.Get(time) if attribute else None
         wrong = type_problem(attribute, value)
         if wrong:
-            return f"has {name} that {wrong}"
+            return f"has an array of a wrong type: {name} {wrong}"
         length = 0 if value is None else len(value)
         # USD would read on behind the end of an array that is too short.
         if length != count and (length or name == "positions"):

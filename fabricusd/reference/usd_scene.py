@@ -33,12 +33,15 @@ from fabricusd.reference.usd_material import Materials
 from fabricusd.reference.usd_mesh import Placed, is_mirrored, read_mesh
 from fabricusd.reference.usd_skel import Skeletons
 from fabricusd.reference.usd_units import note_units
-from fabricusd.reference.usd_value import value_of
+from fabricusd.reference.usd_value import note_types, usd_words, value_of
 from fabricusd.schema.source import compose_stage, usd_errors
 
 _PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 _DEEPEST = 8
 """Point instancers inside one another before they are taken for a cycle."""
+
+_READ_BY_USD = "xformOp.*|visibility|purpose|invisibleIds|exposure(:.*)?"
+"""Attributes that no reader here asks for: transforms and the like come from USD's functions."""
 
 _DETAIL = 1e-5
 """Size of a mesh over that of the scene below which 32-bit coordinates show."""
@@ -151,7 +154,7 @@ class _Reader:
         _note_small_meshes(self.scene)
 
     def _left_out(self, prim: Usd.Prim, error: Tf.ErrorException) -> None:
-        self.scene.note(str(prim.GetPath()), f"is left out: {one_line(str(error), 200)}")
+        self.scene.note(str(prim.GetPath()), f"is left out: {usd_words(error)}")
 
     def _visit(
         self,
@@ -164,6 +167,7 @@ class _Reader:
         `root`'s parent on."""
         base = root if root.IsPseudoRoot() else root.GetParent()
         for prim in self._visible(root, bool(inside)):
+            note_types(prim, _READ_BY_USD, self.time, self.scene)
             try:
                 matrix = before @ as_matrix(cache.ComputeRelativeTransform(prim, base)[0])
                 self._add(_Waiting(prim=prim, matrix=matrix, base=base, before=before), inside)

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 
-from fabricusd.errors import FabricError, one_line
+from fabricusd.errors import FabricError
 from fabricusd.reference.scene import Scene
-from fabricusd.reference.usd_value import array_of
+from fabricusd.reference.usd_value import array_of, note_types, usd_words
 
 _BELOW_ROOTS = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
 """As for prototypes of instancers, which may lie below an `over`."""
@@ -88,7 +88,7 @@ class Skeletons:
         except FabricError as error:
             problem = error.problem
         except Tf.ErrorException as error:
-            problem = one_line(str(error), 200)
+            problem = usd_words(error)
         self.scene.note(str(prim.GetPath()), f"is skinned, but {problem}; it is rendered at rest")
         return None
 
@@ -100,6 +100,8 @@ class Skeletons:
         skeletal = self._cache.GetSkelQuery(UsdSkel.Skeleton(skeleton))
         if not skeletal:
             raise FabricError(where, f"its skeleton {skeleton.GetPath()} makes no sense")
+        animation = skeletal.GetAnimQuery()
+        self._note_types(prim, skeleton, *([animation.GetPrim()] if animation else []))
         blended = query.HasBlendShapes() and self._blend(prim, query, skeletal, points)
         if not query.HasJointInfluences():
             return Pose(
@@ -131,6 +133,14 @@ class Skeletons:
             bind=query.GetGeomBindTransform(self.time),
             keeps_normals=not blended,
         )
+
+    def _note_types(self, mesh: Usd.Prim, *others: Usd.Prim) -> None:
+        """What has a wrong type is as good as missing to USD, which does not say so."""
+        note_types(mesh, r"(primvars:)?skel:.*", self.time, self.scene)
+        shapes = UsdSkel.BindingAPI(mesh).GetBlendShapeTargetsRel().GetTargets()
+        targets = [mesh.GetStage().GetPrimAtPath(path) for path in shapes]
+        for prim in (*others, *filter(None, targets)):
+            note_types(prim, ".*", self.time, self.scene)
 
     def _query(self, prim: Usd.Prim) -> tuple[UsdSkel.SkinningQuery, Usd.Prim]:
         """The mesh's skinning and its skeleton's prim, below the nearest SkelRoot that has it."""

@@ -5,12 +5,14 @@ USD hands out whatever a file holds, also a path or a word where the schema has 
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
-from pxr import Sdf, Usd, Vt
+from pxr import Sdf, Tf, Usd, Vt
 
+from fabricusd.errors import one_line
 from fabricusd.reference.scene import Scene
 
 _WORDS = (Vt.TokenArray, Vt.StringArray)
@@ -29,6 +31,22 @@ def value_of(attribute: Usd.Attribute, time: Usd.TimeCode, scene: Scene) -> Any:
     taken = "it is left out" if fallback is None else f"{_words(fallback)} is taken"
     scene.note(str(attribute.GetPath()), f"{problem}; {taken}")
     return fallback
+
+
+def note_types(prim: Usd.Prim, names: str, time: Usd.TimeCode, scene: Scene) -> None:
+    """Note the authored attributes of a wrong type among those that USD reads by itself.
+
+    names : pattern of their names
+    """
+    for attribute in prim.GetAuthoredAttributes():
+        if re.fullmatch(names, attribute.GetName()):
+            value_of(attribute, time, scene)
+
+
+def usd_words(error: Tf.ErrorException) -> str:
+    """What USD found wrong, on one line, without the places in its source."""
+    told = [str(one.commentary) for one in error.args if hasattr(one, "commentary")]
+    return one_line("; ".join(told) or str(error), 200)
 
 
 def type_problem(attribute: Usd.Attribute, value: Any) -> str:
