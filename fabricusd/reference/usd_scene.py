@@ -286,17 +286,25 @@ class _Reader:
             if not prim or not prim.IsA(UsdGeom.Camera):
                 known = ", ".join(str(p.GetPath()) for p in self.cameras) or "none"
                 raise FabricError(f"{path}:{name}", f"is no camera; the scene's are: {known}")
-            found = read_camera(prim, self.time, self.metres, self.scene)
+            found = self._read_camera(prim)
             if found is None:
-                raise FabricError(str(path), self.scene.notes[-1])
+                own = [note for note in self.scene.notes if note.startswith(name)]
+                raise FabricError(str(path), own[-1])
             return found
         for prim in self.cameras:
-            found = read_camera(prim, self.time, self.metres, self.scene)
+            found = self._read_camera(prim)
             if found is not None:
                 if len(self.cameras) > 1:
                     self.scene.note(found.path, f"is taken, one of {len(self.cameras)} cameras")
                 return found
         return None
+
+    def _read_camera(self, prim: Usd.Prim) -> Camera | None:
+        try:
+            return read_camera(prim, self.time, self.metres, self.scene)
+        except Tf.ErrorException as error:
+            self._left_out(prim, error)
+            return None
 
 
 def _note_small_meshes(scene: Scene) -> None:
