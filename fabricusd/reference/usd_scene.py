@@ -32,7 +32,7 @@ from fabricusd.reference.usd_light import is_light, read_light
 from fabricusd.reference.usd_material import Materials
 from fabricusd.reference.usd_mesh import Placed, is_mirrored, read_mesh
 from fabricusd.reference.usd_skel import Skeletons
-from fabricusd.reference.usd_units import note_units
+from fabricusd.reference.usd_units import note_units, stage_units
 from fabricusd.reference.usd_value import note_types, usd_words, value_of
 from fabricusd.schema.source import compose_stage, usd_errors
 
@@ -111,14 +111,8 @@ class _Reader:
         self.fineness = fineness
         self.waiting: list[_Waiting] = []
         self.time = Usd.TimeCode.EarliestTime() if time_code is None else Usd.TimeCode(time_code)
-        self.scene = Scene(notes=notes, up_axis=str(UsdGeom.GetStageUpAxis(stage)))
-        self.metres = UsdGeom.GetStageMetersPerUnit(stage)
-        where = stage.GetRootLayer().GetDisplayName()
-        if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
-            self.scene.note(where, f"has no metersPerUnit; USD's {self.metres:g} is taken")
-        elif not (math.isfinite(self.metres) and self.metres > 0):
-            self.scene.note(where, f"has metersPerUnit {self.metres:g}; 0.01 is taken")
-            self.metres = 0.01
+        self.scene = Scene(notes=notes)
+        self.metres, self.scene.up_axis = stage_units(stage, self.scene)
         self.materials = Materials(self.scene, binding, self.time)
         self.skeletons = Skeletons(self.time, self.scene)
         self.copies = Copies(stage, self.time, self.scene)
@@ -207,6 +201,9 @@ class _Reader:
             matrix = one.matrix
             if pose is not None and pose.skeleton is not None:
                 matrix = one.before @ self._relative(pose.skeleton, one.base)
+                if not np.isfinite(matrix).all():
+                    self.scene.note(where, "has a skeleton whose place is not finite, left out")
+                    return
             mesh = read_mesh(
                 Placed(prim=prim, matrix=matrix, mirrored=is_mirrored(one.matrix), pose=pose),
                 self.time, self.metres, self.materials, self.scene, self.fineness,

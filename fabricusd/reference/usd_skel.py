@@ -224,4 +224,6 @@ def _in_order(query: UsdSkel.SkinningQuery, joints: Vt.Matrix4dArray) -> Vt.Matr
 def _for_normals(matrix: Gf.Matrix4d) -> Gf.Matrix3d:
     """The inverse transpose, by which normals turn; 0 where the matrix has no inverse."""
     turn = np.array(matrix.ExtractRotationMatrix())
+    if not np.isfinite(turn).all():
+        return Gf.Matrix3d(0)
     return Gf.Matrix3d(*np.linalg.pinv(turn).T.ravel().tolist())

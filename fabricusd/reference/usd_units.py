@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from pxr import Pcp, Sdf, Usd, UsdGeom
+from pxr import Pcp, Sdf, Tf, Usd, UsdGeom
 
 from fabricusd.reference.scene import Scene
 from fabricusd.reference.usd_instances import as_matrix
@@ -17,8 +17,34 @@ from fabricusd.reference.usd_instances import as_matrix
 _ALIKE = 1e-3
 """Relative difference below which two units are one."""
 
+_AXES = {"Y": np.array([0.0, 1.0, 0.0]), "Z": np.array([0.0, 0.0, 1.0])}
+"""Axes that may point up."""
+
 _PLACED = ("Mesh", "Camera", "Points", "BasisCurves", "PointInstancer", "Skeleton")
 """Types of prims whose lengths are in a layer's unit; lights and others mostly come with them."""
+
+
+def stage_units(stage: Usd.Stage, scene: Scene) -> tuple[float, str]:
+    """(metres in one unit of a stage, its axis up), with a note where they are not said sensibly."""
+    where = stage.GetRootLayer().GetDisplayName()
+    metres, up = 0.01, "Y"
+    try:
+        metres = float(UsdGeom.GetStageMetersPerUnit(stage))
+    except Tf.ErrorException:
+        scene.note(where, f"has a metersPerUnit that is no number; {metres:g} is taken")
+    if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
+        scene.note(where, f"has no metersPerUnit; USD's {metres:g} is taken")
+    elif not (math.isfinite(metres) and metres > 0):
+        scene.note(where, f"has metersPerUnit {metres:g}; 0.01 is taken")
+        metres = 0.01
+    try:
+        given = str(UsdGeom.GetStageUpAxis(stage))
+    except Tf.ErrorException:
+        given = "of another type"
+    if given not in _AXES:
+        scene.note(where, f"has an upAxis that is {given}; it must be Y or Z; {up} is taken")
+        return metres, up
+    return metres, given
 
 
 def note_units(stage: Usd.Stage, metres: float, time: Usd.TimeCode, scene: Scene) -> None:
@@ -27,7 +53,7 @@ def note_units(stage: Usd.Stage, metres: float, time: Usd.TimeCode, scene: Scene
     metres : in one unit of the stage
     """
     root = stage.GetRootLayer()
-    up = str(UsdGeom.GetStageUpAxis(stage))
+    up = scene.up_axis
     other = {
         layer: words
         for layer in stage.GetUsedLayers()
@@ -121,6 +147,5 @@ def _made_up_for(
     # A scale that is nearer to the units' ratio than to 1 was chosen with the ratio in mind.
     if abs(math.log(size) - wanted) > 0.5 * abs(wanted) + _ALIKE and abs(wanted) > _ALIKE:
         return False
-    axes = {"Y": np.array([0.0, 1.0, 0.0]), "Z": np.array([0.0, 0.0, 1.0])}
-    turned = matrix @ axes[_up(layer) or up]
-    return float(turned @ axes[up]) > 0.5 * float(np.linalg.norm(turned))
+    turned = matrix @ _AXES[_up(layer) or up]
+    return float(turned @ _AXES[up]) > 0.5 * float(np.linalg.norm(turned))

@@ -274,6 +274,20 @@ def test_what_cannot_be_posed_is_rendered_at_rest_with_a_note(tmp_path, name):
     assert scene.meshes[0].points == pytest.approx(np.array(POINTS) + np.array([5, 0, 0]))
 
 
+@pytest.mark.parametrize("number", [np.nan, np.inf, 1e30])
+def test_joints_without_a_finite_place_are_read(tmp_path, number):
+    stage = new_stage(tmp_path)
+    sleeve(stage).CreateNormalsAttr([(0, 0, 1)] * 6)
+    animation = UsdSkel.Animation(stage.GetPrimAtPath("/Body/Skel/Anim"))
+    animation.GetRotationsAttr().Set([Gf.Quatf(1), Gf.Quatf(number, 1, 0, 0)], 2.0)
+    skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Body/Skel"))
+    assert len(read(stage, time_code=2.0).meshes) == 1
+    UsdGeom.XformCommonAPI(skeleton).SetTranslate((number, 0, 0))
+    scene = read(stage, time_code=2.0)
+    assert len(scene.meshes) == (1 if np.isfinite(number) else 0)
+    assert any(note.startswith("/Body/Sleeve has") for note in scene.notes)
+
+
 def test_a_mesh_below_a_skel_root_that_nothing_moves_is_read_without_a_note(tmp_path):
     stage = new_stage(tmp_path)
     sleeve(stage)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from pxr import Sdf, Usd, UsdGeom
 
+from fabricusd.errors import FabricError
+from fabricusd.reference.read import read_scene
 from fabricusd.schema.source import PRESETS
 from tests.reference.stages import bind_fabric, new_stage, read, square
 
@@ -167,3 +171,34 @@ def test_an_asset_in_another_unit_is_noted_once(tmp_path, name):
 @pytest.mark.parametrize("name", SILENT)
 def test_an_asset_in_the_stages_unit_or_brought_to_it_is_not_noted(tmp_path, name):
     assert notes_of(new_stage(tmp_path), tmp_path, SILENT[name]) == []
+
+
+METADATA = {
+    # line of the layer: words of the note
+    "metersPerUnit = </x>": "has a metersPerUnit that is no number; 0.01 is taken",
+    'metersPerUnit = "a"': "metersPerUnit",
+    "metersPerUnit = nan": "has metersPerUnit nan; 0.01 is taken",
+    "metersPerUnit = -1": "has metersPerUnit -1; 0.01 is taken",
+    "upAxis = </x>": "has an upAxis that is of another type; it must be Y or Z; Y is taken",
+    'upAxis = "X"': "has an upAxis that is X; it must be Y or Z; Y is taken",
+}
+
+
+@pytest.mark.parametrize("line", METADATA)
+def test_a_stage_whose_unit_or_axis_is_none_is_read_with_a_note_or_refused(tmp_path, line):
+    stage = new_stage(tmp_path)
+    square(stage)
+    stage.GetRootLayer().Save()
+    text = (tmp_path / "scene.usda").read_text()
+    name = line.split()[0]
+    file = tmp_path / "changed.usda"
+    file.write_text(re.sub(rf"{name} = .*", line, text))
+    assert line in file.read_text()
+    try:
+        scene = read_scene(file)
+    except FabricError as error:
+        found = [str(error)]
+    else:
+        assert scene.up_axis == "Y"
+        found = scene.notes
+    assert any(METADATA[line] in words for words in found)
