@@ -25,7 +25,7 @@ _PLACED = ("Mesh", "Camera", "Points", "BasisCurves", "PointInstancer", "Skeleto
 
 
 def stage_units(stage: Usd.Stage, scene: Scene) -> tuple[float, str]:
-    """(metres in one unit of a stage, its axis up), with a note where they are not said sensibly."""
+    """(metres in one unit of a stage, its axis up), with a note where they make no sense."""
     where = stage.GetRootLayer().GetDisplayName()
     metres, up = 0.01, "Y"
     try:
