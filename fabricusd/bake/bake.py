@@ -33,6 +33,7 @@ from fabricusd.bake.map_error import MapError, map_errors
 from fabricusd.bake.maps import TextureMap, chosen_maps
 from fabricusd.bake.mesh_layer import write_mesh_layer
 from fabricusd.bake.overlaps import refuse_overlaps
+from fabricusd.bake.reasons import explained
 from fabricusd.bake.recipe import Recipe, recipe
 from fabricusd.bake.relight import best_choice
 from fabricusd.bake.report import write_report
@@ -268,9 +269,12 @@ def _garments(
     mesh: str | None,
     fabric: str | Fabric | Binding | None,
 ) -> list[Garment]:
-    if settings.unwrap:
-        return garments(scene, mesh, partial(unwrapped, settings.unwrap, as_binding(fabric)))
-    found = garments(scene, mesh)
+    with explained(scene):
+        if not scene.meshes:
+            raise FabricError("the scene", "holds no mesh that could be baked")
+        if settings.unwrap:
+            return garments(scene, mesh, partial(unwrapped, settings.unwrap, as_binding(fabric)))
+        found = garments(scene, mesh)
     return [fitted(one) for one in found] if settings.fit else found
 
 

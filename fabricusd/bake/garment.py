@@ -118,16 +118,12 @@ def garments(
     """
     known = [m.path for m in scene.meshes]
     if mesh is not None and mesh not in known:
-        accepted = f"; it must be one of {', '.join(known)}" if known else ", which has none"
-        raise _explained(FabricError(mesh, f"is no mesh of the scene{accepted}"), scene)
+        raise FabricError(mesh, f"is no mesh of the scene; it must be one of {', '.join(known)}")
     found: dict[str, Garment] = {}
     for one in scene.meshes:
         if mesh is not None and one.path != mesh:
             continue
-        try:
-            made = (make or garment_of)(scene, one)
-        except FabricError as error:
-            raise _explained(error, scene) from error
+        made = (make or garment_of)(scene, one)
         if made is None:
             continue
         key = _shape_key(one)
@@ -137,27 +133,10 @@ def garments(
         else:
             found[key] = made
     if not found:
-        bare = "wears no fabric; bind one, or name one with --fabric"
-        raise _explained(FabricError(mesh or "the scene", bare), scene)
+        raise FabricError(
+            mesh or "the scene", "wears no fabric; bind one, or name one with --fabric"
+        )
     return _with_fabric_names(_with_names(list(found.values())))
-
-
-MOST_REASONS = 3
-"""Notes of the reader that a refusal repeats."""
-
-
-def _explained(error: FabricError, scene: Scene) -> FabricError:
-    """The refusal with what the scene's reader had to say of its mesh, or else of the scene."""
-    where, told = error.where, error.problem
-    reasons = [n for n in scene.notes if n.startswith((f"{where} ", f"{where}."))]
-    if where == "the scene" or not scene.meshes:
-        # What could not be opened stands first; what is said of fabrics explains more than lights.
-        reasons = sorted(scene.notes, key=lambda n: n.startswith("/") and "fabric" not in n)
-    reasons = [n for n in reasons if n.removeprefix(where).strip().split(";")[0] not in told]
-    words = "".join(f"; {reason}" for reason in reasons[:MOST_REASONS])
-    if len(reasons) > MOST_REASONS:
-        words += f"; and {len(reasons) - MOST_REASONS} more, which 'fabricusd render -n' tells"
-    return FabricError(where, told + words)
 
 
 def _shape_key(mesh: Mesh) -> str:
