@@ -263,18 +263,16 @@ def plan(
     ]
 
 
+@explained
 def _garments(
     scene: Scene,
     settings: Settings,
     mesh: str | None,
     fabric: str | Fabric | Binding | None,
 ) -> list[Garment]:
-    with explained(scene):
-        if not scene.meshes:
-            raise FabricError("the scene", "holds no mesh that could be baked")
-        if settings.unwrap:
-            return garments(scene, mesh, partial(unwrapped, settings.unwrap, as_binding(fabric)))
-        found = garments(scene, mesh)
+    if settings.unwrap:
+        return garments(scene, mesh, partial(unwrapped, settings.unwrap, as_binding(fabric)))
+    found = garments(scene, mesh)
     return [fitted(one) for one in found] if settings.fit else found
 
 

@@ -2,26 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from functools import wraps
+from typing import Concatenate, ParamSpec, TypeVar
 
 from fabricusd.errors import FabricError
 from fabricusd.reference.scene import Scene
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 MOST_REASONS = 3
 """Notes of the reader that a refusal repeats."""
 
 
-@contextmanager
-def explained(scene: Scene) -> Iterator[None]:
-    """Add to a FabricError of the block the scene's notes on what it is about, a mesh or all."""
-    try:
-        yield
-    except FabricError as error:
-        reasons = "".join(f"; {reason}" for reason in _reasons(error, scene.notes))
-        if not reasons:
-            raise
-        raise FabricError(error.where, error.problem + reasons) from error
+def explained(
+    make: Callable[Concatenate[Scene, P], T],
+) -> Callable[Concatenate[Scene, P], T]:
+    """A function of a scene whose refusals repeat the scene's notes on what they are about, a mesh
+    or all; a scene without a mesh is refused."""
+
+    @wraps(make)
+    def made(scene: Scene, /, *args: P.args, **named: P.kwargs) -> T:
+        try:
+            if not scene.meshes:
+                raise FabricError("the scene", "holds no mesh that could be baked")
+            return make(scene, *args, **named)
+        except FabricError as error:
+            reasons = "".join(f"; {reason}" for reason in _reasons(error, scene.notes))
+            if not reasons:
+                raise
+            raise FabricError(error.where, error.problem + reasons) from error
+
+    return made
 
 
 def _reasons(error: FabricError, notes: list[str]) -> list[str]:
