@@ -285,8 +285,8 @@ class _Reader:
                 raise FabricError(f"{path}:{name}", f"is no camera; the scene's are: {known}")
             found = self._read_camera(prim)
             if found is None:
-                own = [note for note in self.scene.notes if note.startswith(name)]
-                raise FabricError(str(path), own[-1])
+                own = [n for n in self.scene.notes if n.startswith(f"{prim.GetPath()} ")]
+                raise FabricError(str(path), own[-1] if own else f"{name} sees nothing")
             return found
         for prim in self.cameras:
             found = self._read_camera(prim)
