@@ -70,7 +70,9 @@ def read_usd_scene(
     # What USD has to say of a prim would be several lines on standard error.
     warnings = UsdUtils.CoalescingDiagnosticDelegate()
     try:
-        scene = _Reader(stage, notes, binding, time_code, fineness).read(path, camera)
+        # What is not finite is noted; NumPy would write of it to standard error as well.
+        with np.errstate(all="ignore"):
+            scene = _Reader(stage, notes, binding, time_code, fineness).read(path, camera)
         for warning in warnings.TakeUncoalescedDiagnostics():
             scene.note(str(path), f"USD: {one_line(warning.commentary, 300)}")
     finally:
@@ -195,19 +197,17 @@ class _Reader:
         prim, where = one.prim, str(one.prim.GetPath())
         if is_light(prim):
             self.scene.note(where, "shines as a light, left out: it is a mesh alone")
-        # What is not finite is noted; NumPy would write of it to standard error as well.
-        with np.errstate(all="ignore"):
-            pose = self.skeletons.pose(prim)
-            matrix = one.matrix
-            if pose is not None and pose.skeleton is not None:
-                matrix = one.before @ self._relative(pose.skeleton, one.base)
-                if not np.isfinite(matrix).all():
-                    self.scene.note(where, "has a skeleton whose place is not finite, left out")
-                    return
-            mesh = read_mesh(
-                Placed(prim=prim, matrix=matrix, mirrored=is_mirrored(one.matrix), pose=pose),
-                self.time, self.metres, self.materials, self.scene, self.fineness,
-            )  # fmt: skip
+        pose = self.skeletons.pose(prim)
+        matrix = one.matrix
+        if pose is not None and pose.skeleton is not None:
+            matrix = one.before @ self._relative(pose.skeleton, one.base)
+            if not np.isfinite(matrix).all():
+                self.scene.note(where, "has a skeleton whose place is not finite, left out")
+                return
+        mesh = read_mesh(
+            Placed(prim=prim, matrix=matrix, mirrored=is_mirrored(one.matrix), pose=pose),
+            self.time, self.metres, self.materials, self.scene, self.fineness,
+        )  # fmt: skip
         if mesh is None:
             return
         self.scene.meshes.append(mesh)

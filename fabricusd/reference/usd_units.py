@@ -17,6 +17,9 @@ from fabricusd.reference.usd_instances import as_matrix
 _ALIKE = 1e-3
 """Relative difference below which two units are one."""
 
+_UNITS = (1e-12, 1e16)
+"""Metres that a unit may have: from a thousandth of a nanometre to a light-year."""
+
 _AXES = {"Y": np.array([0.0, 1.0, 0.0]), "Z": np.array([0.0, 0.0, 1.0])}
 """Axes that may point up."""
 
@@ -34,8 +37,9 @@ def stage_units(stage: Usd.Stage, scene: Scene) -> tuple[float, str]:
         scene.note(where, f"has a metersPerUnit that is no number; {metres:g} is taken")
     if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
         scene.note(where, f"has no metersPerUnit; USD's {metres:g} is taken")
-    elif not (math.isfinite(metres) and metres > 0):
-        scene.note(where, f"has metersPerUnit {metres:g}; 0.01 is taken")
+    elif not _UNITS[0] <= metres <= _UNITS[1]:
+        accepted = f"from {_UNITS[0]:g} to {_UNITS[1]:g}"
+        scene.note(where, f"has metersPerUnit {metres:g}; it must be {accepted}; 0.01 is taken")
         metres = 0.01
     try:
         given = str(UsdGeom.GetStageUpAxis(stage))
