@@ -39,7 +39,7 @@ def stage_units(stage: Usd.Stage, scene: Scene) -> tuple[float, str]:
         scene.note(where, f"has no metersPerUnit; USD's {metres:g} is taken")
     elif not _UNITS[0] <= metres <= _UNITS[1]:
         accepted = f"from {_UNITS[0]:g} to {_UNITS[1]:g}"
-        scene.note(where, f"has metersPerUnit {metres:g}; it must be {accepted}; 0.01 is taken")
+        scene.note(where, f"has metersPerUnit {metres:g}; 0.01 is taken; it must be {accepted}")
         metres = 0.01
     try:
         given = str(UsdGeom.GetStageUpAxis(stage))

@@ -177,9 +177,9 @@ METADATA = {
     # line of the layer: words of the note
     "metersPerUnit = </x>": "has a metersPerUnit that is no number; 0.01 is taken",
     'metersPerUnit = "a"': "no value of its type",
-    "metersPerUnit = nan": "has metersPerUnit nan; it must be from 1e-12 to 1e+16; 0.01 is taken",
-    "metersPerUnit = -1": "has metersPerUnit -1; it must be from 1e-12 to 1e+16; 0.01 is taken",
-    "metersPerUnit = 1e308": "has metersPerUnit 1e+308; it must be",
+    "metersPerUnit = nan": "has metersPerUnit nan; 0.01 is taken; it must be from 1e-12 to 1e+16",
+    "metersPerUnit = -1": "has metersPerUnit -1; 0.01 is taken",
+    "metersPerUnit = 1e308": "has metersPerUnit 1e+308; 0.01 is taken",
     "upAxis = </x>": "has an upAxis that is of another type; it must be Y or Z; Y is taken",
     'upAxis = "X"': "has an upAxis that is X; it must be Y or Z; Y is taken",
 }
