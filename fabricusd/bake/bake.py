@@ -33,6 +33,7 @@ from fabricusd.bake.map_error import MapError, map_errors
 from fabricusd.bake.maps import TextureMap, chosen_maps
 from fabricusd.bake.mesh_layer import write_mesh_layer
 from fabricusd.bake.overlaps import refuse_overlaps
+from fabricusd.bake.reasons import explained
 from fabricusd.bake.recipe import Recipe, recipe
 from fabricusd.bake.relight import best_choice
 from fabricusd.bake.report import write_report
@@ -290,6 +291,7 @@ def _extent(one: Garment) -> str:
     return words
 
 
+@explained
 def _garments(
     scene: Scene,
     settings: Settings,

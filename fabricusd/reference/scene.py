@@ -149,11 +149,14 @@ class Scene:
     notes: list[str] = field(default_factory=list)
     up_axis: str = "Y"
     refined: int = 0
+    _told: set[str] = field(default_factory=set, repr=False)
 
     def note(self, where: str, problem: str) -> None:
         """Keep one clear line about `where`, once."""
         line = f"{where} {problem}"
-        if line not in self.notes:
+        # A list is slow to search where each of many prims has a line of its own.
+        if line not in self._told:
+            self._told.add(line)
             self.notes.append(line)
 
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

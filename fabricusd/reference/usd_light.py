@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Usd, UsdGeom, UsdLux
+from pxr import Sdf, Usd, UsdLux
 
 from fabricusd.errors import FabricError
 from fabricusd.images import read_image
 from fabricusd.reference.scene import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE, Light, Scene
 from fabricusd.reference.usd_asset import asset_file
+from fabricusd.reference.usd_value import value_of
 
 _KINDS = {
     "DistantLight": DISTANT,
@@ -65,7 +66,7 @@ class _Inputs:
         if not (attribute and attribute.HasAuthoredValue()):
             older = self.prim.GetAttribute(name)
             attribute = older if older and older.HasAuthoredValue() else attribute
-        given = attribute.Get(self.time) if attribute else None
+        given = value_of(attribute, self.time, self.scene)
         return otherwise if given is None else given
 
     def numbers(self, name: str, otherwise: tuple[float, ...]) -> NDArray[np.float64]:
@@ -138,7 +139,7 @@ def read_light(
         path=str(prim.GetPath()),
         kind=kind,
         radiance=(float(radiance[0]), float(radiance[1]), float(radiance[2])),
-        frame=_pole(prim, frame) if kind == DOME else frame,
+        frame=_pole(inputs, frame) if kind == DOME else frame,
         width=lengths.get("width", 1.0) * metres,
         height=lengths.get("length", lengths.get("height", 1.0)) * metres,
         radius=lengths.get("radius", 0.5) * metres,
@@ -253,12 +254,12 @@ def _size(kind: int, matrix: NDArray[np.float64], lengths: dict[str, float], ang
     }.get(kind, 1.0)
 
 
-def _pole(prim: Usd.Prim, frame: NDArray[np.float64]) -> NDArray[np.float64]:
+def _pole(inputs: _Inputs, frame: NDArray[np.float64]) -> NDArray[np.float64]:
     """A dome's frame with its pole along +y: DomeLight_1 may have it along the stage's axis."""
-    axis = prim.GetAttribute("poleAxis")
+    axis = inputs.prim.GetAttribute("poleAxis")
     pole = axis.Get() if axis else None
     if pole == "scene":
-        pole = UsdGeom.GetStageUpAxis(prim.GetStage())
+        pole = inputs.scene.up_axis
     if pole != "Z":
         return frame
     turn = np.eye(4)

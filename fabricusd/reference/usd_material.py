@@ -12,6 +12,7 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
 from fabricusd.reference.scene import FabricSurface, PreviewSurface, Scene
 from fabricusd.reference.usd_preview import PreviewNetwork
+from fabricusd.reference.usd_value import value_of
 from fabricusd.schema import read_binding
 from fabricusd.schema.access import applies_binding, targets
 
@@ -109,8 +110,10 @@ class Materials:
     def _display(self, prim: Usd.Prim, name: str, count: int) -> tuple[float, ...] | None:
         """The mean of a display primvar of `count` channels; None where it has no usable value."""
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
-        given = primvar.Get(self.time) if primvar and primvar.HasValue() else None
-        if given is None or not len(given):
+        given = None
+        if primvar and primvar.HasValue():
+            given = value_of(primvar.GetAttr(), self.time, self.scene)
+        if given is None or not hasattr(given, "__len__") or not len(given):
             return None
         where = str(prim.GetPath())
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,10 @@ from fabricusd.reference.tessellation import (
     Tessellation,
 )
 from fabricusd.reference.usd_material import Materials, Resolved
+from fabricusd.reference.usd_skel import Pose
 from fabricusd.reference.usd_subdivision import read_refinement
+from fabricusd.reference.usd_value import array_of, value_of
+from fabricusd.schema.access import applies_binding
 
 MOST_TRIANGLES = 4_000_000
 """Triangles that a scene's surfaces are refined to, together: some 3 GB with all that is done."""
@@ -36,10 +40,29 @@ _FARTHEST = 1e9
 """Metres from the origin: beyond it squares of areas leave the range of 32-bit numbers."""
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Placed:
+    """A mesh's prim, and where it stands.
+
+    matrix : (4, 4) from its points to the world, in scene units
+    mirrored : whether the prim's own transform mirrors it
+    pose : its points as a skeleton leaves them; None for those of the prim
+    """
+
+    prim: Usd.Prim
+    matrix: NDArray[np.float64]
+    mirrored: bool
+    pose: Pose | None = None
+
+
+def is_mirrored(matrix: NDArray[np.float64]) -> bool:
+    """Whether a (4, 4) transform turns right hands into left ones."""
+    return bool(np.linalg.det(matrix[:3, :3]) < 0)
+
+
 def read_mesh(
-    prim: Usd.Prim,
+    placed: Placed,
     time: Usd.TimeCode,
-    matrix: NDArray[np.float64],
     metres: float,
     materials: Materials,
     scene: Scene,
@@ -47,13 +70,14 @@ def read_mesh(
 ) -> Mesh | None:
     """The mesh in world space and metres, or None with a note where it has no usable faces.
 
-    matrix : (4, 4) local to world, in scene units of `metres`
+    metres : in one scene unit
     """
+    prim, matrix, pose, mirrored = placed.prim, placed.matrix, placed.pose, placed.mirrored
     where = str(prim.GetPath())
     mesh = UsdGeom.Mesh(prim)
-    points = np.array(mesh.GetPointsAttr().Get(time) or [], np.float64).reshape(-1, 3)
-    counts = np.array(mesh.GetFaceVertexCountsAttr().Get(time) or [], np.int64)
-    indices = np.array(mesh.GetFaceVertexIndicesAttr().Get(time) or [], np.int64)
+    points = pose.points if pose else array_of(mesh.GetPointsAttr(), time, scene, width=3)
+    counts = array_of(mesh.GetFaceVertexCountsAttr(), time, scene, np.int64)
+    indices = array_of(mesh.GetFaceVertexIndicesAttr(), time, scene, np.int64)
     problem = _problem(points, counts, indices)
     if problem:
         scene.note(where, f"{problem}, left out")
@@ -61,8 +85,7 @@ def read_mesh(
     if (counts < 3).any():
         scene.note(where, f"has {int((counts < 3).sum())} faces below three corners, left out")
     points = _near(points, matrix, metres, where, scene)
-    mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
-    scheme = _scheme(mesh, time)
+    scheme = str(value_of(mesh.GetSubdivisionSchemeAttr(), time, scene) or "none")
     level = None
     if scheme not in ("none", "bilinear"):
         world = (points @ matrix[:3, :3].T + matrix[:3, 3]) * metres
@@ -77,7 +100,9 @@ def read_mesh(
     if missing.any():
         scene.note(where, "has no UVs for its fabric; it is rendered grey")
         numbers = np.where(missing, materials.without_uv().index, numbers)
-    normals = _authored_normals(prim, mesh, cut, time, scene) if scheme == "none" else cut.normals
+    normals: NDArray[np.floating] | None = (
+        _authored_normals(placed, mesh, cut, time, scene) if scheme == "none" else cut.normals
+    )
     if normals is not None:
         # Normals turn by the inverse transpose; rows here are normals.
         turn = np.linalg.pinv(matrix[:3, :3]).astype(np.float32)
@@ -110,10 +135,6 @@ def _near(
     return np.where(far[:, None], np.nan, points)
 
 
-def _scheme(mesh: UsdGeom.Mesh, time: Usd.TimeCode) -> str:
-    return str(mesh.GetSubdivisionSchemeAttr().Get(time) or "none")
-
-
 def _tessellate(
     mesh: UsdGeom.Mesh,
     time: Usd.TimeCode,
@@ -126,7 +147,8 @@ def _tessellate(
     mirrored: bool,
 ) -> Tessellation:
     """The faces as triangles, refined where a level is given and they are a surface that can be."""
-    left_handed = mesh.GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded
+    orientation = value_of(mesh.GetOrientationAttr(), time, scene)
+    left_handed = orientation == UsdGeom.Tokens.leftHanded
     hidden = _holes(mesh, time, len(counts), scene)
     if level is not None:
         refinement = read_refinement(mesh, time, points, counts, indices, hidden, scene, level)
@@ -161,7 +183,7 @@ def _affordable(mesh: UsdGeom.Mesh, refinement: Refinement, level: int, scene: S
 def _holes(mesh: UsdGeom.Mesh, time: Usd.TimeCode, count: int, scene: Scene) -> NDArray[np.bool_]:
     """(f,) which faces are holes."""
     hidden = np.zeros(count, bool)
-    holes = np.array(mesh.GetHoleIndicesAttr().Get(time) or [], np.int64)
+    holes = array_of(mesh.GetHoleIndicesAttr(), time, scene, np.int64)
     known = (holes >= 0) & (holes < count)
     if not known.all():
         bad = holes[np.argmin(known)]
@@ -196,12 +218,19 @@ def _materials(
     resolved = [materials.of(prim)]
     which = np.zeros(faces, np.int64)
     for subset in UsdGeom.Subset.GetAllGeomSubsets(mesh):
-        own = materials.of(subset.GetPrim())
-        if own is None or subset.GetElementTypeAttr().Get() != UsdGeom.Tokens.face:
-            continue
-        named = np.array(subset.GetIndicesAttr().Get(time) or [], np.int64)
-        chosen = named[(named >= 0) & (named < faces)]
         where = str(subset.GetPath())
+        kind = value_of(subset.GetElementTypeAttr(), time, scene)
+        if kind != UsdGeom.Tokens.face:
+            if applies_binding(subset.GetPrim()):
+                scene.note(
+                    where, f"is a subset of the type '{kind}', left out: only faces wear a fabric"
+                )
+            continue
+        own = materials.of(subset.GetPrim())
+        if own is None:
+            continue
+        named = array_of(subset.GetIndicesAttr(), time, scene, np.int64)
+        chosen = named[(named >= 0) & (named < faces)]
         if len(chosen) < len(named):
             scene.note(where, f"names {len(named) - len(chosen)} faces that are none, left out")
         if (which[chosen] > 0).any():
@@ -234,7 +263,7 @@ def _uv(
         primvar = _uv_primvar(prim, surface, where, scene)
         name = primvar.GetName() if primvar else ""
         if name not in known:
-            known[name] = _at_corners(primvar, cut, time, 2) if primvar else None
+            known[name] = _at_corners(primvar, cut, time, 2, scene) if primvar else None
         values = known[name]
         if primvar and values is None:
             scene.note(
@@ -276,33 +305,42 @@ def _uv_primvar(
 
 
 def _at_corners(
-    primvar: Any, cut: Tessellation, time: Usd.TimeCode, width: int
+    primvar: Any, cut: Tessellation, time: Usd.TimeCode, width: int, scene: Scene
 ) -> NDArray[np.float64] | None:
     """(m, 3, width) values of a primvar at the triangles' corners; None where its type or its
     length are others."""
-    values = primvar.Get(time)
+    values = value_of(primvar.GetAttr(), time, scene)
     try:
         array = np.array([] if values is None else values, np.float64)
     except (TypeError, ValueError):
         return None
     if array.ndim != 2 or array.shape[1] < width:
         return None
-    indices = np.array(primvar.GetIndices(time), np.int64) if primvar.IsIndexed() else None
+    indices = None
+    if primvar.IsIndexed():
+        indices = array_of(primvar.GetIndicesAttr(), time, scene, np.int64)
     return cut.spread(array[:, :width], str(primvar.GetInterpolation()), indices)
 
 
 def _authored_normals(
-    prim: Usd.Prim, mesh: UsdGeom.Mesh, cut: Tessellation, time: Usd.TimeCode, scene: Scene
+    placed: Placed, mesh: UsdGeom.Mesh, cut: Tessellation, time: Usd.TimeCode, scene: Scene
 ) -> NDArray[np.float64] | None:
-    """(m, 3, 3) normals of the file, or None; the primvar wins over the attribute."""
+    """(m, 3, 3) normals of the file, posed as the mesh is, or None; the primvar wins over the
+    attribute."""
+    prim, pose = placed.prim, placed.pose
+    where = str(prim.GetPath())
     primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals")
-    authored = mesh.GetNormalsAttr().Get(time)
     if primvar and primvar.HasValue():
-        values = _at_corners(primvar, cut, time, 3)
-    elif authored is not None and len(authored):
-        values = cut.spread(np.array(authored, np.float64), str(mesh.GetNormalsInterpolation()))
+        values = _at_corners(primvar, cut, time, 3, scene)
     else:
-        return None
+        authored = array_of(mesh.GetNormalsAttr(), time, scene, width=3)
+        if not len(authored):
+            return None
+        values = cut.spread(authored, str(mesh.GetNormalsInterpolation()))
     if values is None:
-        scene.note(str(prim.GetPath()), "has normals that do not fit its faces; it is smoothed")
-    return values
+        scene.note(where, "has normals that do not fit its faces; it is smoothed")
+        return None
+    posed = values if pose is None else pose.normals(values, cut.triangles)
+    if posed is None:
+        scene.note(where, "has normals that its blend shapes do not move; it is smoothed")
+    return posed

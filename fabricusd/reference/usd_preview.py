@@ -57,6 +57,8 @@ _LEFT_OUT = {"clearcoat": 0.0, "displacement": 0.0}
 _FLAT = (0.0, 0.0, 1.0)
 """The normal that turns nothing."""
 
+_MODES = ("repeat", "clamp", "mirror", "black")
+
 _CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 
 
@@ -243,9 +245,15 @@ class PreviewNetwork:
         return np.ascontiguousarray(np.clip(pixels, row.low, row.high), np.float32)
 
     def _wrap(self, node: UsdShade.Shader) -> tuple[str, str]:
-        modes = [str(self._source(node, name)[0] or "repeat") for name in ("wrapS", "wrapT")]
-        known = [m if m in ("repeat", "clamp", "mirror", "black") else "repeat" for m in modes]
-        return known[0], known[1]
+        return self._mode(node, "wrapS"), self._mode(node, "wrapT")
+
+    def _mode(self, node: UsdShade.Shader, name: str) -> str:
+        mode = str(self._source(node, name)[0] or "repeat")
+        if mode in _MODES:
+            return mode
+        if mode != "useMetadata":
+            self._note(f"has {name} '{mode}'; it must be one of {', '.join(_MODES)}; it repeats")
+        return "repeat"
 
     def _coordinates(self, node: UsdShade.Shader) -> NDArray[np.float64]:
         """(3, 3) from the mesh's UVs to the texture's; the UV set is kept in `uv_set`."""

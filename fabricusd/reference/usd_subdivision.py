@@ -12,6 +12,7 @@ from fabricusd.reference.polygons import triangulate
 from fabricusd.reference.scene import Scene
 from fabricusd.reference.subdivision import Cage, Topology, too_crowded
 from fabricusd.reference.tessellation import Refinement
+from fabricusd.reference.usd_value import array_of, value_of
 
 _BOUNDARIES = ("none", "edgeOnly", "edgeAndCorner")
 
@@ -32,7 +33,7 @@ def read_refinement(
     level : 0 for the cage
     """
     where = str(mesh.GetPath())
-    scheme = str(mesh.GetSubdivisionSchemeAttr().Get(time))
+    scheme = str(value_of(mesh.GetSubdivisionSchemeAttr(), time, scene))
     surface = f"is a subdivision surface ({scheme}), rendered at its cage"
     if scheme != "catmullClark" or not level:
         scene.note(where, surface)
@@ -49,7 +50,8 @@ def read_refinement(
     if crowded:
         scene.note(where, f"{surface}: it {crowded}")
         return None
-    smooth = mesh.GetTriangleSubdivisionRuleAttr().Get(time) == UsdGeom.Tokens.smooth
+    rule = value_of(mesh.GetTriangleSubdivisionRuleAttr(), time, scene)
+    smooth = rule == UsdGeom.Tokens.smooth
     if smooth and (cut_counts == 3).any():
         scene.note(where, "has triangleSubdivisionRule 'smooth', refined by 'catmullClark'")
     boundary = _token(mesh.GetInterpolateBoundaryAttr(), time, _BOUNDARIES, where, scene)
@@ -74,7 +76,7 @@ def _token(
     attribute: Usd.Attribute, time: Usd.TimeCode, known: tuple[str, ...], where: str, scene: Scene
 ) -> str:
     """A token's value, or its fallback with a note where that is none of `known`."""
-    value = str(attribute.Get(time))
+    value = str(value_of(attribute, time, scene))
     if value in known:
         return value
     fallback = "edgeAndCorner" if "edgeAndCorner" in known else "cornersPlus1"
@@ -137,9 +139,9 @@ def _creases(
 ) -> NDArray[np.float64]:
     """(e,) sharpness of the topology's edges; of one named twice, the last."""
     crease = np.zeros(len(topology.uses))
-    points = np.array(mesh.GetCreaseIndicesAttr().Get(time) or [], np.int64)
-    lengths = np.array(mesh.GetCreaseLengthsAttr().Get(time) or [], np.int64)
-    sharpness = np.array(mesh.GetCreaseSharpnessesAttr().Get(time) or [], np.float64)
+    points = array_of(mesh.GetCreaseIndicesAttr(), time, scene, np.int64)
+    lengths = array_of(mesh.GetCreaseLengthsAttr(), time, scene, np.int64)
+    sharpness = array_of(mesh.GetCreaseSharpnessesAttr(), time, scene)
     if not len(points) and not len(lengths):
         return crease
     edges = int((lengths - 1).sum())
@@ -179,8 +181,8 @@ def _corners(
 ) -> NDArray[np.float64]:
     """(n,) sharpness of the points."""
     found = np.zeros(count)
-    points = np.array(mesh.GetCornerIndicesAttr().Get(time) or [], np.int64)
-    sharpness = np.array(mesh.GetCornerSharpnessesAttr().Get(time) or [], np.float64)
+    points = array_of(mesh.GetCornerIndicesAttr(), time, scene, np.int64)
+    sharpness = array_of(mesh.GetCornerSharpnessesAttr(), time, scene)
     if len(points) != len(sharpness):
         scene.note(
             where,
