@@ -33,12 +33,12 @@ from fabricusd.bake.map_error import MapError, map_errors
 from fabricusd.bake.maps import TextureMap, chosen_maps
 from fabricusd.bake.mesh_layer import write_mesh_layer
 from fabricusd.bake.overlaps import refuse_overlaps
-from fabricusd.bake.ranges import LARGEST, SMALLEST, check_settings
+from fabricusd.bake.ranges import check_settings
 from fabricusd.bake.recipe import Recipe, recipe
 from fabricusd.bake.relight import best_choice
 from fabricusd.bake.report import write_report
 from fabricusd.bake.scratch import Scratch
-from fabricusd.bake.sheet import Sheet, sheets_of
+from fabricusd.bake.sheet import LARGEST, SMALLEST, Sheet, sheets_of
 from fabricusd.bake.unwrap import unwrapped
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric

@@ -15,7 +15,7 @@ from fabricusd.bake.encoding import FORMATS, encoding_from
 from fabricusd.bake.garment import FIRST_TILE, LAST_TILE
 from fabricusd.bake.maps import REGISTRY
 from fabricusd.bake.names import folded, is_file_stem
-from fabricusd.bake.ranges import LARGEST, SMALLEST
+from fabricusd.bake.sheet import LARGEST, SMALLEST
 from fabricusd.bake.stated import Stated, read_stated
 from fabricusd.errors import FabricError
 
@@ -37,7 +37,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     udim = root.field("settings").field("udim").flag()
     root.field("scene").field("file").text()
     resolution = root.field("resolution")
-    if resolution.value not in RESOLUTIONS or isinstance(resolution.value, float):
+    if not isinstance(resolution.value, int) or resolution.value not in RESOLUTIONS:
         resolution.refuse(f"a power of two from {SMALLEST} to {LARGEST}")
     maps = {name for name, one in root.field("maps").items() if _check_map(name, one)}
     garments = root.field("garments")

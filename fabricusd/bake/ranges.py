@@ -11,14 +11,12 @@ from fabricusd.bake.btf.write import FORMS
 from fabricusd.bake.encoding import FORMATS
 from fabricusd.bake.light import is_number, unit_light
 from fabricusd.bake.maps import chosen_maps
+from fabricusd.bake.sheet import LARGEST, SMALLEST
 from fabricusd.bake.unwrap import AXES
 from fabricusd.errors import FabricError
 
 if TYPE_CHECKING:
     from fabricusd.bake.bake import Settings
-
-SMALLEST, LARGEST = 64, 32768
-"""Texels along a side: beyond it a texture is more than most tools open; use more UDIM tiles."""
 
 WIDEST = 1024
 """Texels of a margin: more than any mip level that is looked at needs."""
