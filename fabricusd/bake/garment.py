@@ -32,6 +32,9 @@ PART = 1 << 16
 NOT_BAKED = ("weave", "back", "documentation")
 """Fields of a fabric that are digested apart, or do not show in a texture."""
 
+GREATEST = 1e9
+"""Points [m] and UVs beyond are none: a thread there is finer than what float64 tells apart."""
+
 FARTHEST = (-8.0, 32.0)
 """UVs beyond are as good as there, a tile or more outside of those that are baked on every side."""
 
@@ -280,17 +283,18 @@ def signed_area(uv: NDArray[np.float64]) -> NDArray[np.float64]:
 def check_shape(
     where: str, points: NDArray[np.float64], tri: NDArray[Any], uv: NDArray[np.float64]
 ) -> None:
-    """Raise FabricError for points or UVs that are not finite, with their number and the first."""
-    point = np.asarray(~np.isfinite(points).all(axis=1))
+    """Raise FabricError for points or UVs that are not finite or out of bounds, saying how many."""
+    point = np.asarray(~(np.abs(points) <= GREATEST).all(axis=1))
     for noun, bad in (
         ("points", point[tri].any(axis=1)),
-        ("UVs", ~np.isfinite(uv).all(axis=(1, 2))),
+        ("UVs", ~(np.abs(uv) <= GREATEST).all(axis=(1, 2))),
     ):
         if bad.any():
             raise FabricError(
                 where,
-                f"has {int(bad.sum())} of {len(tri)} triangles with {noun} that are not finite, "
-                f"the first is triangle {int(np.argmax(bad))}; they must be numbers",
+                f"has {int(bad.sum())} of {len(tri)} triangles with {noun} that are not finite or "
+                f"beyond {GREATEST:g}, the first is triangle {int(np.argmax(bad))}; they must be "
+                "numbers within",
             )
 
 

@@ -26,6 +26,9 @@ from fabricusd.files import whole_file
 DIGEST = 16
 """Bytes of a checksum at a file's end; the block's top is before it."""
 
+MOST = np.float32(1e12)
+"""Greatest value of a map or plane: sums of squares of it are within single precision."""
+
 Floats = NDArray[np.float32]
 
 
@@ -76,8 +79,16 @@ class KeptValues:
 
     def is_sound(self, path: Path) -> bool:
         """Whether a block's file is whole."""
-        size = int(self.offsets[-1, -1]) + self.places[-1][-1] + top_bytes(self.sheet) + DIGEST
-        return sound_data(path, size, size) is not None
+        end = int(self.offsets[-1, -1]) + self.places[-1][-1]
+        size = end + top_bytes(self.sheet) + DIGEST
+        data = sound_data(path, size, size)
+        if data is None:
+            return False
+        parts = [
+            np.frombuffer(data, one.kind, sum(places) // np.dtype(one.kind).itemsize, first)
+            for one, places, first in zip(self.maps, self.places, self.offsets[:, 0], strict=True)
+        ]
+        return all(map(are_values, (*parts, np.frombuffer(data[end:-DIGEST], np.float32))))
 
     def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
         """(h, w, channels) of a map."""
@@ -124,6 +135,8 @@ class KeptLayout:
         data = sound_data(path, 2 + tail, 2 * n * n + planes + tail)
         if data is None:
             return False
+        if not are_values(np.frombuffer(data[-tail:-DIGEST], np.float32)):
+            return False
         if len(data) == 2 + tail:
             return NOBODY <= int(np.frombuffer(data, np.int16, 1)[0]) < lays
         if len(data) < 2 * n * n + tail:
@@ -131,7 +144,9 @@ class KeptLayout:
         owner = np.frombuffer(data, np.int16, n * n).reshape(n, n)
         if owner.min() < NOBODY or owner.max() >= lays:
             return False
-        return len(data) == 2 * n * n + 4 * PLANES * self._cut(owner) + tail
+        if len(data) != 2 * n * n + 4 * PLANES * self._cut(owner) + tail:
+            return False
+        return are_values(np.frombuffer(data[2 * n * n : -tail], np.float32))
 
     def _cut(self, owner: NDArray[np.int16]) -> int:
         """Texels of all levels and lays that are owned in part."""
@@ -199,6 +214,11 @@ def sound_data(path: Path, least: int, most: int) -> bytes | None:
         return None
     known = hashlib.blake2b(data[:-DIGEST], digest_size=DIGEST).digest()
     return data if known == data[-DIGEST:] else None
+
+
+def are_values(numbers: NDArray[Any]) -> bool:
+    """Whether all could be values of maps or planes, finite and not out of all bounds."""
+    return bool((np.abs(numbers) <= MOST).all())
 
 
 def top_bytes(sheet: Sheet) -> int:

@@ -28,7 +28,11 @@ def test_each_of_three_meshes_keeps_its_textures(tmp_path, capsys):
     assert main([*words, "--resolution", "64", "--maps", "lay", "-o", str(tmp_path)]) == 0
     said = json.loads((tmp_path / "manifest.json").read_text())["garments"]
     prims = {name: one["prims"] for name, one in said.items()}
-    assert prims == {"cloth": ["/W/A/cloth"], "cloth_2": ["/W/C/cloth_2"], "cloth_3": ["/W/B/cloth"]}
+    assert prims == {
+        "cloth": ["/W/A/cloth"],
+        "cloth_2": ["/W/C/cloth_2"],
+        "cloth_3": ["/W/B/cloth"],
+    }
     covered = {"cloth": 1.0, "cloth_3": 0.25, "cloth_2": 1 / 16}
     for name, share in covered.items():
         file = said[name]["files"]["lay"]["1001"]["file"]
@@ -68,7 +72,9 @@ def test_any_names_become_files_that_differ(texts):
         taken |= folded(name)
 
 
-@pytest.mark.parametrize("name", ["", "..", "a/b", "a\\b", "a.b", "-x", "con", "LPT1", "a\0b", " a"])
+@pytest.mark.parametrize(
+    "name", ["", "..", "a/b", "a\\b", "a.b", "-x", "con", "LPT1", "a\0b", " a"]
+)
 def test_what_no_baker_writes_is_no_name(name):
     assert not is_file_stem(name)
 
