@@ -33,7 +33,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
     Raises FabricError for a file that is none, with the place and the value of the first fault.
     """
-    root = read_stated(folder / MANIFEST)
+    root = read_stated(file_in(folder, MANIFEST))
     udim = root.field("settings").field("udim").flag()
     root.field("scene").field("file").text()
     resolution = root.field("resolution")
