@@ -266,7 +266,8 @@ ODD = st.sampled_from(
     [
         None, True, -1, 0, 1e308, float("nan"), 10**400, "", "..", "../../../x", "/etc/passwd",
         "Body", "1001", "\0", "\ud800", "x" * 20_000, [], {}, [[]], [0, 0],
-        {"file": "../secret.exr"}, ["../secret.exr"], [[0, 0], [0, 0]], {"1001": {"file": "../secret.exr"}},
+        {"file": "../secret.exr"}, ["../secret.exr"], [[0, 0], [0, 0]],
+        {"1001": {"file": "../secret.exr"}},
     ]
 )  # fmt: skip
 
