@@ -2,8 +2,8 @@
 
     python bench/bench_bake_bounds.py [triangles | jacquard] [--texels 256]
 
-Each input is baked in a process of its own, by the command line; printed are its seconds and the
-most memory that it held. Run it twice: the first run compiles kernels, which takes both.
+Each input is baked in a process of its own, by the command line; printed are its seconds, those of
+all processors, and the most memory that it held. Run it twice: the first run compiles kernels.
 """
 
 from __future__ import annotations
@@ -71,15 +71,19 @@ def write_jacquard(path: Path) -> None:
     save(Fabric(name="Jacquard", weave=Weave(cells=np.where(leaf, ~satin, satin))), path)
 
 
-def measured(words: list[str]) -> tuple[float, float]:
-    """(seconds, megabytes at most) of one run of the command line."""
+def measured(words: list[str]) -> str:
+    """What one run of the command line took."""
     began = time.perf_counter()
     subprocess.run(
         [sys.executable, "-m", "fabricusd", *words], check=True, stdout=subprocess.DEVNULL
     )
     seconds = time.perf_counter() - began
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
     unit = 1 if sys.platform == "darwin" else 1024
-    return seconds, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * unit / 1e6
+    return (
+        f"{seconds:.1f} s, {used.ru_utime + used.ru_stime:.1f} s of processors, "
+        f"{used.ru_maxrss * unit / 1e6:.0f} MB"
+    )
 
 
 def main() -> None:
@@ -97,8 +101,8 @@ def main() -> None:
             fabric = str(folder / "jacquard.usda")
             write_jacquard(Path(fabric))
         words = ["bake", str(scene), "--fabric", fabric, "--resolution", str(options.texels)]
-        seconds, megabytes = measured([*words, "-o", str(folder / "out")])
-        print(f"{options.what} at {options.texels} texels: {seconds:.1f} s, {megabytes:.0f} MB")
+        said = measured([*words, "-o", str(folder / "out")])
+        print(f"{options.what} at {options.texels} texels: {said}")
 
 
 if __name__ == "__main__":

@@ -229,6 +229,15 @@ def test_a_mesh_that_names_a_picture_is_refused_before_it_is_packed(folder):
     assert not package.exists()
 
 
+def test_a_manifest_that_has_lost_a_lay_of_its_mesh_is_refused(folder):
+    said = said_in(folder)
+    del said["garments"]["Body"]["lays"][0]
+    say(folder, said)
+    with pytest.raises(FabricError, match="has 2 parts; the manifest says 1 lays"):
+        write_materials(folder, None, PLAIN)
+    assert not (folder / "look.usda").exists()
+
+
 def test_a_texture_of_another_size_is_refused(folder):
     levels = [np.zeros((n, n, 3), np.float16) for n in (32, 16, 8, 4, 2, 1)]
     write_mip_exr(
@@ -316,7 +325,7 @@ def test_no_change_of_a_manifest_reads_or_writes_outside(baked, tmp_path, data):
         for one in found.garments:
             for name in one.textures:
                 baked_set.read(one.name, name)
-        if data.draw(st.integers(0, 19)) == 0:
+        if data.draw(st.integers(0, 49)) == 0:
             write_materials(folder, None, PLAIN)
     outside = everything(tmp_path, folder)
     assert {p.name: c for p, c in outside.items()} == {"secret.exr": b"secret"}
