@@ -16,8 +16,12 @@ from typing import Any, NoReturn
 from fabricusd.errors import FabricError
 from fabricusd.files import readable_file
 
-LONGEST = 16 << 20
-"""Bytes of a file that is read: a hostile one could take 25 times as many of memory."""
+LONGEST = 6 << 20
+"""Bytes of a file that is read: a hostile one could take 25 times as many of memory, and a manifest
+of a hundred tiles has half a million."""
+
+MANY = 8
+"""Entries of a list that an error shows."""
 
 DEEP = 10_000
 """Characters of a text at most."""
@@ -33,11 +37,8 @@ class Stated:
 
     def refuse(self, wanted: str) -> NoReturn:
         """Raise what is said about a value that is not `wanted`."""
-        shown = json.dumps(self.value, ensure_ascii=False, default=str)
-        shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
-        raise FabricError(
-            self.file, f"says {self.place or 'its root'} is {shown}; it must be {wanted}"
-        )
+        where = self.place or "its root"
+        raise FabricError(self.file, f"says {where} is {_shown(self.value)}; it must be {wanted}")
 
     def below(self, key: str, value: Any) -> Stated:
         """A value inside this one."""
@@ -94,6 +95,16 @@ class Stated:
         if type(value) not in (int, float) or not abs(value) <= most or not math.isfinite(value):
             self.refuse(f"a number of at most {most:g}")
         return float(value)
+
+
+def _shown(value: Any) -> str:
+    """A value in JSON's words, at most 60 characters; a great list or object by its size alone."""
+    if isinstance(value, list | dict) and len(value) > MANY:
+        return f"{'a list' if isinstance(value, list) else 'an object'} of {len(value)} entries"
+    if isinstance(value, str):
+        value = value[:60]
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def read_stated(path: Path) -> Stated:

@@ -95,6 +95,8 @@ FAULTS = [
     ("garments|body", {}, "the name of one garment"),
     ("garments|nul", {}, "the name of one garment"),
     ("garments|a\\b", {}, "the name of one garment"),
+    (f"{ONE}|prims", [0] * 10**5, "garments/Body/prims/0 is 0; it must be a text"),
+    (f"{ONE}|mesh", [0] * 10**5, "a list of 100000 entries"),
     (ONE, 3, "says garments/Body is 3; it must be an object"),
     (f"{ONE}|mesh", "../secret.usdc", "it must be Body.usdc"),
     (f"{ONE}|mesh", None, "has no 'mesh' in garments/Body"),
@@ -159,7 +161,7 @@ def test_a_field_that_no_baker_writes_is_refused_with_its_place(
         b'{"garments": ' * 10**5,
         b"1" * 10**5,
         b"NaN",
-        b"0" * (17 << 20),
+        b"0" * (9 << 20),
     ],
 )
 def test_a_file_that_is_no_manifest_is_refused_in_one_line(folder, data):
