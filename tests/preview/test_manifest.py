@@ -311,7 +311,8 @@ def test_no_change_of_a_manifest_reads_or_writes_outside(baked, tmp_path, data):
                 )
                 held[place[-1]], held[other] = held[other], held[place[-1]]
             else:
-                held[place[-1]] = data.draw(ODD)
+                # A copy: the next change may put something into it.
+                held[place[-1]] = copy.deepcopy(data.draw(ODD))
         (folder / "manifest.json").write_text(json.dumps(said), "utf-8", "surrogatepass")
     else:
         text = bytearray((baked / "manifest.json").read_bytes())
