@@ -8,13 +8,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from bake.killed import leave_half_written
 from bake.meshes import write_quad
 
 from fabricusd.bake.bake import Settings, bake
 from fabricusd.bake.lock import HOLDER, LOCK, locked, refuse_locked
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
-from fabricusd.files import whole_file
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -108,10 +108,7 @@ def test_what_a_kill_left_half_written_is_removed_by_the_next_bake(tmp_path):
     scene = write_quad(tmp_path / "square.obj")
     out = tmp_path / "out"
     (out / "report").mkdir(parents=True)
-    # Held until the end: the temporary file would go with the object.
-    killed = [whole_file(place / "x.exr") for place in (out, out / "report")]
-    for one in killed:
-        one.__enter__().write_bytes(b"half")
+    leave_half_written(out / "x.exr", out / "report" / "x.png")
     settings = Settings(resolution=64, maps=("opacity",))
     bake(scene, out, settings, fabric="linen_plain")
     assert not list(out.glob(".*"))
