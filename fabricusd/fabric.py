@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -236,7 +237,17 @@ class Weave:
         return self.name == other.name and np.array_equal(self.cells, other.cells)
 
     def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        # Kept, as are the shares: a jacquard of 4096 threads each way has 16 million cells.
         return hash((self.cells.shape, self.cells.tobytes(), self.name))
+
+    @cached_property
+    def shares_on_top(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(m,) share of each end's cells where it is on top, (n,) that of each pick's."""
+        return self.cells.mean(axis=1), 1.0 - self.cells.mean(axis=0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -313,6 +313,16 @@ def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.f
 
 
 @reads("a picture")
+def shape_of(path: str | os.PathLike[str]) -> tuple[int, int, int]:
+    """(height, width, channels) as the head of a picture's file says; no pixel is read."""
+    source: Any = oiio.ImageInput.open(str(readable_file(path)))
+    if source is None:
+        raise FabricError(str(path), f"cannot be read: {_reason(oiio)}")
+    spec = source.spec()
+    return int(spec.height), int(spec.width), int(spec.nchannels)
+
+
+@reads("a picture")
 def read_middle(path: str | os.PathLike[str], most: int) -> NDArray[np.float32]:
     """(h, w, c) float32 middle of a square texture, at most `most` a side.
 

@@ -91,10 +91,10 @@ def _type_cells(fabric: Fabric) -> tuple[Floats, Floats]:
     meets every place of the sequence with the same remainder by their greatest common divisor
     equally often, so sums over remainders are exact and small.
     """
-    cells = fabric.weave.cells
     shown = np.zeros((2, len(fabric.threads)))
     hidden = np.zeros_like(shown)
-    on_top = {WARP: cells.mean(axis=1), WEFT: 1.0 - cells.mean(axis=0)}
+    by_end, by_pick = fabric.weave.shares_on_top
+    on_top = {WARP: by_end, WEFT: by_pick}
     for j, thread_set in enumerate(sets(fabric)):
         sequence = np.asarray(thread_set.sequence)
         common = math.gcd(len(on_top[j]), len(sequence))

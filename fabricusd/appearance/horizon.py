@@ -150,9 +150,10 @@ def mean_light(
     `table` is None; at most MOST_CELLS of them. Not below LEAST_LIGHT.
     """
     repeat = shape_repeat(fabric)
-    cells = np.argwhere(np.ones(repeat, bool))
-    if len(cells) > MOST_CELLS:
-        cells = cells[np.random.default_rng(0).choice(len(cells), MOST_CELLS, replace=False)]
+    number = np.arange(math.prod(repeat))
+    if len(number) > MOST_CELLS:
+        number = np.random.default_rng(0).choice(len(number), MOST_CELLS, replace=False)
+    cells = np.stack(np.unravel_index(number, repeat), axis=1)
     if table is None:
         slots = 1 if cloth.under == GAP else 2
         entries = np.zeros((len(cells), slots, *TEXELS, AZIMUTHS), np.uint8)

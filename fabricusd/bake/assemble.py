@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fabricusd import __version__
 from fabricusd.bake.blocks import Layers, composed
 from fabricusd.bake.encoding import FORMATS, encoding_of
-from fabricusd.bake.kept import Kept, block_is_sound, kept, read_top
+from fabricusd.bake.kept import Kept, kept, read_top
 from fabricusd.bake.layers import ComputedLayer, Place
 from fabricusd.bake.maps import TextureMap
 from fabricusd.bake.planes import PLANES
@@ -76,8 +76,9 @@ def compute(work: Work) -> bool:
     def one_block(_: int, k: int) -> None:
         sheet, x, y = jobs[k]
         path = work.scratch.block(sheet, x, y)
-        if not block_is_sound(path):
-            ways[id(sheet)].write(path, x, y)
+        way = ways[id(sheet)]
+        if not way.is_sound(path):
+            way.write(path, x, y)
 
     return work.run(one_block, len(jobs), "blocks")
 
@@ -101,7 +102,7 @@ def _write_texture(
     """One texture, from the blocks and the levels above them."""
     k = todo[job]
     files, one, way = work.files, work.maps[k], kept(sheet, work.maps)
-    path, note = files.path(sheet, one), ""
+    path, encoding = files.path(sheet, one), None
     levels: list[Any] = [
         partial(bands, work.scratch, sheet, way, k, level) for level in range(sheet.levels)
     ]
@@ -116,12 +117,11 @@ def _write_texture(
         write_mip_exr(path, levels, sheet.resolution, one.channels, one.kind, metadata)
     else:
         encoding = encoding_of(one, levels[0]())
-        note = json.dumps(asdict(encoding))
         metadata["oiio:ColorSpace"] = "sRGB" if one.color else "Raw"
-        metadata["fabricusd:encoding"] = note
+        metadata["fabricusd:encoding"] = json.dumps(asdict(encoding))
         rows = (encoding.encoded(band) for band in levels[0]())
         write_16_bit(path, rows, sheet.resolution, len(one.channels), metadata)
-    work.scratch.mark_done(path, note)
+    work.scratch.mark_done(path, encoding)
 
 
 def _whole(level: np.ndarray[Any, Any]) -> Any:

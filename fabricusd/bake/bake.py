@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import shutil
 import time
@@ -18,7 +17,7 @@ from fabricusd.bake.accuracy import SwatchError, swatch_errors
 from fabricusd.bake.assemble import Files, Progress, Work, assemble, compute
 from fabricusd.bake.btf.write import MAX_ERROR, write_btf
 from fabricusd.bake.choose import Tried, cheapest, maps_with
-from fabricusd.bake.encoding import FORMATS, Encoding, stored_by
+from fabricusd.bake.encoding import Encoding, stored_by
 from fabricusd.bake.garment import (
     Garment,
     fitted,
@@ -28,20 +27,23 @@ from fabricusd.bake.garment import (
     tiles_of,
 )
 from fabricusd.bake.kept import kept
+from fabricusd.bake.lock import locked
 from fabricusd.bake.manifest import manifest_of, write_json
 from fabricusd.bake.map_error import MapError, map_errors
 from fabricusd.bake.maps import TextureMap, chosen_maps
 from fabricusd.bake.mesh_layer import write_mesh_layer
 from fabricusd.bake.overlaps import refuse_overlaps
+from fabricusd.bake.ranges import check_settings
 from fabricusd.bake.reasons import explained
 from fabricusd.bake.recipe import Recipe, recipe
 from fabricusd.bake.relight import best_choice
 from fabricusd.bake.report import write_report
 from fabricusd.bake.scratch import Scratch
-from fabricusd.bake.sheet import Sheet, sheets_of
+from fabricusd.bake.sheet import LARGEST, SMALLEST, Sheet, sheets_of
 from fabricusd.bake.unwrap import unwrapped
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
+from fabricusd.files import remove_partial_files
 from fabricusd.reference.mesh_size import size_words, threads_words
 from fabricusd.reference.read import as_binding, read_scene
 from fabricusd.reference.scene import Scene
@@ -50,9 +52,6 @@ from fabricusd.schema import save_all
 
 MARGIN = 16
 """Texels that a shell is continued beyond its border: enough for four mip levels without a seam."""
-
-LARGEST = 32768
-"""Texels along a side: beyond it a texture is more than most tools open; use more UDIM tiles."""
 
 FEWEST = 2.0
 """Texels per thread below which threads do not resolve and texels hold means of several."""
@@ -72,6 +71,9 @@ class Settings:
     max_error : mean delta E 2000 of re-lit texels against level `weave` to reach; 0 to ask nothing
     btf : forms of the BTF to write, see `btf.write.FORMS`
     file_format : "exr", or "png" or "tiff" for 16-bit integers and the finest level alone
+    margin : texels that a shell is continued beyond its border
+
+    `ranges.check_settings` says what each may be; `bake` and `plan` ask it before any work.
     """
 
     resolution: int = 1024
@@ -144,40 +146,71 @@ def bake(
     resume : go on with a bake of the same job that was stopped
 
     Raises FabricError for a scene, mesh or setting that cannot be baked, before anything is
-    written; and for a disk that is full, with what is done kept for `resume`.
+    written; where another process bakes into `out`; and for a disk that is full, with what is done
+    kept for `resume`.
     """
     began = time.perf_counter()
     settings = settings or Settings()
+    count = worker_count(workers)
+    job = _job(scene, settings, fabric, mesh, units)
+    folder = _folder(out)
+    with locked(folder):
+        remove_partial_files(folder / "report")
+        result = _bake(job, folder, resume=resume, workers=count, progress=progress)
+        if result.finished:
+            result.seconds = time.perf_counter() - began
+            write_json(folder / "manifest.json", manifest_of(result, settings, Path(scene)))
+            write_report(result, settings)
+            Scratch.remove(folder)
+    return result
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Job:
+    """What is to be baked, all of it checked; notes : of the scene, tiles : of each garment"""
+
+    settings: Settings
+    notes: list[str]
+    up_axis: str
+    found: list[Garment]
+    maps: list[TextureMap]
+    resolution: int
+    tiles: list[dict[int, tuple[int, int]]]
+
+
+def _job(
+    scene: str | os.PathLike[str],
+    settings: Settings,
+    fabric: str | Fabric | Binding | None,
+    mesh: str | None,
+    units: str | None,
+) -> _Job:
+    check_settings(settings)
     read = read_scene(scene, fabric=fabric, units=units)
     found = _garments(read, settings, mesh, fabric)
-    maps = chosen_maps(settings.maps, light=settings.light is not None)
-    if settings.file_format not in FORMATS:
-        raise FabricError(
-            "--format", f"is '{settings.file_format}'; it must be one of {', '.join(FORMATS)}"
-        )
-    resolution = _resolution(settings, found)
-    tiles = [tiles_of(one, settings.udim) for one in found]
-    folder = _folder(out)
-    for one, places in zip(found, tiles, strict=True):
-        refuse_overlaps(one, places, min(resolution, 2048), folder)
+    return _Job(
+        settings=settings,
+        notes=read.notes,
+        up_axis=read.up_axis,
+        found=found,
+        maps=chosen_maps(settings.maps, light=settings.light is not None),
+        resolution=_resolution(settings, found),
+        tiles=[tiles_of(one, settings.udim) for one in found],
+    )
+
+
+def _bake(
+    job: _Job, folder: Path, *, resume: bool, workers: int, progress: Progress | None
+) -> Baked:
+    """The textures, meshes and fabrics in `folder`, and what is measured of them."""
+    settings, found = job.settings, job.found
+    for one, places in zip(found, job.tiles, strict=True):
+        refuse_overlaps(one, places, min(job.resolution, 2048), folder)
     recipes = _recipes(found, settings)
-    tried: list[Tried] = []
-    if settings.max_error:
-        best, tried = cheapest(
-            settings.max_error,
-            lambda n: [
-                _sheets(one, recipes, places, n, MARGIN)[0]
-                for one, places in zip(found, tiles, strict=True)
-            ],
-            resolution,
-            sum(map(len, tiles)),
-        )
-        resolution = best.resolution
-        if settings.maps is None:
-            maps = maps_with(best.maps, light=settings.light is not None)
+    resolution, maps, tried = _chosen(job, recipes)
     sheets = [
         sheet
-        for one, places in zip(found, tiles, strict=True)
+        for one, places in zip(found, job.tiles, strict=True)
         for sheet in _sheets(one, recipes, places, resolution, settings.margin)
     ]
     result = Baked(
@@ -187,14 +220,13 @@ def bake(
         maps=maps,
         files={},
         tried=tried,
-        notes=[*read.notes, *(n for g in found for n in g.notes), *_coarse(found, resolution)],
+        notes=[*job.notes, *(n for g in found for n in g.notes), *_coarse(found, resolution)],
     )
     scratch = Scratch(folder, _key(found, settings, resolution, maps), resume=resume)
     _check_space(folder, sum(kept(sheet, maps).bytes_needed for sheet in sheets))
-    count = worker_count(workers)
     files = Files(folder=folder, udim=settings.udim, file_format=settings.file_format)
     work = Work(
-        scratch=scratch, sheets=sheets, maps=maps, files=files, workers=count, progress=progress
+        scratch=scratch, sheets=sheets, maps=maps, files=files, workers=workers, progress=progress
     )
     result.finished = compute(work) and assemble(work)
     if not result.finished:
@@ -204,18 +236,33 @@ def bake(
         for texture in maps:
             path = files.path(sheet, texture)
             per_map.setdefault(texture.name, {})[sheet.number] = path.name
-            note = scratch.note(path)
-            if note:
-                result.encodings[path.name] = Encoding(**json.loads(note))
+            encoding = scratch.encoding(path)
+            if encoding:
+                result.encodings[path.name] = encoding
     for one in found:
-        write_mesh_layer(folder / f"{one.name}.usdc", one, read.up_axis)
+        write_mesh_layer(folder / f"{one.name}.usdc", one, job.up_axis)
     _measure(result, sheets, settings)
-    result.seconds = time.perf_counter() - began
     save_all([lay.fabric for one in found for lay in one.lays], folder / "fabrics.usda")
-    write_json(folder / "manifest.json", manifest_of(result, settings, Path(scene)))
-    write_report(result, settings)
-    scratch.close()
     return result
+
+
+def _chosen(job: _Job, recipes: dict[Fabric, Recipe]) -> tuple[int, list[TextureMap], list[Tried]]:
+    """Resolution and maps; where an error is asked for the cheapest, and what was tried."""
+    settings = job.settings
+    if not settings.max_error:
+        return job.resolution, job.maps, []
+    best, tried = cheapest(
+        settings.max_error,
+        lambda n: [
+            _sheets(one, recipes, places, n, MARGIN)[0]
+            for one, places in zip(job.found, job.tiles, strict=True)
+        ],
+        job.resolution,
+        sum(map(len, job.tiles)),
+    )
+    if settings.maps is not None:
+        return best.resolution, job.maps, tried
+    return best.resolution, maps_with(best.maps, light=settings.light is not None), tried
 
 
 def _measure(result: Baked, sheets: Sequence[Sheet], settings: Settings) -> None:
@@ -260,23 +307,31 @@ def plan(
     scene: str | os.PathLike[str],
     settings: Settings,
     *,
+    out: str | os.PathLike[str] | None = None,
     fabric: str | Fabric | Binding | None = None,
     mesh: str | None = None,
     units: str | None = None,
+    workers: int | None = None,
 ) -> Plan:
     """What `bake` would make, with the same errors, and nothing written."""
-    read = read_scene(scene, fabric=fabric, units=units)
-    found = _garments(read, settings, mesh, fabric)
-    maps = chosen_maps(settings.maps, light=settings.light is not None)
-    resolution = _resolution(settings, found)
+    worker_count(workers)
+    job = _job(scene, settings, fabric, mesh, units)
+    if out is not None:
+        _check_folder(Path(out))
+    for one, places in zip(job.found, job.tiles, strict=True):
+        refuse_overlaps(one, places, min(job.resolution, 2048), None)
     return Plan(
         lines=[
-            f"{one.name}: {len(maps)} maps, tiles "
-            f"{', '.join(map(str, tiles_of(one, settings.udim)))}, {resolution} x {resolution}, "
-            f"{resolution / threads_per_uv(one):.3g} texels per thread; {_extent(one)}"
-            for one in found
+            f"{one.name}: {len(job.maps)} maps, tiles {', '.join(map(str, places))}, "
+            f"{job.resolution} x {job.resolution}, "
+            f"{job.resolution / threads_per_uv(one):.3g} texels per thread; {_extent(one)}"
+            for one, places in zip(job.found, job.tiles, strict=True)
         ],
-        notes=[*read.notes, *(n for g in found for n in g.notes), *_coarse(found, resolution)],
+        notes=[
+            *job.notes,
+            *(n for g in job.found for n in g.notes),
+            *_coarse(job.found, job.resolution),
+        ],
     )
 
 
@@ -299,37 +354,46 @@ def _garments(
     fabric: str | Fabric | Binding | None,
 ) -> list[Garment]:
     if settings.unwrap:
-        return garments(scene, mesh, partial(unwrapped, settings.unwrap, as_binding(fabric)))
+        # The warp runs along an axis of the world, so a turned mesh gets another grain.
+        make = partial(unwrapped, settings.unwrap, as_binding(fabric))
+        return garments(scene, mesh, make, turned=False)
     found = garments(scene, mesh)
     return [fitted(one) for one in found] if settings.fit else found
 
 
 def _folder(out: str | os.PathLike[str]) -> Path:
     folder = Path(out)
-    if folder.exists() and not folder.is_dir():
-        raise FabricError(str(folder), "is a file; it must be a folder's name")
+    _check_folder(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FabricError(str(folder), f"cannot be made: {error.strerror}") from error
-    if not os.access(folder, os.W_OK):
-        raise FabricError(str(folder), "cannot be written; it must be a folder of yours")
     return folder
 
 
+def _check_folder(folder: Path) -> None:
+    """Raise FabricError for a folder that cannot be made or written."""
+    # os.path answers False where pathlib raises: names too long, folders nobody may look into.
+    if os.path.exists(folder) and not os.path.isdir(folder):
+        raise FabricError(str(folder), "is a file; it must be a folder's name")
+    there = next((one for one in (folder, *folder.parents) if os.path.exists(one)), Path("."))
+    if not os.path.isdir(there):
+        raise FabricError(str(folder), f"cannot be made: {there} is a file, not a folder")
+    if not os.access(there, os.W_OK):
+        verb = "written" if there == folder else "made"
+        raise FabricError(str(folder), f"cannot be {verb}; {there} must be a folder of yours")
+
+
 def _resolution(settings: Settings, found: Sequence[Garment]) -> int:
-    asked = settings.resolution
-    if settings.texels_per_thread:
-        asked = resolution_for(found, settings.texels_per_thread)
-    if asked < 64 or asked & (asked - 1) or asked > LARGEST:
-        words = f"a power of two from 64 to {LARGEST}"
-        if settings.texels_per_thread:
-            raise FabricError(
-                "--texels-per-thread",
-                f"is {settings.texels_per_thread:g}, which takes {asked} texels; it must lead to "
-                f"{words}: bake fewer threads a tile",
-            )
-        raise FabricError("--resolution", f"is {asked}; it must be {words}")
+    if not settings.texels_per_thread:
+        return settings.resolution
+    asked = resolution_for(found, settings.texels_per_thread)
+    if not SMALLEST <= asked <= LARGEST:
+        raise FabricError(
+            "--texels-per-thread",
+            f"is {settings.texels_per_thread:g}, which takes {asked:.6g} texels; it must lead to "
+            f"{SMALLEST} to {LARGEST}: bake fewer threads a tile",
+        )
     return asked
 
 

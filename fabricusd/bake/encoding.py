@@ -25,6 +25,10 @@ GREATEST = 65535
 """The largest number of 16 bits."""
 
 
+GREATEST_SCALE = 1e30
+"""Beyond any value of a map, and within single precision."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Encoding:
     """value = scale * number/65535 + offset, after the sRGB curve where `transfer` is "srgb"."""
@@ -46,6 +50,23 @@ class Encoding:
         values = np.asarray(linear, np.float64) * self.scale + self.offset
         # Ids are whole numbers, which dividing and multiplying does not always give back.
         return np.asarray(np.rint(values) if self.scale == GREATEST else values, np.float32)
+
+
+def encoding_from(said: Any) -> Encoding:
+    """The encoding that JSON says; ValueError where it says none."""
+    if not isinstance(said, dict) or set(said) != {"transfer", "scale", "offset"}:
+        raise ValueError("an encoding has 'transfer', 'scale' and 'offset'")
+    transfer, scale, offset = said["transfer"], said["scale"], said["offset"]
+    if transfer not in ("linear", "srgb"):
+        raise ValueError(f"'transfer' is {transfer!r:.40}; it must be linear or srgb")
+    for name, value in (("scale", scale), ("offset", offset)):
+        if type(value) not in (int, float) or not abs(value) < GREATEST_SCALE:
+            raise ValueError(
+                f"'{name}' is {value!r:.40}; it must be a number below {GREATEST_SCALE:g}"
+            )
+    if not scale > 0:
+        raise ValueError(f"'scale' is {scale!r}; it must be above 0")
+    return Encoding(transfer=transfer, scale=float(scale), offset=float(offset))
 
 
 _FIXED = {

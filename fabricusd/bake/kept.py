@@ -26,6 +26,9 @@ from fabricusd.files import whole_file
 DIGEST = 16
 """Bytes of a checksum at a file's end; the block's top is before it."""
 
+MOST = np.float32(1e12)
+"""Greatest value of a map or plane: sums of squares of it are within single precision."""
+
 Floats = NDArray[np.float32]
 
 
@@ -38,6 +41,9 @@ class Kept(Protocol):
 
     def write(self, path: Path, bx: int, by: int) -> None:
         """Keep a block."""
+
+    def is_sound(self, path: Path) -> bool:
+        """Whether a block's file is there and can be what was written."""
 
     def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
         """(h, w, channels) of map `k` in a block."""
@@ -70,6 +76,19 @@ class KeptValues:
         """Keep a block."""
         found, planes, share = bake_block(self.sheet, self.maps, bx, by)
         write_block(path, [*(level for one in found for level in one), planes, share])
+
+    def is_sound(self, path: Path) -> bool:
+        """Whether a block's file is whole."""
+        end = int(self.offsets[-1, -1]) + self.places[-1][-1]
+        size = end + top_bytes(self.sheet) + DIGEST
+        data = sound_data(path, size, size)
+        if data is None:
+            return False
+        parts = [
+            np.frombuffer(data, one.kind, sum(places) // np.dtype(one.kind).itemsize, first)
+            for one, places, first in zip(self.maps, self.places, self.offsets[:, 0], strict=True)
+        ]
+        return all(map(are_values, (*parts, np.frombuffer(data[end:-DIGEST], np.float32))))
 
     def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
         """(h, w, channels) of a map."""
@@ -107,19 +126,51 @@ class KeptLayout:
             ]
         write_block(path, [*parts, *top(self.sheet, levels[-1])])
 
+    def is_sound(self, path: Path) -> bool:
+        """Whether a block's file is whole, and its owners are lays of the sheet."""
+        n, lays = self.sheet.block, len(self.sheet.garment.lays)
+        tail = top_bytes(self.sheet) + DIGEST
+        # Lays that share a texel have a texel each below it, so a level has at most n * n parts.
+        planes = 4 * PLANES * n * n * self.sheet.levels
+        data = sound_data(path, 2 + tail, 2 * n * n + planes + tail)
+        if data is None:
+            return False
+        if not are_values(np.frombuffer(data[-tail:-DIGEST], np.float32)):
+            return False
+        if len(data) == 2 + tail:
+            return NOBODY <= int(np.frombuffer(data, np.int16, 1)[0]) < lays
+        if len(data) < 2 * n * n + tail:
+            return False
+        owner = np.frombuffer(data, np.int16, n * n).reshape(n, n)
+        if owner.min() < NOBODY or owner.max() >= lays:
+            return False
+        if len(data) != 2 * n * n + 4 * PLANES * self._cut(owner) + tail:
+            return False
+        return are_values(np.frombuffer(data[2 * n * n : -tail], np.float32))
+
+    def _cut(self, owner: NDArray[np.int16]) -> int:
+        """Texels of all levels and lays that are owned in part."""
+        count = 0
+        for number in np.unique(owner[owner != NOBODY]).tolist():
+            owned = (owner == number).astype(np.float32)
+            for _ in range(1, self.sheet.levels):
+                owned = shares(owned, 1)
+                count += int(np.count_nonzero(cut_texels(owned)))
+        return count
+
     def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
         """(h, w, channels) of a map."""
         return composed(self.maps[k], self._layers(path, bx, by, level), self.sheet.block >> level)
 
     def _layers(self, path: Path, bx: int, by: int, level: int) -> Layers:
-        n, lays = self.sheet.block, len(self.sheet.garment.lays)
+        n, tail = self.sheet.block, top_bytes(self.sheet) + DIGEST
         data = path.read_bytes()
-        if len(data) < 2 * n * n:
+        if len(data) == 2 + tail:
             number = int(np.frombuffer(data, np.int16, 1)[0])
             whole = np.broadcast_to(np.float32(1), (n >> level, n >> level))
             return {} if number == NOBODY else {number: self._layer(number, bx, by, level, whole)}
         owner = np.frombuffer(data, np.int16, n * n).reshape(n, n)
-        planes = np.frombuffer(data[2 * n * n : -DIGEST - 4 * lays * (PLANES + 1)], np.float32)
+        planes = np.frombuffer(data[2 * n * n : -tail], np.float32)
         found, begin = {}, 0
         for number in np.unique(owner[owner != NOBODY]).tolist():
             owned = (owner == number).astype(np.float32)
@@ -152,20 +203,33 @@ def write_block(path: Path, parts: Sequence[NDArray[Any]]) -> None:
         stream.write(digest.digest())
 
 
-def block_is_sound(path: Path) -> bool:
-    """Whether a block's file is there and is what was written."""
+def sound_data(path: Path, least: int, most: int) -> bytes | None:
+    """What a block's file holds; None where it is not there, its size is not between `least` and
+    `most`, or its checksum is wrong."""
     try:
+        if not path.is_file() or not least <= path.stat().st_size <= most:
+            return None
         data = path.read_bytes()
     except OSError:
-        return False
+        return None
     known = hashlib.blake2b(data[:-DIGEST], digest_size=DIGEST).digest()
-    return len(data) > DIGEST and known == data[-DIGEST:]
+    return data if known == data[-DIGEST:] else None
+
+
+def are_values(numbers: NDArray[Any]) -> bool:
+    """Whether all could be values of maps or planes, finite and not out of all bounds."""
+    return bool((np.abs(numbers) <= MOST).all())
+
+
+def top_bytes(sheet: Sheet) -> int:
+    """Bytes of a block's top before its checksum, see `read_top`."""
+    return 4 * len(sheet.garment.lays) * (PLANES + 1)
 
 
 def read_top(path: Path, sheet: Sheet) -> tuple[Floats, Floats]:
     """(lays, PLANES) planes and (lays,) owned share of the texel that a block shrinks to."""
     lays = len(sheet.garment.lays)
     with path.open("rb") as stream:
-        stream.seek(-DIGEST - 4 * lays * (PLANES + 1), 2)
-        values = np.frombuffer(stream.read(4 * lays * (PLANES + 1)), np.float32)
+        stream.seek(-DIGEST - top_bytes(sheet), 2)
+        values = np.frombuffer(stream.read(top_bytes(sheet)), np.float32)
     return values[: lays * PLANES].reshape(lays, PLANES), values[lays * PLANES :]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom, Vt
 
+from fabricusd.bake.equal_rows import numbered_rows
 from fabricusd.bake.garment import Garment
 from fabricusd.bake.tangents import corner_tangents
 from fabricusd.schema import export
@@ -37,8 +38,7 @@ def write_mesh_layer(path: str | os.PathLike[str], garment: Garment, up_axis: st
     types = Sdf.ValueTypeNames
     _primvar(primvars, "st", types.TexCoord2fArray, Vt.Vec2fArray, garment.uv)
     _primvar(primvars, "normals", types.Normal3fArray, Vt.Vec3fArray, garment.normals)
-    tangents = corner_tangents(garment)
-    _primvar(primvars, "tangents", types.Float4Array, Vt.Vec4fArray, tangents)
+    _primvar(primvars, "tangents", types.Float4Array, Vt.Vec4fArray, corner_tangents(garment))
     for k, lay in enumerate(garment.lays if len(garment.lays) > 1 else ()):
         faces = Vt.IntArray.FromNumpy(np.flatnonzero(garment.lay == k).astype(np.int32))
         UsdGeom.Subset.CreateGeomSubset(
@@ -50,7 +50,7 @@ def write_mesh_layer(path: str | os.PathLike[str], garment: Garment, up_axis: st
 def _primvar(primvars: Any, name: str, kind: Any, array: Any, corners: NDArray[Any]) -> None:
     """An indexed faceVarying primvar of (m, 3, c) corners."""
     flat = np.ascontiguousarray(corners.reshape(-1, corners.shape[-1]), np.float32)
-    values, index = np.unique(flat, axis=0, return_inverse=True)
+    first, number = numbered_rows(flat.T)
     one = primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.faceVarying)
-    one.Set(array.FromNumpy(np.ascontiguousarray(values)))
-    one.SetIndices(Vt.IntArray.FromNumpy(index.reshape(-1).astype(np.int32)))
+    one.Set(array.FromNumpy(flat[first]))
+    one.SetIndices(Vt.IntArray.FromNumpy(number))

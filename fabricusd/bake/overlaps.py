@@ -13,11 +13,11 @@ from fabricusd.images import write_png
 
 
 def refuse_overlaps(
-    garment: Garment, tiles: dict[int, tuple[int, int]], size: int, folder: Path
+    garment: Garment, tiles: dict[int, tuple[int, int]], size: int, folder: Path | None
 ) -> None:
     """Raise FabricError where texels of `size` a side lie in two triangles, with a picture of it.
 
-    The picture is `<garment>.overlaps.<tile>.png` in `folder`.
+    The picture is `<garment>.overlaps.<tile>.png` in `folder`, none where that is None.
     """
     for number, tile in tiles.items():
         corners = texel_triangles(garment.uv, tile, size)
@@ -26,12 +26,15 @@ def refuse_overlaps(
         twice = int(np.count_nonzero(count > 1))
         if not twice:
             continue
-        picture = folder / f"{garment.name}.overlaps.{number}.png"
-        write_png(picture, overlap_map(corners[inside], size))
+        shown = ""
+        if folder is not None:
+            picture = folder / f"{garment.name}.overlaps.{number}.png"
+            write_png(picture, overlap_map(corners[inside], size))
+            shown = f", see {picture}"
         first, second = np.flatnonzero(inside)[pairs[0]]
         share = twice / max(int(np.count_nonzero(count)), 1)
         raise FabricError(
             garment.copies[0],
             f"has UVs that overlap on {share:.3g} of their area in tile {number}, first triangles "
-            f"{first} and {second}, see {picture}; unwrap it without overlaps, or use --unwrap",
+            f"{first} and {second}{shown}; unwrap it without overlaps, or use --unwrap",
         )

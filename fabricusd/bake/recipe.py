@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.compiled import CompiledFabric, compile_fabric, true_repeat
 from fabricusd.appearance.shadow import Shadow, compile_shadow
 from fabricusd.bake.angle_rows import angle_rows, height_rows
+from fabricusd.bake.light import unit_light
 from fabricusd.bake.moments import texels
 from fabricusd.bake.planes import PLANES
 from fabricusd.fabric import Fabric
@@ -51,8 +52,7 @@ def recipe(
     cloth = compile_fabric(fabric, precision=np.float32)
     horizon = compile_shadow(fabric, "horizon", level=level)
     shadow = compile_shadow(fabric, method, level=level) if light is not None else horizon
-    towards = np.zeros(3) if light is None else np.asarray(light, np.float64)
-    towards = towards / max(float(np.linalg.norm(towards)), 1e-30)
+    towards = np.array((0.0, 0.0, 0.0) if light is None else unit_light(light))
     made = Recipe(
         cloth=cloth,
         shadow=shadow,

@@ -7,7 +7,6 @@ level gives the appearance level `weave`, the coarsest `far`.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,10 +27,10 @@ from fabricusd.appearance.thread_terms import GAMMA_SURFACE, MODEL, THESIS
 from fabricusd.appearance.weave import NO_THREAD
 from fabricusd.bake.angle_shape import COUNTS, angle_shapes
 from fabricusd.bake.encoding import Encoding
+from fabricusd.bake.manifest_file import file_in, read_manifest
 from fabricusd.bake.planes import PARTS
 from fabricusd.errors import FabricError, reads
 from fabricusd.fabric import Fabric
-from fabricusd.files import readable_file
 from fabricusd.images import read_mip_level
 
 Floats = NDArray[np.float64]
@@ -60,12 +59,8 @@ class BakedSet:
     @classmethod
     @reads("a bake")
     def load(cls, folder: str | Path) -> BakedSet:
-        """Read the manifest of `folder`; FabricError where there is none."""
-        path = readable_file(Path(folder) / "manifest.json")
-        try:
-            return cls(Path(folder), json.loads(path.read_text("utf-8")))
-        except ValueError as error:
-            raise FabricError(str(path), f"is no JSON: {error}") from error
+        """Read the manifest of `folder`; FabricError where there is none, or a faulty one."""
+        return cls(Path(folder), read_manifest(Path(folder)))
 
     def read(self, garment: str, name: str, level: int = 0, tile: int = 1001) -> NDArray[Any]:
         """(h, w, c) float32 of one map's level."""
@@ -77,7 +72,7 @@ class BakedSet:
                 f"{', '.join(files) or 'none'}",
             )
         said = files[name][str(tile)]
-        stored = read_mip_level(self.folder / said["file"], level)
+        stored = read_mip_level(file_in(self.folder, said["file"]), level)
         stored = stored[..., : len(self.manifest["maps"][name]["channels"])]
         return Encoding(**said["encoding"]).decoded(stored) if "encoding" in said else stored
 
@@ -96,6 +91,11 @@ class BakedSet:
         fabrics : of each lay, as the manifest counts them
         wi, wo : (3,) unit vectors in UV axes: x along u, y along v, z out of the cloth
         """
+        known = self.manifest["garments"]
+        if garment not in known:
+            raise FabricError(
+                str(self.folder), f"has no garment '{garment}'; it must be of {', '.join(known)}"
+            )
         maps = {
             name: self.read(garment, name, level, tile)
             for name in best_choice(self.manifest["garments"][garment]["files"])

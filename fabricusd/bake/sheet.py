@@ -14,6 +14,9 @@ from fabricusd.bake.garment import Garment
 from fabricusd.bake.raster import texel_triangles
 from fabricusd.bake.recipe import Recipe
 
+SMALLEST, LARGEST = 64, 32768
+"""Texels along a side: beyond it a texture is more than most tools open; use more UDIM tiles."""
+
 BLOCK = 256
 """Texels along a block's side: 12 MB of planes."""
 

@@ -71,7 +71,7 @@ def unwrapped(axis: str, binding: Binding | None, scene: Scene, mesh: Mesh) -> G
         name="",
         points=mesh.points,
         triangles=tri,
-        normals=np.asarray(smooth_normals(mesh.points, tri), np.float64),
+        normals=smooth_normals(mesh.points, tri),
         uv=uv,
         lays=tuple(lays),
         lay=lay,

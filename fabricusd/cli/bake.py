@@ -73,6 +73,7 @@ def run(options: argparse.Namespace) -> int:
 
     from fabricusd.bake.bake import Settings, bake, plan
     from fabricusd.bake.maps import REGISTRY
+    from fabricusd.bake.ranges import positive
 
     if options.list_maps:
         for one in REGISTRY.values():
@@ -83,10 +84,18 @@ def run(options: argparse.Namespace) -> int:
     out = Path(options.output)
     if options.no_clobber and (out / "manifest.json").exists():
         raise FabricError(str(out), "holds a bake; it must be a new folder with --no-clobber")
+    # 0 stands for nothing asked in Settings; on the command line it is a number out of range.
+    per_thread, max_error = options.texels_per_thread, options.max_error
+    if per_thread is not None:
+        positive("--texels-per-thread", per_thread)
+    if max_error is not None:
+        positive("--max-error", max_error)
+    resolution = options.resolution
+    if resolution is None:
+        resolution = 1024 if max_error is None else 4096
     settings = Settings(
-        resolution=options.resolution
-        or (0 if options.texels_per_thread else 4096 if options.max_error else 1024),
-        texels_per_thread=options.texels_per_thread or 0.0,
+        resolution=resolution,
+        texels_per_thread=per_thread or 0.0,
         maps=tuple(options.maps) if options.maps else None,
         light=_light(options.light),
         shadow=options.shadow,
@@ -94,14 +103,15 @@ def run(options: argparse.Namespace) -> int:
         udim=options.udim,
         fit=options.fit,
         unwrap=options.unwrap or "",
-        max_error=_positive(options.max_error),
+        max_error=max_error or 0.0,
         btf=tuple(options.btf or ()),
         file_format=options.format,
     )
     if options.dry_run:
         planned = plan(
-            options.scene, settings, fabric=options.fabric, mesh=options.mesh, units=options.units
-        )
+            options.scene, settings, out=out, fabric=options.fabric, mesh=options.mesh,
+            units=options.units, workers=options.workers,
+        )  # fmt: skip
         for line in planned.lines:
             print(line)
         for note in () if options.quiet else planned.notes:
@@ -137,14 +147,6 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _positive(value: float | None) -> float:
-    if value is None:
-        return 0.0
-    if not value > 0:
-        raise FabricError("--max-error", f"is {value:g}; it must be above 0")
-    return value
-
-
 def _light(text: str | None) -> tuple[float, float, float] | None:
     if text is None:
         return None
@@ -154,8 +156,6 @@ def _light(text: str | None) -> tuple[float, float, float] | None:
         raise FabricError(
             f"--light '{text}'", "is no direction; write three numbers: X,Y,Z"
         ) from None
-    if not z > 0:
-        raise FabricError(f"--light '{text}'", f"has z {z:g}; it must be above 0, over the cloth")
     return x, y, z
 
 

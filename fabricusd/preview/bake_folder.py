@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.bake.manifest_file import MANIFEST, file_in, read_manifest
+from fabricusd.bake.maps import REGISTRY
 from fabricusd.errors import FabricError, reads
 from fabricusd.fabric import Fabric
-from fabricusd.files import readable_file
+from fabricusd.images import shape_of
 
 FABRICS = "fabrics.usda"
 """Layer in the folder that holds the fabrics that were baked, one prim each."""
@@ -36,7 +37,7 @@ class BakedLay:
 class MapSet:
     """The textures of one garment.
 
-    textures : map -> UDIM number -> file; only those that exist
+    textures : map -> UDIM number -> file; only maps all of whose files exist
     missing : map and file of what the manifest names and the folder lacks; "mesh" for the mesh
     prims : paths in the scene that was baked
     own_uv : False where the textures are not in the scene's own UVs
@@ -85,32 +86,20 @@ class BakeFolder:
 def read_bake_folder(path: str | os.PathLike[str]) -> BakeFolder:
     """The bake in a folder, wherever the folder is now. `FabricError` where there is none."""
     folder = Path(path)
-    if folder.name == "manifest.json":
+    if folder.name == MANIFEST:
         folder = folder.parent
     if not folder.is_dir():
         raise FabricError(str(folder), "is no folder; it must be one that 'fabricusd bake' made")
-    source = folder / "manifest.json"
-    if not source.exists():
+    if not (folder / MANIFEST).exists():
         raise FabricError(str(folder), "has no manifest.json; 'fabricusd bake' must finish first")
-    try:
-        said = json.loads(readable_file(source).read_text("utf-8"))
-        return _read(folder, said)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        if isinstance(error, FabricError):
-            raise
-        raise FabricError(
-            str(source), f"is no manifest of a bake ({type(error).__name__}: {error}); bake again"
-        ) from error
-
-
-def _read(folder: Path, said: dict[str, Any]) -> BakeFolder:
-    udim = bool(said["settings"]["udim"])
+    said = read_manifest(folder)
+    udim: bool = said["settings"]["udim"]
     known: dict[str, Fabric | None] = {}
     garments = tuple(
         _garment(folder, name, one, udim, known) for name, one in said["garments"].items()
     )
-    if not garments:
-        raise FabricError(str(folder / "manifest.json"), "names no garment; bake again")
+    for one in garments:
+        _check_sizes(one, said["resolution"])
     return BakeFolder(
         path=folder, garments=garments, scene=said["scene"]["file"], settings=said["settings"]
     )
@@ -122,13 +111,15 @@ def _garment(
     textures: dict[str, dict[int, Path]] = {}
     missing = []
     for texture, tiles in said["files"].items():
-        for number, record in tiles.items():
-            path = folder / record["file"]
-            if path.is_file():
-                textures.setdefault(texture, {})[int(number)] = path
-            else:
-                missing.append((texture, record["file"]))
-    if not (folder / said["mesh"]).is_file():
+        files = {int(number): file_in(folder, one["file"]) for number, one in tiles.items()}
+        lost = [path.name for path in files.values() if not path.is_file()]
+        missing += [(texture, file) for file in lost]
+        if not lost:
+            textures[texture] = files
+    mesh = file_in(folder, said["mesh"])
+    if mesh.is_file():
+        refuse_references(mesh)
+    else:
         missing.append(("mesh", said["mesh"]))
     lays = []
     for lay in said["lays"]:
@@ -144,17 +135,50 @@ def _garment(
         )
     return MapSet(
         folder=folder, name=name, textures=textures, missing=tuple(missing),
-        mesh=folder / said["mesh"], prims=tuple(said["prims"]), lays=tuple(lays),
-        own_uv=bool(said["uv_of_the_scene"]), udim=udim, error=said["error"],
+        mesh=mesh, prims=tuple(said["prims"]), lays=tuple(lays),
+        own_uv=said["uv_of_the_scene"], udim=udim, error=said["error"],
         fingerprint=said["fingerprint"],
     )  # fmt: skip
+
+
+def _check_sizes(one: MapSet, resolution: int) -> None:
+    """Raise FabricError for a texture whose size or channels are not those of the bake."""
+    for name, files in one.textures.items():
+        channels = len(REGISTRY[name].channels)
+        for path in files.values():
+            height, width, depth = shape_of(path)
+            if (height, width) != (resolution, resolution) or depth < channels:
+                raise FabricError(
+                    str(path),
+                    f"has {width} x {height} texels of {depth} channels; the manifest says "
+                    f"{resolution} x {resolution} of {channels}, bake again",
+                )
 
 
 def _fabric(folder: Path, name: str) -> Fabric | None:
     """The fabric of that name as it was baked, or else the preset; None where there is neither."""
     from fabricusd.schema import load, preset_names
 
-    source = folder / FABRICS
+    source = file_in(folder, FABRICS)
     if source.is_file():
+        refuse_references(source)
         return load(f"{source}:/{name}")
     return load(name) if name in preset_names() else None
+
+
+def refuse_references(source: Path) -> None:
+    """Raise FabricError for a layer of the baker's that names other files: it writes none so."""
+    from pxr import Sdf, Tf, UsdUtils
+
+    try:
+        found = Sdf.Layer.FindOrOpen(str(source))
+        named = [] if found is None else UsdUtils.ExtractExternalReferences(str(source))
+    except Tf.ErrorException as error:
+        raise FabricError(str(source), f"is no layer of USD: {error}") from error
+    if found is None:
+        raise FabricError(str(source), "is no layer of USD; bake again")
+    first = next((file for files in named for file in files), None)
+    if first is not None:
+        raise FabricError(
+            str(source), f"refers to '{first}'; a layer that 'fabricusd bake' wrote refers to none"
+        )

@@ -17,6 +17,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from fabricusd import __version__
+from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
 from fabricusd.files import whole_file
 from fabricusd.preview.bake_folder import BakedLay, MapSet
@@ -64,6 +65,11 @@ def write_baked_look(
             prim.GetReferences().AddReference(asset_path(one.mesh, path.parent))
             subsets = UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(prim))
             places = [str(s.GetPath()) for s in subsets] or [str(mesh)]
+            if one.mesh.is_file() and len(places) != len(one.lays):
+                raise FabricError(
+                    str(one.mesh),
+                    f"has {len(places)} parts; the manifest says {len(one.lays)} lays, bake again",
+                )
             wearers += [
                 Wearer(path=place, maps=one, lay=k, worn=False) for k, place in enumerate(places)
             ]

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from pxr import Sdf, Tf, Usd, UsdGeom
 
 from fabricusd import __version__
+from fabricusd.bake.lock import locked, refuse_locked
 from fabricusd.bake.manifest import write_json
+from fabricusd.bake.manifest_file import file_in
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
+from fabricusd.files import remove_partial_files
 from fabricusd.preview.bake_folder import BakeFolder, read_bake_folder
 from fabricusd.preview.layer import write_baked_look, write_scene_look
 from fabricusd.preview.mtlx import write_mtlx
@@ -21,7 +25,7 @@ from fabricusd.preview.paths import asset_path
 from fabricusd.preview.recipes import Progress, Settings, Written, recipes
 from fabricusd.preview.surfaces import GRAPHS, MAPS
 from fabricusd.preview.u3m import write_u3m
-from fabricusd.preview.wearers import find_wearers
+from fabricusd.preview.wearers import Dressed, find_wearers
 
 
 def write_materials(
@@ -45,10 +49,12 @@ def write_materials(
     overwrite, a scene that was not baked.
     """
     settings = settings or Settings()
+    refuse_locked(Path(bake))
     folder = read_bake_folder(bake)
     _check_surfaces(folder, settings)
     path = Path(out) if out is not None else folder.path / "look.usda"
     _check_target(path, clobber)
+    _refuse_links(folder.path, path)
     made = Written()
     for name, file in folder.missing:
         made.notes.append(f"{folder.path / file} is missing; {_without(name)}")
@@ -57,6 +63,25 @@ def write_materials(
     if dry_run:
         made.files = [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
         return made
+    with ExitStack() as locks:
+        for place in _written_folders(path, settings):
+            locks.enter_context(locked(place))
+        remove_partial_files(path.with_name(f"{path.stem}_maps"))
+        _write(folder, path, settings, made, dressed, scene, clobber, progress)
+    return made
+
+
+def _write(
+    folder: BakeFolder,
+    path: Path,
+    settings: Settings,
+    made: Written,
+    dressed: Dressed | None,
+    scene: str | os.PathLike[str] | None,
+    clobber: bool,
+    progress: Progress | None,
+) -> None:
+    """All files of a look, whose folders nobody else writes."""
     made_of, documents = recipes(folder, path, settings, made, progress)
     custom = {
         "version": __version__,
@@ -72,7 +97,29 @@ def write_materials(
     write_json(path.with_suffix(".json"), _report(made))
     made.files += [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
     _write_more(folder, path, settings, made, clobber)
-    return made
+
+
+def _written_folders(path: Path, settings: Settings) -> list[Path]:
+    """Folders that get files of a look, each once, in an order that all runs keep."""
+    places = [path.parent]
+    places += [settings.usdz.parent] if settings.usdz is not None else []
+    places += [settings.u3m] if settings.u3m is not None else []
+    return sorted({place.resolve() for place in places if place.is_dir()})
+
+
+def _refuse_links(folder: Path, path: Path) -> None:
+    """Raise FabricError where a look in its bake's folder would be written through a link out of
+    it: whoever gave the folder away may have laid the link."""
+    if path.parent.resolve() != folder.resolve():
+        return
+    maps = f"{path.stem}_maps"
+    ends = (".mtlx", ".json", ".uv.usdc")
+    for name in (path.name, maps, *(path.with_suffix(end).name for end in ends)):
+        file_in(folder, name)
+    for inside in (folder / maps).iterdir() if (folder / maps).is_dir() else ():
+        file_in(folder, f"{maps}/{inside.name}")
+    for shader in folder.glob(f"{path.stem}.*.osl"):
+        file_in(folder, shader.name)
 
 
 def _without(name: str) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from fabricusd.bake.garment import Garment, fitted, garments
 from fabricusd.errors import FabricError
@@ -72,7 +72,9 @@ def find_wearers(scene: Path, sets: tuple[MapSet, ...]) -> Dressed:
     notes: list[str] = []
     for maps in sets:
         for path in maps.prims:
-            prim = stage.GetPrimAtPath(path)
+            # A garment of an .obj is named after its file, which may be no path of USD.
+            whole = Sdf.Path.IsValidPathString(path) and Sdf.Path(path).IsAbsolutePath()
+            prim = stage.GetPrimAtPath(path) if whole else None
             if not prim:
                 notes.append(f"{path} is not in {scene.name} any more; it gets no look")
                 continue

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bake.killed import leave_half_written
 from bake.meshes import write_quad
 
 from fabricusd.bake import assemble, cell_table, kept
@@ -24,7 +25,6 @@ from fabricusd.bake.scratch import Scratch
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
-from fabricusd.files import whole_file
 from fabricusd.images import read_mip_level
 from fabricusd.schema import load
 
@@ -199,8 +199,7 @@ def test_killed_at_random_moments_it_ends_bit_identical(whole, square, tmp_path)
 
 
 def test_what_a_kill_left_half_written_is_removed(whole, square, linen, tmp_path):
-    killed = whole_file(tmp_path / "square_obj.lay.exr")
-    killed.__enter__().write_bytes(b"half")
+    leave_half_written(tmp_path / "square_obj.lay.exr")
     bake(square, tmp_path, SMALL, fabric=linen, resume=True)
     assert sums(tmp_path) == sums(whole.folder)
     assert not list(tmp_path.glob(".*"))

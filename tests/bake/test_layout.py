@@ -112,5 +112,5 @@ def test_a_file_without_uvs_says_so_and_is_baked_when_unwrapped(tmp_path):
     result = bake(scene, tmp_path / "b", replace(settings, unwrap="z"), fabric=linen)
     assert any("shells, warp along z" in note for note in result.notes)
     assert (tmp_path / "b" / f"{result.garments[0].name}.usdc").is_file()
-    with pytest.raises(FabricError, match="is no axis"):
+    with pytest.raises(FabricError, match="must be one of x, y, z"):
         bake(scene, tmp_path / "c", replace(settings, unwrap="w"), fabric=linen)

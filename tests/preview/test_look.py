@@ -190,7 +190,7 @@ def test_a_scene_that_changed_is_told(shirt, tmp_path):
 BAD = {
     "no folder": (["nowhere"], "is no folder"),
     "no manifest": (["{empty}"], "has no manifest.json"),
-    "broken manifest": (["{broken}"], "is no manifest of a bake"),
+    "broken manifest": (["{broken}"], "has no 'settings' in its root; bake again"),
     "unknown surface": (["{baked}", "--surface", "phong"], "is unknown"),
     "no layer": (["{baked}", "-o", "{empty}/look.txt"], "is no USD layer's name"),
     "no such folder for the layer": (["{baked}", "-o", "{empty}/no/look.usda"], "no directory"),
