@@ -31,7 +31,6 @@ COMMANDS = [
     (["--max-error", "nan"], "--max-error is nan"),
     (["--max-error", "inf"], "--max-error is inf"),
     (["--max-error", "0"], "--max-error is 0"),
-    (["--workers", "0"], "workers is 0"),
     (["--btf", "ubo2"], "--btf 'ubo2' is unknown"),
     (["--maps", "colour"], "map 'colour' is unknown"),
 ]
