@@ -2,7 +2,7 @@
 
     python bench/bench_cli.py
 
-A 4096 by 4096 jacquard as .usda, .usdc and .wif; every run starts a new Python.
+A 4096 by 4096 jacquard as .usda, .usdc, .wif and .png; every run starts a new Python.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from fabricusd.fabric import Fabric, Weave
+from fabricusd.images import write_png
 from fabricusd.schema import save
 from fabricusd.schema.weaves import from_fabric, wif_text
 
@@ -52,6 +53,7 @@ def make(folder: Path) -> None:
     for suffix in (".usda", ".usdc"):
         save(jacquard, folder / f"jacquard{suffix}")
     (folder / "jacquard.wif").write_text(wif_text(from_fabric(jacquard)))
+    write_png(folder / "jacquard.png", np.where(cells.T[::-1, :, None], 0, 255).astype(np.uint8))
 
 
 def main() -> None:
@@ -60,15 +62,18 @@ def main() -> None:
         folder = Path(name)
         # A child's peak counts what its parent had at the fork, so the parent stays small.
         subprocess.run([sys.executable, __file__, "--make", name], check=True)
-        print(f"{'command':28} {'seconds':>8} {'MB':>6}")
+        print(f"{'command':40} {'seconds':>8} {'MB':>6}")
         rows = [("--help",)]
-        for suffix in (".usda", ".usdc", ".wif"):
+        for suffix in (".usda", ".usdc"):
+            made = str(folder / f"made{suffix}")
+            rows += [("new", "--image", str(folder / "jacquard.png"), "-o", made)]
+        for suffix in (".usda", ".usdc", ".wif", ".png"):
             rows += [("cat", str(folder / f"jacquard{suffix}"))]
             rows += [("check", str(folder / f"jacquard{suffix}"))]
         for arguments in rows:
             seconds, megabytes = measure(*arguments)
             words = " ".join(Path(a).name for a in arguments)
-            print(f"{words:28} {seconds:8.2f} {megabytes:6.0f}")
+            print(f"{words:40} {seconds:8.2f} {megabytes:6.0f}")
 
 
 if __name__ == "__main__":

@@ -196,7 +196,7 @@ class Weave:
     """Which thread is on top at each crossing.
 
     cells : (m, n) bool - `cells[i, j]` is True where end `i` (along +U) lies over pick `j`
-        (along +V). A copy is kept, read-only.
+        (along +V). A copy is kept, read-only; of an array that is so already, itself.
     name : str - how it was made, for people: "satin 5 step 2", "8452.wif"
     """
 
@@ -204,7 +204,9 @@ class Weave:
     name: str = ""
 
     def __post_init__(self) -> None:
-        cells = np.array(self.cells, order="C")
+        cells = np.asarray(self.cells, order="C")
+        if cells.flags.writeable:
+            cells = cells.copy()
         if cells.ndim != 2 or cells.size == 0:
             raise FabricError(
                 "weave", f"has shape {cells.shape}; it must have at least one end and one pick"

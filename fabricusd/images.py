@@ -1,4 +1,5 @@
-"""Pictures in files: EXR with layers and metadata, PNG, textures. Only here is OpenImageIO used."""
+"""Pictures in files: EXR with layers and metadata, PNG, textures. Only here and in `flat_image` is
+OpenImageIO used."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ OPENIMAGEIO: str = oiio.VERSION_STRING
 """Which version of the library reads and writes."""
 
 
-def _reason(source: Any) -> str:
+def reason_of(source: Any) -> str:
     """What `source`, or OpenImageIO itself, has to complain of; it quotes damaged files."""
     try:
         return one_line(str(source.geterror()), 200)
@@ -31,7 +32,7 @@ def _reason(source: Any) -> str:
 
 
 @contextmanager
-def _silence() -> Iterator[None]:
+def quietly() -> Iterator[None]:
     """libpng and its like write their own lines past Python, to file descriptor 2."""
     try:
         kept = os.dup(2)
@@ -99,49 +100,32 @@ def _write(path: str | os.PathLike[str], spec: Any, data: NDArray[Any]) -> None:
             raise FabricError(str(path), "is no picture format; it must end in .exr or .png")
         try:
             good = output.open(str(temporary), spec) and output.write_image(data) and output.close()
-            reason = _reason(output)
+            reason = reason_of(output)
         finally:
             # The file is complete only once the writer is gone. Of an interrupt libpng complains.
-            with _silence():
+            with quietly():
                 del output
         if not good:
             raise FabricError(str(path), f"cannot be written: {reason}")
 
 
-@reads("a picture")
-def read_flat(
-    path: str | os.PathLike[str], largest: int
-) -> tuple[NDArray[np.uint8] | NDArray[np.float32], int]:
-    """((h, w, c) pixels as they are in the file, c up to 4; the channel of opacity, or -1).
+MOST_GROWTH = 2000
+"""Most times that a picture may be larger than its file; no usual compression reaches it."""
 
-    uint8 display codes; float32, linear, from a file of floating-point numbers. Raises FabricError
-    for what is not a whole flat image of 1 to `largest` pixels a side.
-    """
-    where = str(readable_file(path))
-    with _silence():
-        reader: Any = oiio.ImageInput.open(where)
-        if reader is None:
-            raise FabricError(where, f"is not an image ({_reason(oiio)}); it must be one")
-        spec = reader.spec()
-        if not (1 <= spec.width <= largest and 1 <= spec.height <= largest and spec.depth <= 1):
-            raise FabricError(
-                where,
-                f"is {spec.width} x {spec.height} x {spec.depth} pixels; it must be from 1 to "
-                f"{largest} a side, and flat",
-            )
-        if spec.deep or spec.nchannels < 1:
-            raise FabricError(where, "has no pixels of one colour each; it must be a flat image")
-        linear = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
-        used = min(spec.nchannels, 4)
-        pixels = reader.read_image(0, 0, 0, used, oiio.FLOAT if linear else oiio.UINT8)
-        reason = _reason(reader)
-        reader.close()
-    if pixels is None or reason:
+SPARE = 32 * 1024 * 1024
+"""Bytes that a picture may have however small its file is."""
+
+
+def require_plausible(where: str, spec: Any) -> None:
+    """Raise where a picture is out of all proportion to its file, before memory is taken for it."""
+    size = float(spec.image_bytes(True))
+    most = SPARE + MOST_GROWTH * os.path.getsize(where)
+    if not 0 < size <= most:
         raise FabricError(
-            where, f"cannot be read to its end ({reason or 'no pixels'}); it must be a whole image"
+            where,
+            f"says that it has {spec.width} x {spec.height} pixels of {spec.nchannels} channels, "
+            f"{size:.4g} bytes; a whole file of its size has at most {most}",
         )
-    alpha = spec.alpha_channel if 0 <= spec.alpha_channel < used else -1
-    return np.asarray(pixels).reshape(spec.height, spec.width, used), alpha
 
 
 @reads("a picture")
@@ -177,12 +161,34 @@ def _stored_pixels(path: str | os.PathLike[str]) -> tuple[NDArray[np.float32], A
     """((h, w, c) float32 values as they are in the file, its specification)."""
     plain = oiio.ImageSpec()
     plain.attribute("oiio:UnassociatedAlpha", 1)
-    buffer = oiio.ImageBuf(str(readable_file(path)), 0, 0, plain)
-    with _silence():
-        pixels = buffer.get_pixels(oiio.FLOAT) if buffer.read(0, 0, True, oiio.FLOAT) else None
+    pixels, buffer = _buffer_pixels(path, 0, plain)
+    return pixels, buffer.nativespec()
+
+
+def _buffer_pixels(
+    path: str | os.PathLike[str], level: int = 0, config: Any = None
+) -> tuple[NDArray[np.float32], Any]:
+    """((h, w, c) float32 values of one mip level, the buffer that was read).
+
+    Raises FabricError for what is no picture, is damaged, or cannot be as large as it says.
+    """
+    where = str(readable_file(path))
+    with quietly():
+        buffer: Any = oiio.ImageBuf(where, 0, level, config or oiio.ImageSpec())
+        if buffer.has_error or level >= max(buffer.nmiplevels, 1):
+            reason = reason_of(buffer) or f"there is no level {level}"
+            raise FabricError(where, f"cannot be read as a picture: {reason}")
+        spec = buffer.spec()
+        if spec.deep or spec.depth > 1:
+            raise FabricError(where, "is deep or has several layers of depth; it must be flat")
+        require_plausible(where, spec)
+        pixels = None
+        if buffer.read(0, level, True, oiio.FLOAT):
+            pixels = buffer.get_pixels(oiio.FLOAT)
+        reason = reason_of(buffer)
     if pixels is None or pixels.size == 0:
-        raise FabricError(str(path), f"cannot be read as a picture: {_reason(buffer)}")
-    return np.asarray(pixels, np.float32), buffer.nativespec()
+        raise FabricError(where, f"cannot be read as a picture: {reason or 'it has no pixels'}")
+    return np.asarray(pixels, np.float32), buffer
 
 
 def _shrunk(pixels: NDArray[np.float32], most: int) -> NDArray[np.float32]:
@@ -201,8 +207,7 @@ def read_exr_layers(
     path: str | os.PathLike[str],
 ) -> tuple[dict[str, NDArray[np.float32]], dict[str, Any]]:
     """Layers (h, w, c) and metadata of an EXR that `write_exr` wrote."""
-    buffer = oiio.ImageBuf(str(readable_file(path)))
-    pixels = np.asarray(buffer.get_pixels(oiio.FLOAT), np.float32)
+    pixels, buffer = _buffer_pixels(path)
     planes: dict[str, list[NDArray[np.float32]]] = {}
     for k, name in enumerate(buffer.spec().channelnames):
         layer, _, _ = name.rpartition(".")
@@ -251,7 +256,7 @@ def write_mip_exr(
                 good = good and output.write_tiles(0, side, row, end, 0, 1, band)
                 row = end
         good = good and output.close()
-        reason = _reason(output) if output is not None else "no EXR writer"
+        reason = reason_of(output) if output is not None else "no EXR writer"
         # The file is complete only once the writer is gone.
         del output
         if not good:
@@ -292,9 +297,9 @@ def write_16_bit(
                 good = good and output.write_scanlines(row, row + len(band), 0, pixels)
                 row += len(band)
             good = good and output.close()
-            reason = _reason(output) if output is not None else "no writer"
+            reason = reason_of(output) if output is not None else "no writer"
         finally:
-            with _silence():
+            with quietly():
                 del output
         if not good:
             raise FabricError(str(path), f"cannot be written: {reason}")
@@ -306,10 +311,7 @@ def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.f
     plain = oiio.ImageSpec()
     # A fourth channel is data: nothing is to be multiplied by it.
     plain.attribute("oiio:UnassociatedAlpha", 1)
-    buffer = oiio.ImageBuf(str(readable_file(path)), 0, level, plain)
-    if buffer.has_error or level >= max(buffer.nmiplevels, 1):
-        raise FabricError(str(path), f"has no level {level}: {_reason(buffer)}")
-    return np.asarray(buffer.get_pixels(oiio.FLOAT), np.float32)
+    return _buffer_pixels(path, level, plain)[0]
 
 
 @reads("a picture")
@@ -328,19 +330,27 @@ def read_middle(path: str | os.PathLike[str], most: int) -> NDArray[np.float32]:
 
     most : a multiple of 64; no other tile is read where there are tiles
     """
-    source: Any = oiio.ImageInput.open(str(readable_file(path)))
-    if source is None:
-        raise FabricError(str(path), f"cannot be read: {_reason(oiio)}")
-    side = source.spec().width
-    size = min(side, most)
-    begin = (side - size) // 2 // 64 * 64
-    end = begin + size
-    channels = source.spec().nchannels
-    if source.spec().tile_width:
-        pixels = source.read_tiles(begin, end, begin, end, 0, 1, 0, channels, oiio.FLOAT)
-    else:
-        pixels = source.read_scanlines(begin, end, 0, 0, channels, oiio.FLOAT)
-        pixels = pixels if pixels is None else pixels[:, begin:end]
+    where = str(readable_file(path))
+    with quietly():
+        source: Any = oiio.ImageInput.open(where)
+        if source is None:
+            raise FabricError(where, f"cannot be read as a picture: {reason_of(oiio)}")
+        spec = source.spec()
+        require_plausible(where, spec)
+        side, channels = spec.width, spec.nchannels
+        if spec.height != side or spec.deep:
+            raise FabricError(
+                where, f"is {side} x {spec.height} pixels; it must be a square texture"
+            )
+        size = min(side, most)
+        begin = (side - size) // 2 // 64 * 64
+        end = begin + size
+        if spec.tile_width:
+            pixels = source.read_tiles(begin, end, begin, end, 0, 1, 0, channels, oiio.FLOAT)
+        else:
+            pixels = source.read_scanlines(begin, end, 0, 0, channels, oiio.FLOAT)
+            pixels = pixels if pixels is None else pixels[:, begin:end]
+        reason = reason_of(source)
     if pixels is None:
-        raise FabricError(str(path), f"cannot be read: {_reason(source)}")
+        raise FabricError(where, f"cannot be read as a picture: {reason}")
     return np.asarray(pixels, np.float32).reshape(size, size, -1)

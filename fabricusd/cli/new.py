@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fabricusd.cli.number import number
 from fabricusd.cli.stdout import write_utf8
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, one_line
 from fabricusd.ranges import RANGES
 
 if TYPE_CHECKING:
@@ -159,9 +159,12 @@ def _color_order(items: list[str] | None, where: str) -> list[tuple[float, float
     order: list[tuple[float, float, float]] = []
     for item in items or ():
         count, star, color = item.rpartition("*")
-        if star and not (count.isdecimal() and 1 <= int(count) <= LONGEST_ORDER):
+        # Python refuses to convert numbers of thousands of digits.
+        whole = count.isdecimal() and len(count) < 10
+        if star and not (whole and 1 <= int(count) <= LONGEST_ORDER):
+            said = one_line(count, 40)
             raise FabricError(
-                where, f"has the count '{count}'; it must be from 1 to {LONGEST_ORDER}"
+                where, f"has the count '{said}'; it must be from 1 to {LONGEST_ORDER}"
             )
         rgb = parse_color(color, where)
         for value in rgb:

@@ -11,9 +11,13 @@ from fabricusd.fabric import Fabric
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".gif", ".jpg", ".jpeg", ".exr", ".tga", ".webp")
 
 
+DRAFT_SUFFIXES = (".wif", ".dtx", ".wpo", ".twa")
+"""Drafts. Of these only WIF is read; its reader calls the others by their names."""
+
+
 def is_draft(source: str | os.PathLike[str]) -> bool:
     """Whether `source` is a draft or an image by its suffix, and not USD."""
-    return Path(source).suffix.lower() in (".wif", *IMAGE_SUFFIXES)
+    return Path(source).suffix.lower() in (*DRAFT_SUFFIXES, *IMAGE_SUFFIXES)
 
 
 @reads("a fabric")
@@ -23,7 +27,8 @@ def load_any(source: str | os.PathLike[str]) -> tuple[Fabric, tuple[str, ...]]:
     if is_draft(text):
         from fabricusd.schema.weaves import losses, read_image, read_wif, to_fabric
 
-        draft = read_wif(text) if text.lower().endswith(".wif") else read_image(text)
+        drawn = text.lower().endswith(IMAGE_SUFFIXES)
+        draft = read_image(text) if drawn else read_wif(text)
         return to_fabric(draft, name=Path(text).stem), (*draft.warnings, *losses(draft))
     from fabricusd.schema.read import load
 

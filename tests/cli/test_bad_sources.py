@@ -56,7 +56,7 @@ WIF = {
     "a unit not allowed": ("Units=Inches", "Units=Ells", "'ells'; it must be Decipoints"),
     "not a number": ("Spacing=0.05", "Spacing=nan", r"\[WARP\] Spacing is 'nan'; it must"),
     "an empty cloth": ("[WARP]\nThreads=2", "[WARP]\nThreads=0", "'0'; it must be a whole number"),
-    "a size that disagrees": ("[THREADING]\n1=1", "[THREADING]\n3=1", "key '3'; .*from 1 to 2"),
+    "a size that disagrees": ("Shafts=2", "Shafts=1", "2 names 2; it must be from 0 to 1"),
     "a colour of no table": ("Color=2", "Color=9", r"\[WEFT\] Color is '9'; it must be a number"),
     "a billion threads": ("[WEFT]\nThreads=2", "[WEFT]\nThreads=1000000000", "from 1 to 16384"),
 }
@@ -185,3 +185,17 @@ def test_a_layer_in_binary_that_is_cut(length, kept, capsys):
     Path("d.usdc").write_bytes(data[: int(len(data) * length)])
     told = refused(capsys, "new", "--weave", "plain", "--thread", "d.usdc", "-o", kept)
     assert_says(told, r"d\.usdc cannot be parsed as USD")
+
+
+@pytest.mark.parametrize("arguments", [("cat", "a.dtx"), ("new", "--wif", "a.dtx", "-o", "")])
+def test_a_draft_of_another_program(arguments, kept, capsys):
+    Path("a.dtx").write_text("@@StartDTX\n@@Info\n%%shafts 4\n")
+    said = refused(capsys, *(a or kept for a in arguments))
+    assert said == "fabricusd: a.dtx is a .dtx draft (Fiberworks); export it as WIF\n"
+
+
+def test_lines_that_no_one_uses_are_told_and_the_draft_is_read(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("d.wif").write_text(SMALL.replace("[TIEUP]\n", "[TIEUP]\n9=1\n"))
+    assert main(("cat", "d.wif")) == 0
+    assert "d.wif: [TIEUP] has 1 line(s) of no treadle from 1 to 2" in capsys.readouterr().err

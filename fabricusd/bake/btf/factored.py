@@ -5,6 +5,7 @@ The atlas of components holds the same as pictures, for tools that only know tex
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +13,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fabricusd.bake.btf.archive import read_arrays
+from fabricusd.bake.btf.damage import damage_in, require_whole
 from fabricusd.bake.btf.factors import Factors
 from fabricusd.bake.btf.interpolate import evaluate
-from fabricusd.bake.btf.matrix import Btf
+from fabricusd.bake.btf.matrix import LARGEST, Btf
 from fabricusd.errors import FabricError, reads
-from fabricusd.files import readable_file, whole_file
+from fabricusd.files import whole_file
 from fabricusd.images import read_exr_layers, write_exr
 
 Floats = NDArray[np.float64]
@@ -65,24 +68,47 @@ def write_factored(path: str | os.PathLike[str], one: FactoredBtf) -> None:
         )
 
 
+ARRAYS = {"directions": 2, "rows": 3, "columns": 2, "size": 1, "per_thread": 0, "delta_e": 0}
+"""Arrays of the file, and how many axes each has."""
+
+KIND = "factored BTF"
+
+
 @reads("a factored BTF")
 def read_factored(path: str | os.PathLike[str]) -> FactoredBtf:
     """Read what `write_factored` wrote; FabricError for anything else."""
-    try:
-        with np.load(readable_file(path)) as data:
-            h, w = (int(n) for n in data["size"])
-            return FactoredBtf(
-                directions=data["directions"],
-                factors=Factors(
-                    rows=(data["rows"].astype(np.float32),),
-                    columns=(data["columns"].astype(np.float32),),
-                    delta_e=float(data["delta_e"]),
-                ),
-                size=(h, w),
-                per_thread=int(data["per_thread"]),
-            )
-    except (ValueError, KeyError, OSError, EOFError) as error:
-        raise FabricError(str(path), f"is no factored BTF: {error}") from error
+    data = read_arrays(path, ARRAYS, KIND)
+    where = str(path)
+    if data["size"].shape != (2,) or data["size"].dtype.kind == "f":
+        raise FabricError(where, f"has the size {data['size'].tolist()}; it must be two whole "
+                          "numbers of texels")  # fmt: skip
+    h, w = (int(n) for n in data["size"])
+    with np.errstate(over="ignore"):  # what overflows is reported with what is infinite already
+        rows, columns = data["rows"].astype(np.float32), data["columns"].astype(np.float32)
+    return _whole(
+        where,
+        directions=data["directions"].astype(np.float64),
+        factors=Factors(rows=(rows,), columns=(columns,), delta_e=float(data["delta_e"])),
+        size=(h, w),
+        per_thread=float(data["per_thread"]),
+    )
+
+
+def _whole(
+    where: str, *, directions: Floats, factors: Factors, size: tuple[int, int], per_thread: float
+) -> FactoredBtf:
+    """A form that was read from `where`, once its parts are found to go together."""
+    require_whole(where, directions, factors, size)
+    if not (math.isfinite(factors.delta_e) and factors.delta_e >= 0):
+        raise FabricError(where, f"has the error {factors.delta_e}; it must be at least 0")
+    if not (1 <= per_thread <= LARGEST and per_thread == int(per_thread)):
+        raise FabricError(
+            where,
+            f"has {per_thread:g} texels a thread; it must have a whole number from 1 to {LARGEST}",
+        )
+    return FactoredBtf(
+        directions=directions, factors=factors, size=size, per_thread=int(per_thread)
+    )
 
 
 def write_atlas(stem: str | os.PathLike[str], one: FactoredBtf) -> tuple[Path, Path]:
@@ -116,21 +142,30 @@ def write_atlas(stem: str | os.PathLike[str], one: FactoredBtf) -> tuple[Path, P
 
 @reads("an atlas of a BTF")
 def read_atlas(stem: str | os.PathLike[str]) -> FactoredBtf:
-    """Read what `write_atlas` wrote."""
+    """Read what `write_atlas` wrote; FabricError for anything else."""
     places, said = read_exr_layers(Path(f"{stem}.components.exr"))
     angles, also = read_exr_layers(Path(f"{stem}.weights.exr"))
+    where = f"{stem}.weights.exr"
+    if sorted(places) != sorted(angles) or len({a.shape for a in angles.values()}) != 1:
+        raise FabricError(
+            where,
+            f"has {len(angles)} layers beside {len(places)} components; it must have one RGB layer "
+            "for each",
+        )
     names = sorted(places)
-    columns = np.concatenate([places[n][::-1] for n in names], axis=-1)
-    rows = np.stack([angles[n] for n in names], axis=-1)
-    polar = [tuple(map(float, p.split(","))) for p in also["fabricusd:directions"].split(";")]
-    h, w, rank = columns.shape
-    return FactoredBtf(
-        directions=np.array(polar),
-        factors=Factors(
-            rows=(rows.reshape(-1, 3, rank),),
-            columns=(columns.reshape(h * w, rank),),
-            delta_e=float(said["fabricusd:deltaE"]),
-        ),
+    with damage_in(where, "atlas of a BTF"):
+        columns = np.concatenate([places[n][::-1] for n in names], axis=-1)
+        rows = np.stack([angles[n] for n in names], axis=-1)
+        written = str(also["fabricusd:directions"]).split(";")
+        directions = np.array([tuple(map(float, p.split(","))) for p in written])
+        delta_e = float(said["fabricusd:deltaE"])
+        per_thread = float(said["fabricusd:texelsPerThread"])
+        h, w, rank = columns.shape
+        rows, columns = rows.reshape(-1, 3, rank), columns.reshape(h * w, rank)
+    return _whole(
+        where,
+        directions=directions,
+        factors=Factors(rows=(rows,), columns=(columns,), delta_e=delta_e),
         size=(h, w),
-        per_thread=int(said["fabricusd:texelsPerThread"]),
+        per_thread=per_thread,
     )

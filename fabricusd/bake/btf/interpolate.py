@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, QhullError
 
 from fabricusd.bake.btf.factors import Factors
 from fabricusd.errors import FabricError
@@ -32,6 +32,8 @@ def direction_weights(directions: Floats, w: ArrayLike) -> tuple[NDArray[np.int6
         # Outside the lowest ring: towards the pole until inside.
         place = place * 0.99
         found = int(mesh.find_simplex(place))
+    if found < 0:
+        raise FabricError("directions", "do not surround the pole; those of a BTF must")
     corner = mesh.transform[found]
     two = corner[:2] @ (place - corner[2])
     weights = np.clip(np.array([two[0], two[1], 1.0 - two.sum()]), 0.0, 1.0)
@@ -40,7 +42,10 @@ def direction_weights(directions: Floats, w: ArrayLike) -> tuple[NDArray[np.int6
 
 @lru_cache(maxsize=8)
 def _mesh(data: bytes, count: int) -> Delaunay:
-    return Delaunay(np.frombuffer(data).reshape(count, 2))
+    try:
+        return Delaunay(np.frombuffer(data).reshape(count, 2))
+    except QhullError:
+        raise FabricError("directions", "lie on one line; those of a BTF must not") from None
 
 
 def texel_weights(

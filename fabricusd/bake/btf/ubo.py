@@ -8,14 +8,16 @@ run from the top in the readers, from the bottom in the file.
 
 from __future__ import annotations
 
+import math
 import os
 import struct
 from dataclasses import dataclass
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.bake.btf.damage import require_finite, require_whole
 from fabricusd.bake.btf.factors import Factors
 from fabricusd.bake.btf.matrix import Btf
 from fabricusd.errors import FabricError, reads
@@ -25,6 +27,11 @@ JOINT, PER_CHANNEL = b"!FMF06FC", b"!DFMF08FC"
 
 _HEADER = struct.Struct("<II80s80s80s4f")
 _VERSION = 1
+
+_ONE, _TWO, _KIND = struct.Struct("<I"), struct.Struct("<II"), struct.Struct("<BI")
+
+_HALF = 2
+"""The file's number for half floats."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,60 +103,112 @@ def _angles(directions: NDArray[np.float64]) -> NDArray[np.float32]:
 
 @reads("a .btf file")
 def read_ubo(path: str | os.PathLike[str]) -> UboFile:
-    """Read what `write_ubo` wrote; FabricError for anything else."""
-    data = readable_file(path).read_bytes()
-    joint = data.startswith(JOINT)
-    if not joint and not data.startswith(PER_CHANNEL):
+    """Read what `write_ubo` wrote; FabricError for anything else.
+
+    Every count in the file is compared with its length before anything of that size is made.
+    """
+    source = readable_file(path)
+    # Not read as a whole: factors are copied as floats anyway.
+    data = np.memmap(source, np.uint8, "r")
+    head = data[: len(PER_CHANNEL)].tobytes()
+    joint = head.startswith(JOINT)
+    if not joint and not head.startswith(PER_CHANNEL):
         raise FabricError(str(path), "is no .btf file of FMF or DFMF factors")
-    try:
-        return _parse(data, joint)
-    except (struct.error, ValueError) as error:
-        raise FabricError(str(path), f"is damaged: {error}") from error
+    reader = _Reader(str(path), data, len(JOINT if joint else PER_CHANNEL))
+    one = _parse(reader, joint)
+    require_whole(str(path), one.directions, one.factors, one.size)
+    return one
 
 
-def _parse(data: bytes, joint: bool) -> UboFile:
-    at = len(JOINT if joint else PER_CHANNEL) + _HEADER.size
+class _Reader:
+    """Takes numbers from a file one after the other, and no more than it has."""
 
-    def take(form: str) -> tuple[int, ...]:
-        nonlocal at
-        values = struct.unpack_from(form, data, at)
-        at += struct.calcsize(form)
+    def __init__(self, where: str, data: NDArray[np.uint8], at: int) -> None:
+        self.where = where
+        self.data = data
+        self.at = at
+
+    def take(self, form: struct.Struct, what: str) -> tuple[Any, ...]:
+        """The fields of `form`."""
+        self.require(form.size, what)
+        values = form.unpack_from(self.data.data, self.at)
+        self.at += form.size
         return values
 
-    def array(kind: str, *shape: int) -> NDArray[np.float32]:
-        nonlocal at
-        count = int(np.prod(shape))
-        values = np.frombuffer(data, kind, count, at).reshape(shape)
-        at += values.nbytes
+    def array(self, kind: str, shape: tuple[int, ...], what: str) -> NDArray[np.float32]:
+        """Numbers of the type `kind` as floats."""
+        count = math.prod(shape)
+        self.require(count * np.dtype(kind).itemsize, what)
+        values = np.frombuffer(self.data, kind, count, self.at).reshape(shape)
+        self.at += values.nbytes
         return values.astype(np.float32)
 
-    (views,) = take("<I")
-    angles = np.empty((views, 2))
-    for k in range(views):
-        angles[k] = array("<f4", 2)
-        take("<I")
-        array("<f4", views, 2)
-    w, h = take("<II")
-    rows, columns = [], []
+    def require(self, size: int, what: str) -> None:
+        """Raise where the file has fewer than `size` bytes more."""
+        left = len(self.data) - self.at
+        if size > left:
+            raise FabricError(
+                self.where,
+                f"is damaged: at byte {self.at} it has {left} bytes; it must have {size} of {what}",
+            )
+
+    def equal(self, found: object, wanted: object, what: str) -> None:
+        """Raise where a number of the file is not what the others make it."""
+        if found != wanted:
+            raise FabricError(self.where, f"is damaged: {what} is {found}; it must be {wanted}")
+
+
+def _parse(reader: _Reader, joint: bool) -> UboFile:
+    header, version, *_ = reader.take(_HEADER, "a header")
+    reader.equal((header, version), (_HEADER.size, _VERSION), "(header size, version)")
+    angles = _read_angles(reader)
+    views = len(angles)
+    w, h = reader.take(_TWO, "a picture's size")
+    groups = []
     if joint:
-        rank, _, _ = take("<IBI")
-        take("<II")
-        array("<f2", rank)
-        rows.append(array("<f2", views * views, 3, rank))
-        columns.append(array("<f2", h * w, rank))
+        (rank,) = reader.take(_ONE, "a rank")
+        groups.append(_read_matrix(reader, views * views, 3, h * w, "the matrix"))
+        reader.equal(rank, groups[0][1].shape[1], "the rank")
     else:
-        take("<II")
-        array("<f4", 12)
-        for _ in range(3):
-            _, rank = take("<BI")
-            take("<II")
-            array("<f2", rank)
-            rows.append(array("<f2", views * views, 1, rank))
-            columns.append(array("<f2", h * w, rank))
+        most, _ = reader.take(_TWO, "ranks")
+        reader.array("<f4", (12,), "colours")
+        for channel in ("red", "green", "blue"):
+            groups.append(_read_matrix(reader, views * views, 1, h * w, f"the matrix of {channel}"))
+        reader.equal(most, max(c.shape[1] for _, c in groups), "the largest rank")
+    reader.equal(len(reader.data) - reader.at, 0, "the number of bytes after the last matrix")
     theta, phi = angles.T
     directions = np.stack((np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)))
+    rows, columns = zip(*groups, strict=True)
     return UboFile(
         directions=directions.T,
         size=(h, w),
-        factors=Factors(rows=tuple(rows), columns=tuple(columns), delta_e=float("nan")),
+        factors=Factors(rows=rows, columns=columns, delta_e=float("nan")),
     )
+
+
+def _read_angles(reader: _Reader) -> NDArray[np.float64]:
+    """(d, 2) inclination and azimuth of the views [rad]; the lights of each must be the same."""
+    (views,) = reader.take(_ONE, "a number of views")
+    reader.require(views * (8 + _ONE.size + 8 * views), f"directions of {views} views")
+    angles = np.empty((views, 2))
+    for k in range(views):
+        angles[k] = reader.array("<f4", (2,), "a view")
+        (lights,) = reader.take(_ONE, "a number of lights")
+        reader.equal(lights, views, f"the number of lights of view {k}")
+        reader.array("<f4", (views, 2), "lights")
+    require_finite(reader.where, "angles", angles)
+    return angles
+
+
+def _read_matrix(
+    reader: _Reader, pairs: int, channels: int, texels: int, what: str
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """(pairs, channels, rank) and (texels, rank) factors."""
+    kind, rank = reader.take(_KIND, f"{what}'s rank")
+    reader.equal(kind, _HALF, f"{what}'s type of number")
+    sizes = reader.take(_TWO, f"{what}'s size")
+    reader.equal(sizes, (pairs * channels, texels), f"the size of {what}")
+    reader.require(2 * rank * (1 + pairs * channels + texels), f"{what} of rank {rank}")
+    reader.array("<f2", (rank,), "singular values")
+    rows = reader.array("<f2", (pairs, channels, rank), "left vectors")
+    return rows, reader.array("<f2", (texels, rank), "right vectors")

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, one_line
 from fabricusd.srgb import linear_from_srgb, srgb_from_linear
 
 RGB = tuple[float, float, float]
@@ -43,9 +43,9 @@ def parse_color(text: str, where: str = "colour") -> RGB:
     try:
         r, g, b = (float(part) for part in word.split(","))
     except ValueError:
-        raise FabricError(where, f"is '{text[:40]}'; {accepted}") from None
+        raise FabricError(where, f"is '{one_line(text, 40)}'; {accepted}") from None
     if not all(math.isfinite(x) and x >= 0 for x in (r, g, b)):
-        raise FabricError(where, f"is '{text[:40]}'; {accepted}")
+        raise FabricError(where, f"is '{one_line(text, 40)}'; {accepted}")
     return (r, g, b)
 
 

@@ -43,6 +43,9 @@ MOST_TERMS = 32
 LARGEST_NUMBER = 10**6
 """Largest constant; products with a thread number then stay far inside 64 bits."""
 
+ROWS = 64
+"""Ends that are evaluated at once: what every pass over them makes then stays in the cache."""
+
 Grid = NDArray[np.int64]
 Values = NDArray[np.generic]
 Evaluate = Callable[[Grid, Grid], Values]
@@ -100,8 +103,7 @@ def parse_expression(text: str) -> Draft:
             )
     except FabricError as error:
         raise error.inside(where) from None
-    i, j = np.arange(term.ends)[:, None], np.arange(term.picks)[None, :]
-    cells = np.broadcast_to(term.evaluate(i, j), (term.ends, term.picks)).astype(bool)
+    cells = _cells(term)
     name = recognise(cells)
     return Draft(
         weave=Weave(cells, name or text.strip()),
@@ -109,6 +111,17 @@ def parse_expression(text: str) -> Draft:
         source=text,
         warnings=_not_a_satin(text, name),
     )
+
+
+def _cells(term: _Term) -> NDArray[np.bool_]:
+    """(ends, picks) bool truth of `term`, read-only."""
+    cells = np.empty((term.ends, term.picks), np.bool_)
+    j = np.arange(term.picks)[None, :]
+    for begin in range(0, term.ends, ROWS):
+        i = np.arange(begin, min(begin + ROWS, term.ends))[:, None]
+        cells[begin : begin + ROWS] = term.evaluate(i, j)
+    cells.flags.writeable = False
+    return cells
 
 
 def _not_a_satin(text: str, name: str) -> tuple[str, ...]:
@@ -135,7 +148,9 @@ def _tree(text: str) -> ast.expr:
     level, depth, terms = [tree], 0, 0
     while level:
         depth += 1
-        terms += sum(isinstance(node, ast.Call | ast.Compare | ast.Mod) for node in level)
+        terms += sum(isinstance(node, ast.Call | ast.Mod) for node in level)
+        # One comparison may go on and on: 1 <= a < b < c.
+        terms += sum(len(node.ops) for node in level if isinstance(node, ast.Compare))
         level = [child for node in level for child in ast.iter_child_nodes(node)]  # type: ignore
     if depth > DEEPEST:
         raise FabricError("", f"is nested {depth} deep; it must be at most {DEEPEST}")

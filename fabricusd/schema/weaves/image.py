@@ -25,7 +25,7 @@ from fabricusd.schema.weaves.color import (
     palette_from_codes,
 )
 from fabricusd.schema.weaves.draft import LIMIT, Draft
-from fabricusd.schema.weaves.image_file import read_codes
+from fabricusd.schema.weaves.image_file import CodeImage
 from fabricusd.schema.weaves.image_threads import find_threads
 
 T = TypeVar("T", bound=np.generic)
@@ -58,31 +58,39 @@ def read_image(
         does not tell; one of the two is enough
 
     Transparent pixels are white. Raises FabricError for what is not an image of 1 to `LIMIT`
-    pixels a side, and for the first pixel that cannot be told to be warp or weft.
+    pixels a side and at most `image_file.MOST_PIXELS` altogether, and for the first pixel that
+    cannot be told to be warp or weft.
     """
     if mode not in MODES:
         raise FabricError("mode", f"is '{mode}'; it must be one of {', '.join(MODES)}")
-    codes = read_codes(path, LIMIT)
-    found = np.flatnonzero(_marked(codes))
+    image = CodeImage(path, LIMIT)
+    found = np.flatnonzero(_marked(image))
     colors = np.stack((found >> 16, (found >> 8) & 255, found & 255), axis=1).astype(np.uint8)
     name, where = Path(path).stem, str(path)
+    noticed = ("The file holds several pictures; the first is read.",) if image.several else ()
     told = bool(warp_colors or weft_colors)
     light, dark = (colors >= WHITE).all(axis=1), (colors <= BLACK).all(axis=1)
     plain = (light | dark) & (np.ptp(colors.astype(int), axis=1) <= GREY)
     if mode == "black-white" or (mode == "auto" and not told and bool(plain.all())):
         if not plain.all():
-            y, x = np.unravel_index(int(np.argmax(_looked_up(codes, found, ~plain))), codes.shape)
-            code = f"#{int(codes[y, x]):06x}"
+            wrong = int(np.argmax(_looked_up(image, found, ~plain)))
+            y, x = (int(n) for n in np.unravel_index(wrong, image.shape))
+            code = f"#{image.pixel(x, y):06x}"
             raise FabricError(f"{where} pixel ({x}, {y})", f"is {code}; it must be black or white")
-        warp_on_top = _looked_up(codes, found, np.asarray(light if invert else dark))
-        return Draft(weave=Weave(_cells(warp_on_top), name), title=name, source=Path(path).name)
+        warp_on_top = _looked_up(image, found, np.asarray(light if invert else dark))
+        return Draft(
+            weave=Weave(_cells(warp_on_top), name),
+            title=name,
+            source=Path(path).name,
+            warnings=noticed,
+        )
     if len(colors) > MOST_COLORS:
         raise FabricError(
             where, f"has {len(colors)} colours; it must have at most {MOST_COLORS}, one a thread"
         )
     threads = find_threads(
         where,
-        _looked_up(codes, found, np.arange(len(colors), dtype=np.uint8)),
+        _looked_up(image, found, np.arange(len(colors), dtype=np.uint8)),
         colors,
         _indices(warp_colors, colors, "warp"),
         _indices(weft_colors, colors, "weft"),
@@ -95,32 +103,37 @@ def read_image(
         weft_colors=tuple(threads.rows[::-1].tolist()),
         title=name,
         source=Path(path).name,
-        warnings=threads.warnings,
+        warnings=(*noticed, *threads.warnings),
     )
 
 
 def _cells(warp_on_top: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(h, w) image, top row first -> (w, h) cells, first pick first."""
-    return np.ascontiguousarray(warp_on_top[::-1].T)
+    """(h, w) image, top row first -> (w, h) cells, first pick first, read-only."""
+    cells = np.ascontiguousarray(warp_on_top[::-1].T)
+    cells.flags.writeable = False
+    return cells
 
 
-def _marked(codes: NDArray[np.uint32]) -> NDArray[np.bool_]:
+def _marked(image: CodeImage) -> NDArray[np.bool_]:
     """(2^24,) bool: which colours there are. A table is ten times as fast as sorting them."""
     seen = np.zeros(1 << 24, np.bool_)
-    for row in codes:
-        seen[row] = True
+    for codes in image.bands():
+        for row in codes:
+            seen[row] = True
     return seen
 
 
-def _looked_up(
-    codes: NDArray[np.uint32], found: NDArray[np.intp], values: NDArray[T]
-) -> NDArray[T]:
-    """`values[k]` at each pixel of the colour `found[k]`; same shape as `codes`."""
+def _looked_up(image: CodeImage, found: NDArray[np.intp], values: NDArray[T]) -> NDArray[T]:
+    """`values[k]` at each pixel of the colour `found[k]`, (h, w)."""
     table = np.zeros(1 << 24, values.dtype)
     table[found] = values
-    result = np.empty(codes.shape, values.dtype)
-    for into, row in zip(result, codes, strict=True):
-        np.take(table, row, out=into, mode="clip")
+    result = np.empty(image.shape, values.dtype)
+    begin = 0
+    for codes in image.bands():
+        end = begin + len(codes)
+        for row, into in zip(codes, result[begin:end], strict=True):
+            np.take(table, row, out=into, mode="clip")
+        begin = end
     return result
 
 

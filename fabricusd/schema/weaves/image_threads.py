@@ -37,6 +37,8 @@ def find_threads(
 ) -> Threads:
     """The threads of an image of colour numbers `index` (h, w) into `colors` (k, 3).
 
+    `index` is used up.
+
     Each colour belongs to the warp or to the weft: those in `warp` and `weft`, all others of the
     other set where only one is given, and without any as the image demands; what it leaves open
     is decided for the darkest colour, as warp, as in a black-and-white draft.
@@ -58,7 +60,9 @@ def find_threads(
         )
     columns = _threads(where, index, colors, shown_in_column & is_warp, "column", warnings)
     rows = _threads(where, index, colors, shown_in_row & ~is_warp, "row", warnings)
-    return Threads(is_warp[index], columns, rows, tuple(warnings))
+    for line in index:  # in its place: a second picture of this size would be the most there is
+        line[:] = is_warp[line]
+    return Threads(index.view(np.bool_), columns, rows, tuple(warnings))
 
 
 def _told(

@@ -1,16 +1,15 @@
-"""The syntax of WIF: encodings, sections, and the values in them. [WIF1.1]
+"""What a WIF file says: its sections, and the values in them. [WIF1.1]
 
 What is read here is what files hold and not only what the specification asks for: sections and
 keys in any case, blanks anywhere, comments after numbers, keys that come twice (the last one
-counts), lines without `=`, all three line ends.
+counts), keys of no thread.
 """
 
 from __future__ import annotations
 
-import codecs
-import configparser
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 
 import numpy as np
@@ -49,36 +48,45 @@ USUAL_RANGES = (255, 999, LARGEST_CODE)
 _DIGITS = str.maketrans("", "", "0123456789,")
 
 
-def decode(data: bytes) -> str:
-    """Text of UTF-16 or UTF-8 with a byte order mark, else UTF-8, else Windows code page 1252."""
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.decode("utf-16", errors="replace")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        # Its five unused bytes are replaced; they can only stand in a title or in notes.
-        return data.decode("cp1252", errors="replace")
+@dataclass
+class Unused:
+    """Things that nothing uses: how many, and the first of them."""
+
+    count: int = 0
+    first: str = ""
+
+    def add(self, text: str) -> None:
+        """Count one more."""
+        self.first = self.first if self.count else text[:60]
+        self.count += 1
 
 
 class Section:
-    """One section: keys in lower case -> text. `where(key)` names a line of it in a message."""
+    """One section: `values` by key in lower case, `numbered` by keys that are whole numbers.
 
-    def __init__(self, file: str, name: str, values: dict[str, str]) -> None:
+    `where(key)` names a line of it in a message.
+    """
+
+    def __init__(self, file: str, name: str) -> None:
         self.file = file
         self.name = name
-        self.values = values
+        self.values: dict[str, str] = {}
+        self.numbered: dict[int, str] = {}
+        self.strays = Unused()
 
     def where(self, key: str | int = "") -> str:
         """`draft.wif [WARP] Threads`."""
         return f"{self.file} [{self.name}] {key}".strip()
 
-    def text(self, key: str) -> str:
+    def text(self, key: str | int) -> str:
         """A string value; a semicolon is part of it. Empty where there is none."""
+        if isinstance(key, int):
+            return self.numbered.get(key, "")
         return self.values.get(key.lower(), "")
 
-    def value(self, key: str) -> str:
+    def value(self, key: str | int) -> str:
         """A value that is not a string, without the comment after it."""
-        return _uncommented(self.text(key))
+        return self.text(key).partition(";")[0].strip()
 
     def boolean(self, key: str) -> bool | None:
         """True, False, or None where there is no value."""
@@ -104,7 +112,7 @@ class Section:
             )
         return int(word)
 
-    def length(self, key: str, unit: Decimal) -> float | None:
+    def length(self, key: str | int, unit: Decimal) -> float | None:
         """A length [m] written in `unit`; 0 is allowed, None where there is no value."""
         word = self.value(key)
         if not word:
@@ -128,89 +136,61 @@ class Section:
             )
         return min(max(float(written * unit), SMALLEST_LENGTH), LARGEST_LENGTH)
 
-    def lists(
-        self, keys: int, largest: int, hint: str = ""
-    ) -> Iterator[tuple[int, NDArray[np.int32]]]:
-        """(key, numbers) of each line `key=n,n,n`; 0 and an empty value are no number.
+    def numbers(self, low: int, high: int) -> Iterator[int]:
+        """The keys from `low` to `high` that there are, in the file's order."""
+        return (number for number in self.numbered if low <= number <= high)
 
-        Keys must be whole numbers from 1 to `keys`, numbers at most `largest`; `hint` says why.
+    def beyond(self, low: int, high: int) -> Unused:
+        """The keys that are no whole numbers from `low` to `high`."""
+        found = Unused(self.strays.count, self.strays.first)
+        for number in self.numbered:
+            if not low <= number <= high:
+                found.add(str(number))
+        return found
+
+    def list(self, number: int, largest: int, hint: str = "") -> NDArray[np.int32]:
+        """(k,) numbers of the line `number=n,n,n`; 0 and an empty value are no number.
+
+        Numbers must be at most `largest`; `hint` says why.
         """
-        for key, text in self.values.items():
-            number = self._key(key, 1, keys)
-            word = _uncommented(text).rstrip(", \t")
-            if any(c in word for c in " \t"):
-                word = re.sub(r"\s*,\s*", ",", word)
-            if word.translate(_DIGITS) or ",," in word or word.startswith(","):
-                raise FabricError(
-                    self.where(number),
-                    f"is {quoted(word, 40)}; it must be whole numbers with commas between",
-                )
-            items = np.fromstring(word, np.int64, sep=",") if word else np.zeros(0, np.int64)
-            items = items[items != 0]
-            if len(items) and items.max() > largest:
-                raise FabricError(
-                    self.where(number), f"names {items.max()}; it must be from 0 to {largest}{hint}"
-                )
-            yield number, items.astype(np.int32)
-
-    def keys(self, low: int, high: int) -> Iterator[tuple[int, str]]:
-        """(number, key) of each line, for sections whose keys are whole numbers."""
-        for key in self.values:
-            yield self._key(key, low, high), key
-
-    def _key(self, key: str, low: int, high: int) -> int:
-        if not re.fullmatch(r"[0-9]{1,9}", key) or not low <= int(key) <= high:
+        word = self.value(number).rstrip(", \t")
+        if any(c in word for c in " \t"):
+            word = re.sub(r"\s*,\s*", ",", word)
+        if word.translate(_DIGITS) or ",," in word or word.startswith(","):
             raise FabricError(
-                self.where(),
-                f"has the key {quoted(key, 40)}; it must be a whole number from {low} to {high}",
+                self.where(number),
+                f"is {quoted(word, 40)}; it must be whole numbers with commas between",
             )
-        return int(key)
+        items = np.fromstring(word, np.int64, sep=",") if word else np.zeros(0, np.int64)
+        items = items[items != 0]
+        if len(items) and items.max() > largest:
+            raise FabricError(
+                self.where(number), f"names {items.max()}; it must be from 0 to {largest}{hint}"
+            )
+        return np.asarray(items, np.int32)
 
 
-def read_sections(text: str, file: str) -> dict[str, Section]:
-    """Name in upper case -> section. A section that comes twice is read as one.
+@dataclass(frozen=True)
+class Wif:
+    """A file's sections by their names in upper case, and what was noticed while reading them."""
 
-    Raises FabricError where there is no section `[WIF]`, which every WIF file starts with.
-    """
-    parser = configparser.RawConfigParser(
-        delimiters=("=",),
-        comment_prefixes=(";",),
-        inline_comment_prefixes=None,
-        strict=False,
-        empty_lines_in_values=False,
-        allow_no_value=True,
-        default_section="  ",  # what `_lines` can never make
-    )
-    try:
-        parser.read_file(_lines(text), source=file)
-    except configparser.Error as error:
-        reason = str(error).split("\n")[0]
-        raise FabricError(file, f"is not a WIF file ({reason}); it must be one") from None
-    sections = {
-        name: Section(file, name, {key: value or "" for key, value in parser.items(name)})
-        for name in parser.sections()
-    }
-    if "WIF" not in sections:
-        raise FabricError(file, "has no section [WIF]; it must be a WIF file, which has one")
-    return sections
+    file: str
+    sections: dict[str, Section] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
 
+    def section(self, name: str) -> Section:
+        """The section `name`, empty where the file has none."""
+        return self.sections.get(name) or Section(self.file, name)
 
-def _lines(text: str) -> Iterator[str]:
-    """Lines from the first section on, without the indentation that means more to an INI parser
-    than to WIF, section names in upper case with single blanks."""
-    # Not str.splitlines, which would also split at the form feeds and such of a title, and not
-    # re.split, which takes twice as long over a jacquard.
-    started = False
-    for line in text.replace("\r\n", "\n").replace("\r", "\n").split("\n"):
-        line = line.strip(" \t\0\f\v")
-        if line.startswith("[") and "]" in line:
-            started = True
-            line = "[" + " ".join(line[1 : line.index("]")].upper().split()) + "]"
-            if line == "[]":
-                line = "[?]"
-        if started and not line.startswith("="):
-            yield line
+    def warn(self, text: str) -> None:
+        """Add a warning, one line."""
+        self.warnings.append(text)
 
-
-def _uncommented(text: str) -> str:
-    return text.partition(";")[0].strip()
+    def warn_of_beyond(self, name: str, count: int, noun: str, first: int = 1) -> None:
+        """Warn of the lines of section `name` that belong to none of its `count` things."""
+        unused = self.section(name).beyond(first, count)
+        if unused.count:
+            self.warn(
+                f"[{name}] has {unused.count} line(s) of no {noun} from {first} to {count}, such "
+                f"as {quoted(unused.first, 40)}; they are not used."
+            )

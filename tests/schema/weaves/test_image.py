@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import fuzz
 import numpy as np
 import OpenImageIO as oiio
 import pytest
@@ -144,7 +145,7 @@ def test_threads_found_without_help_show_the_same_picture(
     used = np.unique(shown)
     index = np.searchsorted(used, shown).astype(np.uint8)
     try:
-        found = find_threads("x", index, colors[used])
+        found = find_threads("x", index.copy(), colors[used])
     except FabricError as error:
         # Only a picture of one set, all warp or all weft, cannot be told.
         assert "shows no" in error.problem, error  # noqa: PT017
@@ -153,15 +154,12 @@ def test_threads_found_without_help_show_the_same_picture(
     assert np.array_equal(again, index)
 
 
-def test_a_jacquard_of_4096_by_4096_is_read_in_a_second(tmp_path: Path) -> None:
-    import time
-
+def test_a_jacquard_of_4096_by_4096_is_read_in_bounded_time_and_memory(tmp_path: Path) -> None:
     cells = np.random.default_rng(1).random((4096, 4096)) < 0.5
     path = save(tmp_path / "big.png", np.where(cells.T[::-1], 0, 255).astype(np.uint8))
-    read_image(path)
-    start = time.process_time()
-    draft = read_image(path)
-    assert time.process_time() - start < 2  # measured 0.5 s; other work shares the machine
+    read_image(path)  # loads the library
+    with fuzz.guarded(seconds=10, megabytes=200):  # measured 0.5 s; its cells are 16 MB
+        draft = read_image(path)
     assert np.array_equal(draft.weave.cells, cells)
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
+import fuzz
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fabricusd.errors import FabricError
-from fabricusd.schema.weaves import parse_weave
+from fabricusd.schema.weaves import parse_color, parse_weave
 from fabricusd.schema.weaves.named import DARK, LIGHT, WEAVES
 from fabricusd.schema.weaves.recognise import recognise, shortest_repeat
 
@@ -184,3 +185,26 @@ def test_the_shortest_repeat_makes_the_whole_again(bits: int, a: int, b: int) ->
     assert small.shape[1] <= 4
     copies = (whole.shape[0] // small.shape[0], whole.shape[1] // small.shape[1])
     assert np.array_equal(np.tile(small, copies), whole)
+
+
+WORDS = st.sampled_from(
+    [
+        *WEAVES,
+        *("S", "Z", "step", "weft", "warp", "x", "", "é", "\0", "/", "-", "2/2", "3/1/1/3", "8/3"),
+        *("1/0", "0/1", "9999/9999", "4096", "4097", "1/" * 400 + "1", "9" * 5000, "-1", "2.5"),
+    ]
+)
+
+
+@settings(max_examples=fuzz.examples(100, 20_000))
+@given(st.sampled_from(list(WEAVES)), st.lists(WORDS | st.integers(0, 99).map(str), max_size=5))
+def test_any_words_after_a_name_are_a_weave_or_one_line_of_error(
+    name: str, words: list[str]
+) -> None:
+    fuzz.refusal(parse_weave, " ".join([name, *words]))
+
+
+@settings(max_examples=fuzz.examples(100, 20_000))
+@given(st.text(st.sampled_from("#0123456789abcdefgnif.,- +e\0٣"), max_size=12))
+def test_any_text_is_a_colour_or_one_line_of_error(text: str) -> None:
+    fuzz.refusal(parse_color, text)
