@@ -317,10 +317,12 @@ def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.f
 @reads("a picture")
 def shape_of(path: str | os.PathLike[str]) -> tuple[int, int, int]:
     """(height, width, channels) as the head of a picture's file says; no pixel is read."""
-    source: Any = oiio.ImageInput.open(str(readable_file(path)))
-    if source is None:
-        raise FabricError(str(path), f"cannot be read: {_reason(oiio)}")
-    spec = source.spec()
+    where = str(readable_file(path))
+    with quietly():
+        source: Any = oiio.ImageInput.open(where)
+        if source is None:
+            raise FabricError(where, f"cannot be read as a picture: {reason_of(oiio)}")
+        spec = source.spec()
     return int(spec.height), int(spec.width), int(spec.nchannels)
 
 
