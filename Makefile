@@ -60,7 +60,7 @@ build/bpy/.installed:
 	@touch $@
 
 blender: $(STAMP) build/bpy/.installed  ## Compare Cycles with the reference, into build/blender.
-	$(BIN)/python bench/blender_compare.py --blender build/bpy/bin/python
+	$(BIN)/python bench/materials/blender_compare.py --blender build/bpy/bin/python
 
 clean:  ## Remove the environment and everything made.
 	rm -rf $(VENV) demo build dist *.egg-info

@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from fabricusd.fabric import Fabric, Weave
-from fabricusd.images import write_png
+from fabricusd.images.files import write_png
 from fabricusd.schema import save
-from fabricusd.schema.weaves import from_fabric, wif_text
+from fabricusd.weaves import from_fabric, wif_text
 
 RUNS = 5
 SIZE = 4096

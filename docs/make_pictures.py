@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from fabricusd.images import write_png
+from fabricusd.images.files import write_png
 from fabricusd.reference import render
 from fabricusd.reference.view_transform import view
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pxr import Sdf, Usd
 
-from fabricusd.schema.rules import RULES
+from fabricusd.schema.rules.rules import RULES
 
 HERE = Path(__file__).resolve().parent
 TYPES = (

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from fabricusd.fabric import Weave
-from fabricusd.schema.weaves import Draft
-from fabricusd.schema.weaves.color import palette_from_codes
+from fabricusd.weaves import Draft
+from fabricusd.weaves.color import palette_from_codes
 
 LENGTHS = st.integers(1, 20000).map(lambda k: k * 1e-6)
 LINES = st.text(st.characters(codec="utf-8", exclude_categories=("C", "Z")), max_size=12)

@@ -1,5 +1,5 @@
 """The appearance of thread and weave: pure mathematics, no USD, no Embree, no files."""
 
-from fabricusd.kernel_cache import forget_stale_kernels
+from fabricusd.kernels.cache import forget_stale_kernels
 
 forget_stale_kernels()

@@ -9,9 +9,10 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from fabricusd.appearance.conserving import conserving_single, single_tables
-from fabricusd.appearance.far import far_values
-from fabricusd.appearance.quadrature import (
+from fabricusd.appearance.conserving.single import conserving_single, single_tables
+from fabricusd.appearance.published.far import far_values
+from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.weave.quadrature import (
     CANDIDATES,
     MOST_NODES_EVER,
     POINTS,
@@ -20,10 +21,9 @@ from fabricusd.appearance.quadrature import (
     count_nodes,
     curve_nodes,
 )
-from fabricusd.appearance.real import KERNEL
-from fabricusd.appearance.surface_tables import surface_tables
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
+from fabricusd.kernels.real import KERNEL
 
 Floats = NDArray[np.float64]
 

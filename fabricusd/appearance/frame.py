@@ -29,7 +29,7 @@ import math
 
 from numba import njit
 
-from fabricusd.appearance.real import INLINE, atan2
+from fabricusd.kernels.real import INLINE, atan2
 
 WEFT, WARP = 0, 1
 """Index of a thread set; also the value of a grid cell where that set lies on top."""

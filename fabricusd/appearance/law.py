@@ -12,39 +12,44 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.conserving import ConservingTables, facet_terms, single_tables, visible
-from fabricusd.appearance.conserving_sampling import (
+from fabricusd.appearance.conserving.multiple import (
+    conserving_point_value,
+    conserving_tables,
+    conserving_value,
+    multiple_share,
+)
+from fabricusd.appearance.conserving.sampling import (
     ConservingSamplingTables,
     conserving_density,
     conserving_direction,
     conserving_point_density,
     conserving_point_direction,
 )
-from fabricusd.appearance.conserving_shares import conserving_sampling_tables
-from fabricusd.appearance.far import far_value
-from fabricusd.appearance.frame import to_thread
-from fabricusd.appearance.levels import across_at, point_value
-from fabricusd.appearance.multiple import (
-    conserving_point_value,
-    conserving_tables,
-    conserving_value,
-    multiple_share,
+from fabricusd.appearance.conserving.shares import conserving_sampling_tables
+from fabricusd.appearance.conserving.single import (
+    ConservingTables,
+    facet_terms,
+    single_tables,
+    visible,
 )
-from fabricusd.appearance.quadrature import Rule
-from fabricusd.appearance.real import PART, cos, sin
-from fabricusd.appearance.share_fit import AZIMUTHS, ELEVATIONS
-from fabricusd.appearance.stretches import STRETCH_COLUMNS
-from fabricusd.appearance.surface_sampling import (
+from fabricusd.appearance.frame import to_thread
+from fabricusd.appearance.published.far import far_value
+from fabricusd.appearance.published.levels import across_at, point_value
+from fabricusd.appearance.published.sampling import (
     SamplingTables,
     far_density,
     far_direction,
     point_density,
     point_direction,
 )
-from fabricusd.appearance.surface_shares import sampling_tables
-from fabricusd.appearance.surface_tables import SurfaceTables, surface_tables
-from fabricusd.appearance.thread_terms import ALBEDO_B, ALBEDO_G, ALBEDO_R, CONSERVING, MODEL
+from fabricusd.appearance.published.shares import sampling_tables
+from fabricusd.appearance.published.tables import SurfaceTables, surface_tables
+from fabricusd.appearance.sampling.share_fit import AZIMUTHS, ELEVATIONS
+from fabricusd.appearance.sampling.stretches import STRETCH_COLUMNS
+from fabricusd.appearance.scattering.terms import ALBEDO_B, ALBEDO_G, ALBEDO_R, CONSERVING, MODEL
+from fabricusd.appearance.weave.quadrature import Rule
 from fabricusd.fabric import PILE_ANGLE, Fabric
+from fabricusd.kernels.real import PART, cos, sin
 
 FAR, WEAVE, THREAD = 0, 1, 2
 """Levels, in the order of `surface.LEVELS`."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf, i0e
 
-from fabricusd.appearance.coverage import WARP, WEFT, coverage
+from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage
 from fabricusd.fabric import PILE_ANGLE, Fabric, TangentCurve, Thread
 
 Array = NDArray[np.float64]

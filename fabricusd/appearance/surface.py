@@ -23,9 +23,7 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.accuracy import choose_rule
-from fabricusd.appearance.blocks import BLOCK
-from fabricusd.appearance.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.far import far_values
+from fabricusd.appearance.conserving.multiple import conserving_value
 from fabricusd.appearance.law import (
     CONSERVING_ONLY,
     FAR,
@@ -37,9 +35,18 @@ from fabricusd.appearance.law import (
     law_direction,
     surface_law,
 )
-from fabricusd.appearance.levels import POINT_ROWS, point_block, point_values
-from fabricusd.appearance.multiple import conserving_value
-from fabricusd.appearance.place_blocks import (
+from fabricusd.appearance.published.blocks import BLOCK
+from fabricusd.appearance.published.far import far_values
+from fabricusd.appearance.published.levels import POINT_ROWS, point_block, point_values
+from fabricusd.appearance.shadow.methods import (
+    METHODS,
+    Shadow,
+    compile_shadow,
+    horizon_block,
+    lit_all,
+    mean_block,
+)
+from fabricusd.appearance.shadow.place_blocks import (
     ANGLE,
     INT_ROWS,
     LIT,
@@ -48,21 +55,14 @@ from fabricusd.appearance.place_blocks import (
     S,
     look_up_block,
 )
-from fabricusd.appearance.place_blocks import (
+from fabricusd.appearance.shadow.place_blocks import (
     THREAD as THREAD_ROW,
 )
-from fabricusd.appearance.real import KERNEL, index
-from fabricusd.appearance.shadow import (
-    METHODS,
-    Shadow,
-    compile_shadow,
-    horizon_block,
-    lit_all,
-    mean_block,
-)
-from fabricusd.appearance.weave import WeaveHit, lookup
+from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
+from fabricusd.appearance.weave.lookup import WeaveHit, lookup
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
+from fabricusd.kernels.real import KERNEL, index
 
 Floats = NDArray[np.float64]
 

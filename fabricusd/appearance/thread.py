@@ -18,10 +18,9 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
-from fabricusd.appearance.real import KERNEL
-from fabricusd.appearance.thread_sampling import density, sample_direction
-from fabricusd.appearance.thread_table import pack_threads, thread_row
-from fabricusd.appearance.thread_terms import (
+from fabricusd.appearance.scattering.sampling import density, sample_direction
+from fabricusd.appearance.scattering.table import pack_threads, thread_row
+from fabricusd.appearance.scattering.terms import (
     ALBEDO_B,
     ALBEDO_G,
     ALBEDO_R,
@@ -45,6 +44,7 @@ from fabricusd.appearance.thread_terms import (
 )
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEFAULT_MODEL, MODELS, Thread
+from fabricusd.kernels.real import KERNEL
 
 __all__ = [
     "ALBEDO_B",

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from fabricusd import __version__
-from fabricusd.bake.accuracy import SwatchError, swatch_errors
-from fabricusd.bake.assemble import Files, Progress, Work, assemble, compute
 from fabricusd.bake.btf.write import MAX_ERROR, write_btf
-from fabricusd.bake.choose import Tried, cheapest, maps_with
-from fabricusd.bake.encoding import Encoding, stored_by
-from fabricusd.bake.garment import (
+from fabricusd.bake.error.accuracy import SwatchError, swatch_errors
+from fabricusd.bake.error.choose import Tried, cheapest, maps_with
+from fabricusd.bake.error.map_error import MapError, map_errors
+from fabricusd.bake.error.relight import best_choice
+from fabricusd.bake.layout.garment import (
     Garment,
     fitted,
     garments,
@@ -26,28 +26,28 @@ from fabricusd.bake.garment import (
     threads_per_uv,
     tiles_of,
 )
-from fabricusd.bake.kept import kept
-from fabricusd.bake.lock import locked
+from fabricusd.bake.layout.mesh_layer import write_mesh_layer
+from fabricusd.bake.layout.overlaps import refuse_overlaps
+from fabricusd.bake.layout.unwrap import unwrapped
 from fabricusd.bake.manifest import manifest_of, write_json
-from fabricusd.bake.map_error import MapError, map_errors
-from fabricusd.bake.maps import TextureMap, chosen_maps
-from fabricusd.bake.mesh_layer import write_mesh_layer
-from fabricusd.bake.overlaps import refuse_overlaps
 from fabricusd.bake.ranges import check_settings
 from fabricusd.bake.reasons import explained
-from fabricusd.bake.recipe import Recipe, recipe
-from fabricusd.bake.relight import best_choice
 from fabricusd.bake.report import write_report
-from fabricusd.bake.scratch import Scratch
-from fabricusd.bake.sheet import LARGEST, SMALLEST, Sheet, sheets_of
-from fabricusd.bake.unwrap import unwrapped
+from fabricusd.bake.texels.encoding import Encoding, stored_by
+from fabricusd.bake.texels.maps import TextureMap, chosen_maps
+from fabricusd.bake.texels.recipe import Recipe, recipe
+from fabricusd.bake.texels.sheet import LARGEST, SMALLEST, Sheet, sheets_of
+from fabricusd.bake.work.assemble import Files, Progress, Work, assemble, compute
+from fabricusd.bake.work.kept import kept
+from fabricusd.bake.work.lock import locked
+from fabricusd.bake.work.scratch import Scratch
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.files import remove_partial_files
-from fabricusd.reference.mesh_size import size_words, threads_words
-from fabricusd.reference.read import as_binding, read_scene
-from fabricusd.reference.scene import Scene
-from fabricusd.reference.workers import worker_count
+from fabricusd.run.workers import worker_count
+from fabricusd.scene.read import as_binding, read_scene
+from fabricusd.scene.scene import Scene
+from fabricusd.scene.size import size_words, threads_words
 from fabricusd.schema import save_all
 
 MARGIN = 16

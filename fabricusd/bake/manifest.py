@@ -12,10 +12,10 @@ import numba
 import numpy as np
 
 from fabricusd import __version__
-from fabricusd.bake.maps import TextureMap
-from fabricusd.bake.scratch import sha256
+from fabricusd.bake.texels.maps import TextureMap
+from fabricusd.bake.work.scratch import sha256
 from fabricusd.files import whole_file
-from fabricusd.images import OPENIMAGEIO
+from fabricusd.images.files import OPENIMAGEIO
 
 if TYPE_CHECKING:
     from fabricusd.bake.bake import Baked, Settings

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from fabricusd.bake.encoding import FORMATS, encoding_from
-from fabricusd.bake.garment import FIRST_TILE, LAST_TILE
-from fabricusd.bake.maps import REGISTRY
+from fabricusd.bake.layout.garment import FIRST_TILE, LAST_TILE
 from fabricusd.bake.names import folded, is_file_stem
-from fabricusd.bake.sheet import LARGEST, SMALLEST
 from fabricusd.bake.stated import Stated, read_stated
+from fabricusd.bake.texels.encoding import FORMATS, encoding_from
+from fabricusd.bake.texels.maps import REGISTRY
+from fabricusd.bake.texels.sheet import LARGEST, SMALLEST
 from fabricusd.errors import FabricError
 
 MANIFEST = "manifest.json"

@@ -8,11 +8,11 @@ from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 from fabricusd.bake.btf.write import FORMS
-from fabricusd.bake.encoding import FORMATS
-from fabricusd.bake.light import is_number, unit_light
-from fabricusd.bake.maps import chosen_maps
-from fabricusd.bake.sheet import LARGEST, SMALLEST
-from fabricusd.bake.unwrap import AXES
+from fabricusd.bake.layout.unwrap import AXES
+from fabricusd.bake.texels.encoding import FORMATS
+from fabricusd.bake.texels.light import is_number, unit_light
+from fabricusd.bake.texels.maps import chosen_maps
+from fabricusd.bake.texels.sheet import LARGEST, SMALLEST
 from fabricusd.errors import FabricError
 
 if TYPE_CHECKING:

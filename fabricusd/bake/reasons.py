@@ -7,7 +7,7 @@ from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar
 
 from fabricusd.errors import FabricError
-from fabricusd.reference.scene import Scene
+from fabricusd.scene.scene import Scene
 
 P = ParamSpec("P")
 T = TypeVar("T")

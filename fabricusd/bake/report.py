@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fabricusd.bake.manifest import write_json
 from fabricusd.files import whole_file
-from fabricusd.images import read_middle, write_png
+from fabricusd.images.files import read_middle, write_png
 
 if TYPE_CHECKING:
     from fabricusd.bake.bake import Baked, Settings

@@ -15,10 +15,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fabricusd.appearance.footprint import Limits
+from fabricusd.appearance.weave.footprint import Limits
 from fabricusd.errors import FabricError, reads
 from fabricusd.files import readable_file, whole_file
-from fabricusd.reference.scene import FabricSurface, Scene
+from fabricusd.scene.scene import FabricSurface, Scene
 
 BOUNDS = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 """Errors that the levels' limits are measured for."""
@@ -146,10 +146,10 @@ def presets_in(scene: Scene) -> tuple[str, ...]:
 
 def write_table(path: Path, quick: bool = True) -> None:
     """Measure every woven preset's shadowing methods and every preset's levels; write the table."""
-    from fabricusd.appearance.shadow import METHODS
-    from fabricusd.chart import shadows
+    from fabricusd.appearance.shadow.methods import METHODS
     from fabricusd.chart.level_errors import coarsest
     from fabricusd.chart.panel import Row
+    from fabricusd.chart.panels import shadows
     from fabricusd.schema import load, preset_names
 
     found: dict[str, dict[str, tuple[float, float]]] = {}

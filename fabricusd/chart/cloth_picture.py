@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.compiled import true_repeat
 from fabricusd.appearance.surface import evaluate
+from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 

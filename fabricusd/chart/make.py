@@ -9,7 +9,7 @@ from pathlib import Path
 from fabricusd.chart.draw import adjuster, draw_panel, pyplot
 from fabricusd.chart.page import Charts, markdown, write_csv, write_json
 from fabricusd.chart.panel import Panel, Row, measure
-from fabricusd.chart.registry import PANELS
+from fabricusd.chart.panels.registry import PANELS
 from fabricusd.chart.sheets import SHEETS
 from fabricusd.errors import FabricError
 from fabricusd.files import whole_file

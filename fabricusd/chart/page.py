@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import fabricusd
-from fabricusd.appearance.footprint import DEFAULT
+from fabricusd.appearance.weave.footprint import DEFAULT
 from fabricusd.chart.choice import BOUNDS as LEVEL_BOUNDS
 from fabricusd.chart.choice import cheapest, choose_limits, read_limits, read_table
 from fabricusd.chart.panel import Panel, Row, relative_costs

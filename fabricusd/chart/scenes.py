@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.fabric import Binding, Fabric
-from fabricusd.reference.scene import DISTANT, DOME, Camera, FabricSurface, Light, Mesh, Scene
+from fabricusd.scene.scene import DISTANT, DOME, Camera, FabricSurface, Light, Mesh, Scene
 
 RADIUS = 0.05
 """Of a cylinder [m]."""

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.shadow import shadowing
+from fabricusd.appearance.shadow.methods import shadowing
 from fabricusd.appearance.surface import evaluate
 from fabricusd.chart.draw import pyplot, save
 from fabricusd.chart.highlights import predicted
 from fabricusd.chart.scenes import RADIUS, cloth, curtain, cylinder, facing, sky, sun
 from fabricusd.fabric import Fabric, Thread
 from fabricusd.reference.render import render_scene
-from fabricusd.reference.scene import Scene
 from fabricusd.reference.view_transform import view
+from fabricusd.scene.scene import Scene
 from fabricusd.schema import load
 
 Picture = NDArray[np.float32]

@@ -14,17 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance import plain
-from fabricusd.appearance.footprint import weights
 from fabricusd.appearance.surface import evaluate
 from fabricusd.appearance.thread import evaluate as thread_value
-from fabricusd.appearance.weave import lookup
+from fabricusd.appearance.weave.footprint import weights
+from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.chart.cloth_picture import difference, ideal_spectrum, picture, view_of
 from fabricusd.chart.draw import pyplot, save
 from fabricusd.chart.scenes import cloth, facing
 from fabricusd.fabric import PILE_ANGLE, Fabric
 from fabricusd.files import whole_file
 from fabricusd.reference.render import render_scene
-from fabricusd.reference.scene import SPHERE, Light, Mesh, Scene
+from fabricusd.scene.scene import SPHERE, Light, Mesh, Scene
 from fabricusd.schema import load
 
 Floats = NDArray[np.float64]
@@ -301,7 +301,7 @@ CASES: tuple[Callable[[], Case], ...] = (
 
 ELSEWHERE = {
     "degenerate, mirrored, overlapping or missing UV": "refused or named in a note; "
-    "tests/bake/test_garment.py, tests/reference/test_usd_scene.py",
+    "tests/bake/layout/test_garment.py, tests/scene/usd/test_stage.py",
     "a 1×1 and a 4096×4096 grid": "tests/appearance/test_failures.py",
     "grazing camera on a thin fold": "rays leave from beside the shading point, "
     "tests/reference/test_terminator.py",

@@ -6,8 +6,8 @@ import argparse
 import sys
 from typing import Any
 
-from fabricusd.cli.number import number
-from fabricusd.cli.units import add_units
+from fabricusd.cli.arguments.number import number
+from fabricusd.cli.arguments.units import add_units
 from fabricusd.errors import FabricError
 
 EPILOG = """example:
@@ -72,8 +72,8 @@ def run(options: argparse.Namespace) -> int:
     from pathlib import Path
 
     from fabricusd.bake.bake import Settings, bake, plan
-    from fabricusd.bake.maps import REGISTRY
     from fabricusd.bake.ranges import positive
+    from fabricusd.bake.texels.maps import REGISTRY
 
     if options.list_maps:
         for one in REGISTRY.values():

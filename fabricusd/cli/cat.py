@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     fabric, notes = load_any(source)
     _tell(source, notes, options)
     if options.wif:
-        from fabricusd.schema.weaves import from_fabric, wif_text
+        from fabricusd.weaves import from_fabric, wif_text
 
         draft = from_fabric(fabric)
         write_utf8(wif_text(draft))
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     )
     print(in_words(fabric, width=size.columns))
     if not options.no_draft:
-        from fabricusd.schema.weaves import draw
+        from fabricusd.weaves import draw
 
         plain = not can_show("▀▄█…")
         lines = max(size.lines, 48)

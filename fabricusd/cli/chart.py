@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
     for target in filter(None, (options.choice, options.stability, options.page)):
         require_writable(target)
     from fabricusd.chart.make import make_charts
-    from fabricusd.chart.registry import PANELS
+    from fabricusd.chart.panels.registry import PANELS
     from fabricusd.chart.sheets import SHEETS
 
     if options.choice:

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print the findings of every file, unreadable ones last."""
     from fabricusd.schema.check import check
-    from fabricusd.schema.rules import RULES
+    from fabricusd.schema.rules.rules import RULES
 
     if options.list_rules:
         for rule in RULES:

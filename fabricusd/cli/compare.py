@@ -7,7 +7,7 @@ import json
 import sys
 from dataclasses import asdict
 
-from fabricusd.cli.number import number
+from fabricusd.cli.arguments.number import number
 
 EPILOG = """A is measured against the reference B; EXR is radiance, the rest display colours
 
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the figures, draw the map, judge the bounds."""
-    from fabricusd.images import read_image, write_png
+    from fabricusd.images.files import read_image, write_png
     from fabricusd.quality.pictures import difference, flip_map, heat
 
     high_range = options.a.lower().endswith(".exr") and options.b.lower().endswith(".exr")

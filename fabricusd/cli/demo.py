@@ -23,7 +23,7 @@ def run(options: argparse.Namespace) -> int:
     """Author every preset as a layer, check it, read it back, and write its draft as WIF."""
     from fabricusd.schema import check, load, preset_names, save
     from fabricusd.schema.describe import in_words
-    from fabricusd.schema.weaves import draw, from_fabric, write_wif
+    from fabricusd.weaves import draw, from_fabric, write_wif
 
     folder = Path(options.output)
     try:

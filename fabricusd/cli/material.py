@@ -56,8 +56,8 @@ def run(options: argparse.Namespace) -> int:
     from pathlib import Path
 
     _require_targets(options)
-    from fabricusd.preview.materials import write_materials
-    from fabricusd.preview.recipes import Settings
+    from fabricusd.materials.materials import write_materials
+    from fabricusd.materials.recipes import Settings
 
     def say(line: str) -> None:
         print(f"fabricusd: {line}", file=sys.stderr)

@@ -6,14 +6,14 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
-from fabricusd.cli.number import number
+from fabricusd.cli.arguments.number import number
 from fabricusd.cli.stdout import write_utf8
 from fabricusd.errors import FabricError, one_line
 from fabricusd.ranges import RANGES
 
 if TYPE_CHECKING:
     from fabricusd.fabric import Fabric, Thread
-    from fabricusd.schema.weaves import Draft
+    from fabricusd.weaves import Draft
 
 LONGEST_ORDER = 16384
 """Most threads of one colour in a row; also the largest draft that is read."""
@@ -102,7 +102,7 @@ def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
         return load(options.preset), ()
     from dataclasses import replace
 
-    from fabricusd.schema.weaves import losses, to_fabric
+    from fabricusd.weaves import losses, to_fabric
 
     draft = _draft(options)
     for which, density in (("warp", options.ends_per_cm), ("weft", options.picks_per_cm)):
@@ -118,7 +118,7 @@ def _flag(option: str) -> str:
 
 
 def _draft(options: argparse.Namespace) -> Draft:
-    from fabricusd.schema.weaves import parse_weave, read_wif, with_colors
+    from fabricusd.weaves import parse_weave, read_wif, with_colors
 
     if options.invert and options.image is None:
         raise FabricError("--invert", "goes with --image only")
@@ -136,7 +136,7 @@ def _draft(options: argparse.Namespace) -> Draft:
 
 def _image_draft(options: argparse.Namespace) -> Draft:
     """Colours given with an image of colours say which of them are whose; else they recolour it."""
-    from fabricusd.schema.weaves import read_image, with_colors
+    from fabricusd.weaves import read_image, with_colors
 
     warp = _color_order(options.warp_color, "--warp-color")
     weft = _color_order(options.weft_color, "--weft-color")
@@ -154,7 +154,7 @@ def _image_draft(options: argparse.Namespace) -> Draft:
 
 def _color_order(items: list[str] | None, where: str) -> list[tuple[float, float, float]]:
     """`4*#111 4*#eee` -> eight linear colours."""
-    from fabricusd.schema.weaves import parse_color
+    from fabricusd.weaves import parse_color
 
     order: list[tuple[float, float, float]] = []
     for item in items or ():
@@ -177,7 +177,7 @@ def _base_thread(options: argparse.Namespace) -> Thread:
     from dataclasses import replace
 
     from fabricusd.schema.anysource import load_any
-    from fabricusd.schema.weaves import DEFAULT_THREAD
+    from fabricusd.weaves import DEFAULT_THREAD
 
     thread = DEFAULT_THREAD
     if options.thread:
@@ -213,8 +213,8 @@ def _changed(fabric: Fabric, options: argparse.Namespace) -> Fabric:
 
 
 def _write(fabric: Fabric, options: argparse.Namespace) -> None:
-    from fabricusd.schema.weaves import from_fabric, wif_text, write_wif
     from fabricusd.schema.write import EXTENSIONS, save, usd_text
+    from fabricusd.weaves import from_fabric, wif_text, write_wif
 
     output = options.output
     wif = output is not None and output.lower().endswith(".wif")

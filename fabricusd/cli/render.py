@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fabricusd.cli.number import number
-from fabricusd.cli.units import add_units
+from fabricusd.cli.arguments.number import number
+from fabricusd.cli.arguments.units import add_units
 from fabricusd.errors import FabricError, one_line
 from fabricusd.ranges import RANGES, require_picture
 
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
     """Render, and say what was left out."""
     require_picture(options.width, options.height)
     from fabricusd.reference import AOVS, read_scene, render
-    from fabricusd.reference.mesh_size import mesh_words
+    from fabricusd.scene.size import mesh_words
 
     frames = None if options.frames is None else parse_frames(options.frames)
     output = Path(options.output)
@@ -154,7 +154,7 @@ def _refuse_existing(output: Path, frames: tuple[float, ...] | None) -> None:
 
 def _choose(options: argparse.Namespace, fabric: Fabric | None) -> None:
     """Fill in what --max-error leaves open, and say why."""
-    from fabricusd.appearance.footprint import DEFAULT
+    from fabricusd.appearance.weave.footprint import DEFAULT
 
     options.limits = DEFAULT
     if options.max_error is None:

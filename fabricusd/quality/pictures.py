@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.color_difference import delta_e_2000
 from fabricusd.errors import FabricError
+from fabricusd.quality.colors import delta_e_2000
 
 Picture = NDArray[np.float32]
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from fabricusd.reference.scene import DISTANT, DOME, Light, Scene
+from fabricusd.scene.scene import DISTANT, DOME, Light, Scene
 
 
 def default_lights(scene: Scene) -> list[Light]:

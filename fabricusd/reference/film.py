@@ -9,9 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.real import INLINE, LEAN
 from fabricusd.errors import FabricError
-from fabricusd.reference.wave import (
+from fabricusd.kernels.real import INLINE, LEAN
+from fabricusd.reference.rays.wave import (
     ALBEDO,
     ALPHA,
     AT_LEVEL,

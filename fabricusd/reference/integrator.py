@@ -11,14 +11,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.footprint import DEFAULT, Limits
+from fabricusd.appearance.weave.footprint import DEFAULT, Limits
 from fabricusd.errors import FabricError
-from fabricusd.reference import arrivals
-from fabricusd.reference.arrivals import AUTO_LEVEL, QUEUES, arrive, sort_lanes
-from fabricusd.reference.camera import Lens, camera_rays
-from fabricusd.reference.compile_ahead import FAR, NEAR, compile_ahead
-from fabricusd.reference.departures import depart, record_first
-from fabricusd.reference.embree import (
+from fabricusd.reference.lights.table import build_lights, share_out
+from fabricusd.reference.rays.camera import Lens, camera_rays
+from fabricusd.reference.rays.embree import (
     DX,
     DZ,
     GEOMETRY,
@@ -29,24 +26,9 @@ from fabricusd.reference.embree import (
     TFAR,
     Accelerator,
 )
-from fabricusd.reference.fabric_surface import FabricShader
-from fabricusd.reference.hits import add_emission, prepare
-from fabricusd.reference.lights import build_lights, share_out
-from fabricusd.reference.normal_map import shade_mapped
-from fabricusd.reference.preview_surface import (
-    EMISSIVE,
-    EMISSIVE_MAP,
-    NORMAL_MAP,
-    OPACITY,
-    OPACITY_MAP,
-    build_surfaces,
-    shade_preview,
-)
-from fabricusd.reference.scene import FabricSurface, Material, Scene
-from fabricusd.reference.shadow_rays import settle, thin_out
-from fabricusd.reference.sobol import new_numbers
-from fabricusd.reference.triangles import build_tables
-from fabricusd.reference.wave import (
+from fabricusd.reference.rays.sobol import new_numbers
+from fabricusd.reference.rays.triangles import build_tables
+from fabricusd.reference.rays.wave import (
     BEAUTY_ROWS,
     FAR_LEVEL,
     LANE_BETA,
@@ -57,6 +39,24 @@ from fabricusd.reference.wave import (
     WEAVE_LEVEL,
     Wave,
 )
+from fabricusd.reference.stages import arrivals
+from fabricusd.reference.stages.arrivals import AUTO_LEVEL, QUEUES, arrive, sort_lanes
+from fabricusd.reference.stages.departures import depart, record_first
+from fabricusd.reference.stages.hits import add_emission, prepare
+from fabricusd.reference.stages.shadow_rays import settle, thin_out
+from fabricusd.reference.start.compile_ahead import FAR, NEAR, compile_ahead
+from fabricusd.reference.surfaces.fabric import FabricShader
+from fabricusd.reference.surfaces.normal_map import shade_mapped
+from fabricusd.reference.surfaces.preview import (
+    EMISSIVE,
+    EMISSIVE_MAP,
+    NORMAL_MAP,
+    OPACITY,
+    OPACITY_MAP,
+    build_surfaces,
+    shade_preview,
+)
+from fabricusd.scene.scene import FabricSurface, Material, Scene
 
 LEVELS = {
     "far": FAR_LEVEL, "weave": WEAVE_LEVEL, "thread": THREAD_LEVEL, "auto": AUTO_LEVEL,

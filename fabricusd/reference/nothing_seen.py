@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fabricusd.reference.camera import FAR, Lens
 from fabricusd.reference.integrator import Tracer
-from fabricusd.reference.wave import ALPHA, Wave
+from fabricusd.reference.rays.camera import FAR, Lens
+from fabricusd.reference.rays.wave import ALPHA, Wave
 
 LOOKED = 1 << 14
 """Pixels that are looked through again, evenly over the picture."""

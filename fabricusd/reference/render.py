@@ -15,24 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fabricusd
-from fabricusd.appearance.footprint import DEFAULT, Limits
-from fabricusd.appearance.shadow import METHODS
+from fabricusd.appearance.shadow.methods import METHODS
+from fabricusd.appearance.weave.footprint import DEFAULT, Limits
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.files import require_writable
-from fabricusd.images import write_exr, write_png
+from fabricusd.images.files import write_exr, write_png
 from fabricusd.ranges import RANGES, require_picture, require_ranges
-from fabricusd.reference.camera import build_lens, default_camera
-from fabricusd.reference.compile_ahead import FAR, compile_ahead
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import AOVS, Film, require_aovs
 from fabricusd.reference.integrator import Tracer
 from fabricusd.reference.nothing_seen import reason_for_nothing
-from fabricusd.reference.read import read_scene
-from fabricusd.reference.scene import Scene
+from fabricusd.reference.rays.camera import build_lens, default_camera
+from fabricusd.reference.rays.wave import ALPHA, Wave
+from fabricusd.reference.start.compile_ahead import FAR, compile_ahead
 from fabricusd.reference.view_transform import view
-from fabricusd.reference.wave import ALPHA, Wave
-from fabricusd.reference.workers import Batches, pixels_along_z_curve, worker_count
+from fabricusd.run.workers import Batches, pixels_along_z_curve, worker_count
+from fabricusd.scene.read import read_scene
+from fabricusd.scene.scene import Scene
 from fabricusd.stop import Stop
 
 BATCH = 1 << 13

@@ -25,7 +25,7 @@ def load_any(source: str | os.PathLike[str]) -> tuple[Fabric, tuple[str, ...]]:
     """(fabric, what was noticed on the way). FabricError as the reader of that kind raises it."""
     text = os.fspath(source)
     if is_draft(text):
-        from fabricusd.schema.weaves import losses, read_image, read_wif, to_fabric
+        from fabricusd.weaves import losses, read_image, read_wif, to_fabric
 
         drawn = text.lower().endswith(IMAGE_SUFFIXES)
         draft = read_image(text) if drawn else read_wif(text)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fabricusd.appearance.coverage import WARP, WEFT, coverage
+from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage
 from fabricusd.fabric import Fabric, TangentCurve, Thread, ThreadSet
 
 INCHES_PER_METRE = 1 / 0.0254

@@ -44,7 +44,7 @@ def generate() -> dict[str, str]:
     """File name -> contents, freshly made."""
     from pxr import Usd
 
-    from fabricusd.schema.rules import RULES
+    from fabricusd.schema.rules.rules import RULES
 
     tool = Path(Usd.__file__).with_name("usdGenSchema.py")
     with tempfile.TemporaryDirectory() as name:

@@ -17,7 +17,7 @@ from fabricusd.schema.access import over_above, targets, value
 from fabricusd.schema.attributes import DEGREE, Attribute, to_si
 from fabricusd.schema.check import Finding, check_prim
 from fabricusd.schema.names import free_name
-from fabricusd.schema.rules import thread_prims
+from fabricusd.schema.rules.rules import thread_prims
 from fabricusd.schema.source import (
     find_fabric,
     no_warnings,

@@ -14,7 +14,7 @@ from typing import Any
 
 from pxr import Usd, UsdValidation
 
-from fabricusd.schema.rules import RULES, Rule, applies, run
+from fabricusd.schema.rules.rules import RULES, Rule, applies, run
 
 PLUGIN_NAME = "fabricusd.schema.validators"
 

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fabricusd.appearance import plain, surface
-from fabricusd.appearance.far import far_values
-from fabricusd.appearance.levels import point_values
-from fabricusd.appearance.surface_tables import surface_tables
+from fabricusd.appearance.published.far import far_values
+from fabricusd.appearance.published.levels import point_values
+from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEGREE, MODELS, Fabric, TangentCurve, Thread, ThreadSet, Weave
 from tests.appearance.directions import VIEWS, direction, random_directions

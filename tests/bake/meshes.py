@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from fabricusd.fabric import Binding, Fabric
-from fabricusd.reference.scene import FabricSurface, Mesh, Scene
+from fabricusd.scene.scene import FabricSurface, Mesh, Scene
 
 
 def quad_scene(

@@ -17,15 +17,16 @@ import pytest
 from bake.killed import leave_half_written
 from bake.meshes import write_quad
 
-from fabricusd.bake import assemble, cell_table, kept
 from fabricusd.bake import bake as module
 from fabricusd.bake.bake import Settings, bake, plan
-from fabricusd.bake.relight import RELIT, BakedSet, best_choice
-from fabricusd.bake.scratch import Scratch
+from fabricusd.bake.error.relight import RELIT, BakedSet, best_choice
+from fabricusd.bake.texels import cell_table
+from fabricusd.bake.work import assemble, kept
+from fabricusd.bake.work.scratch import Scratch
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
-from fabricusd.images import read_mip_level
+from fabricusd.images.files import read_mip_level
 from fabricusd.schema import load
 
 MAPS = ("normal", "thread_id", "lay", "base_color")

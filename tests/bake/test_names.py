@@ -12,12 +12,12 @@ from bake.meshes import quad_mesh, quad_scene
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fabricusd.bake.garment import garments
+from fabricusd.bake.layout.garment import garments
 from fabricusd.bake.names import LONGEST, different_names, file_stem, folded, is_file_stem
 from fabricusd.cli.main import main
 from fabricusd.fabric import Binding, Fabric
-from fabricusd.images import read_mip_level
-from fabricusd.reference.scene import FabricSurface
+from fabricusd.images.files import read_mip_level
+from fabricusd.scene.scene import FabricSurface
 
 CASES = Path(__file__).resolve().parents[1] / "cases" / "hostile"
 

@@ -10,8 +10,8 @@ from bake.meshes import write_quad
 
 from fabricusd.bake import bake as module
 from fabricusd.bake.bake import Settings, bake, plan
-from fabricusd.bake.light import unit_light
 from fabricusd.bake.ranges import check_settings
+from fabricusd.bake.texels.light import unit_light
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
 

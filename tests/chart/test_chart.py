@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fabricusd.chart.registry import PANELS
+from fabricusd.chart.panels.registry import PANELS
 from fabricusd.cli.main import main
 
 SECONDS = 60.0

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from fabricusd.chart.choice import cheapest, choose_shadow, front_of, presets_in, read_table
+from fabricusd.chart.panels.shadows import WOVEN
 from fabricusd.chart.scenes import one_cylinder
-from fabricusd.chart.shadows import WOVEN
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
 from fabricusd.schema import load

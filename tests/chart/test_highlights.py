@@ -13,7 +13,7 @@ from fabricusd.chart.scenes import RADIUS, facing, sun
 from fabricusd.chart.sheets import cylinders, filament, wrap_degrees
 from fabricusd.fabric import Fabric, TangentCurve
 from fabricusd.reference.render import render_scene
-from fabricusd.reference.scene import Scene
+from fabricusd.scene.scene import Scene
 from fabricusd.schema import load
 
 SATIN, CREPE, LINEN = "polyester_satin_charmeuse", "silk_crepe_de_chine", "linen_plain"

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fabricusd.appearance.footprint import weights
+from fabricusd.appearance.weave.footprint import weights
 from fabricusd.chart.choice import choose_limits, read_limits
 from fabricusd.chart.level_errors import LIGHTS, TO_EYE, WIDTHS, Zoom, coarsest, zoom
 from fabricusd.schema import load, preset_names

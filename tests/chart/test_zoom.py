@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fabricusd.appearance.compiled import true_repeat
-from fabricusd.appearance.footprint import FAR, weights
+from fabricusd.appearance.weave.compiled import true_repeat
+from fabricusd.appearance.weave.footprint import FAR, weights
 from fabricusd.chart.cloth_picture import SIZE, difference, ideal_spectrum, picture, view_of
 from fabricusd.schema import load, preset_names
 

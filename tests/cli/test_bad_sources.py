@@ -12,7 +12,7 @@ from wif_samples import SMALL
 
 from fabricusd.cli.main import main
 from fabricusd.fabric import Fabric
-from fabricusd.images import write_png
+from fabricusd.images.files import write_png
 from fabricusd.schema import save
 
 GOOD = """#usda 1.0

@@ -262,7 +262,7 @@ def test_check_tells_findings_by_status(capsys, tmp_path):
 
 
 def test_list_rules_prints_each_with_its_meaning(capsys):
-    from fabricusd.schema.rules import RULES
+    from fabricusd.schema.rules.rules import RULES
 
     _, out, _ = run(capsys, "check", "--list-rules")
     assert len(out.splitlines()) == len(RULES)

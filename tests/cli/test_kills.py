@@ -19,9 +19,9 @@ import numpy as np
 import pytest
 from pxr import Usd
 
-from fabricusd.images import read_image, write_png
-from fabricusd.schema.weaves import read_wif
+from fabricusd.images.files import read_image, write_png
 from fabricusd.stop import SIGNALS
+from fabricusd.weaves import read_wif
 from tests.fuzz import examples
 
 ROOT = str(Path(__file__).resolve().parents[2])

@@ -12,8 +12,8 @@ from fabricusd.cli.main import COMMANDS, build_parser, main
 from fabricusd.errors import FabricError
 from fabricusd.ranges import MOST_PIXELS, RANGES
 from fabricusd.reference.render import render, render_scene
-from fabricusd.reference.scene import Scene
-from fabricusd.reference.workers import worker_count
+from fabricusd.run.workers import worker_count
+from fabricusd.scene.scene import Scene
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n"
 
@@ -211,7 +211,7 @@ def test_a_camera_of_any_exposure_makes_a_picture():
 
 def test_options_are_described_with_a_type_that_argparse_can_name():
     parser = argparse.ArgumentParser()
-    from fabricusd.cli.number import number
+    from fabricusd.cli.arguments.number import number
 
     parser.add_argument("--n", type=number("spp"))
     assert parser.parse_args(["--n", "16"]).n == 16

@@ -61,7 +61,7 @@ def test_what_cannot_be_done_is_refused_before_the_work(tmp_path, capsys, monkey
 
 
 def test_a_seed_of_64_bits_is_kept_in_the_picture(tmp_path):
-    from fabricusd.images import read_exr_layers
+    from fabricusd.images.files import read_exr_layers
 
     (tmp_path / "x.obj").write_text(OBJ)
     out = tmp_path / "x.exr"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fabricusd.images import read_exr_layers
+from fabricusd.images.files import read_exr_layers
 from fabricusd.stop import SIGNALS
 
 ROOT = str(Path(__file__).resolve().parents[2])

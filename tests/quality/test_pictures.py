@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fabricusd import FabricError
-from fabricusd.color_difference import delta_e_2000
+from fabricusd.quality.colors import delta_e_2000
 from fabricusd.quality.pictures import difference, flip_map, heat
 
 

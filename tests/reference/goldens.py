@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from fabricusd.images import write_exr
+from fabricusd.images.files import write_exr
 from fabricusd.reference.film import AOVS
 from fabricusd.reference.render import RenderResult
-from fabricusd.reference.scene import DOME, RECT, Camera, Light, Mesh, PreviewSurface
+from fabricusd.scene.scene import DOME, RECT, Camera, Light, Mesh, PreviewSurface
 from fabricusd.schema import load
 from tests.reference.scenes import cloth, grid, lambert, looking, picture, sphere
 

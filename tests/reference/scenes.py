@@ -10,7 +10,7 @@ from scipy import stats
 
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.reference.render import RenderResult, render_scene
-from fabricusd.reference.scene import (
+from fabricusd.scene.scene import (
     DISTANT,
     Camera,
     FabricSurface,

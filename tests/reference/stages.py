@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom
 
-from fabricusd.reference.read import read_scene
-from fabricusd.reference.scene import Scene
+from fabricusd.scene.read import read_scene
+from fabricusd.scene.scene import Scene
 from fabricusd.schema import preset_names
 from fabricusd.schema.source import PRESETS
 

@@ -9,10 +9,10 @@ import pytest
 from pxr import Sdf, UsdGeom, UsdShade
 
 from fabricusd.errors import FabricError
-from fabricusd.reference.read import read_scene
+from fabricusd.reference.rays.triangles import build_tables
 from fabricusd.reference.render import render_scene
-from fabricusd.reference.scene import FabricSurface
-from fabricusd.reference.triangles import build_tables
+from fabricusd.scene.read import read_scene
+from fabricusd.scene.scene import FabricSurface
 from tests.reference.stages import SQUARE, bind_fabric, new_stage, read, square
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fabricusd.reference.film import Film
-from fabricusd.reference.wave import BEAUTY_ROWS, DIRECT
+from fabricusd.reference.rays.wave import BEAUTY_ROWS, DIRECT
 
 WIDTH, HEIGHT, PASS = 64, 32, 16
 PIXELS = np.arange(WIDTH * HEIGHT, dtype=np.int32)

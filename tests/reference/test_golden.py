@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fabricusd.images import read_exr_layers
+from fabricusd.images.files import read_exr_layers
 from fabricusd.quality.statistics import z_test
 from tests.reference.goldens import CASES, FOLDER, SIZE, render_case
 from tests.reference.scenes import blocks

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fabricusd.reference.scene import (
+from fabricusd.scene.scene import (
     CYLINDER,
     DISK,
     DISTANT,

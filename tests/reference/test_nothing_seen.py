@@ -7,7 +7,7 @@ import pytest
 from reference.scenes import looking
 
 from fabricusd.reference.render import render, render_scene
-from fabricusd.reference.scene import Camera, Mesh, PreviewSurface, Scene
+from fabricusd.scene.scene import Camera, Mesh, PreviewSurface, Scene
 
 
 def _square(eye, at, clipping, *, orthographic=False):

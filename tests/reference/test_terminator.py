@@ -9,7 +9,7 @@ import pytest
 
 from fabricusd.chart import scenes
 from fabricusd.reference.render import render_scene
-from fabricusd.reference.scene import PreviewSurface, Scene
+from fabricusd.scene.scene import PreviewSurface, Scene
 
 
 def profile(monkeypatch: pytest.MonkeyPatch, sides: int, smooth: bool = True) -> np.ndarray:

@@ -9,8 +9,8 @@ import pytest
 
 from fabricusd import FabricError
 from fabricusd.fabric import Fabric
-from fabricusd.reference.scene import FabricSurface
-from fabricusd.reference.usd_scene import read_usd_scene
+from fabricusd.scene.scene import FabricSurface
+from fabricusd.scene.usd.stage import read_usd_scene
 from fabricusd.schema import check, load, save
 
 SATIN = "polyester_satin_charmeuse"

@@ -130,7 +130,7 @@ def Mesh "Not_applied" (
 
 SCENE = """
 from pathlib import Path
-from fabricusd.reference.usd_scene import read_usd_scene
+from fabricusd.scene.usd.stage import read_usd_scene
 scene = read_usd_scene(Path(sys.argv[1]))
 print(json.dumps([
     {m.path: scene.materials[int(m.material[0])].name for m in scene.meshes}, scene.notes

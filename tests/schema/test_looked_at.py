@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fabricusd.reference import render
-from fabricusd.reference.usd_scene import read_usd_scene
+from fabricusd.scene.usd.stage import read_usd_scene
 from fabricusd.schema import check, load, save
 
 CASES = Path(__file__).parents[1] / "cases" / "looked_at"

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fabricusd.cli.main import main
-from fabricusd.reference.usd_scene import read_usd_scene
+from fabricusd.scene.usd.stage import read_usd_scene
 from fabricusd.schema import load
 
 README = Path(__file__).parents[2] / "README.md"

@@ -10,7 +10,7 @@ from pxr import Usd, UsdValidation
 
 from fabricusd import FabricError
 from fabricusd.schema import check, load, preset_names
-from fabricusd.schema.rules import RULES
+from fabricusd.schema.rules.rules import RULES
 from fabricusd.schema.validators import PLUGIN_NAME
 
 BAD = Path(__file__).parent / "bad"

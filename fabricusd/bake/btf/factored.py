@@ -20,7 +20,7 @@ from fabricusd.bake.btf.interpolate import evaluate
 from fabricusd.bake.btf.matrix import LARGEST, Btf
 from fabricusd.errors import FabricError, reads
 from fabricusd.files import whole_file
-from fabricusd.images import read_exr_layers, write_exr
+from fabricusd.images.files import read_exr_layers, write_exr
 
 Floats = NDArray[np.float64]
 

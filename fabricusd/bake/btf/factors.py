@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.bake.btf.matrix import Btf, table
-from fabricusd.color_difference import delta_e_2000
 from fabricusd.errors import FabricError
+from fabricusd.quality.colors import delta_e_2000
 
 Floats = NDArray[np.float64]
 

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.compiled import true_repeat
-from fabricusd.appearance.coverage import GAP
+from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.surface import points_all
-from fabricusd.appearance.surface_tables import surface_tables
-from fabricusd.appearance.weave import lookup
-from fabricusd.bake.reflectance import refuse_conserving
+from fabricusd.appearance.weave.compiled import true_repeat
+from fabricusd.appearance.weave.coverage import GAP
+from fabricusd.appearance.weave.lookup import lookup
+from fabricusd.bake.texels.reflectance import refuse_conserving
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 

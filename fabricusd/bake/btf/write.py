@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.surface import evaluate
-from fabricusd.bake.accuracy import PAIRS, bound_of, display, pairs_between
 from fabricusd.bake.btf.factored import (
     FactoredBtf,
     factored,
@@ -22,9 +21,10 @@ from fabricusd.bake.btf.factored import (
 from fabricusd.bake.btf.factors import Factors, factors
 from fabricusd.bake.btf.matrix import Btf, btf_of
 from fabricusd.bake.btf.ubo import read_ubo, write_ubo
-from fabricusd.color_difference import delta_e_2000
+from fabricusd.bake.error.accuracy import PAIRS, bound_of, display, pairs_between
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
+from fabricusd.quality.colors import delta_e_2000
 
 Floats = NDArray[np.float64]
 

@@ -1,0 +1,221 @@
+"""The weave under a point, its shadow and level `weave`: `python bench/model/bench_weave.py`.
+
+Everything runs in one process on the same places and directions, so that the ratios to plain NumPy
+hold on a busy machine. Each figure is the best of several runs. A satin: five picks, a set that is
+seen underneath, a curve of five pieces; weave coordinates reach to 10^4 threads. NumPy's side does
+less: the thread's BSDF without masking and `Q`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numba
+import numpy as np
+from bench_thread import microcylinder_in_numpy
+
+from fabricusd.appearance.frame import WARP
+from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
+from fabricusd.appearance.surface import evaluate, weave_all
+from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
+from fabricusd.appearance.weave.coverage import GAP
+from fabricusd.appearance.weave.lookup import find_all, lookup
+from fabricusd.fabric import DEGREE, Fabric, TangentCurve, Thread, ThreadSet, Weave
+
+Array = np.ndarray
+
+
+def satin() -> Fabric:
+    """Nearly the published satin: the sets' own cells leave something to show underneath."""
+    i, j = np.indices((5, 5))
+    angles = (-32, -32, -18, 0, 0, 18, 32, 32)
+    flat = TangentCurve.from_lengths(
+        (a * DEGREE for a in angles), (1.33, 0.66, 2, 2, 2, 0.66, 1.33)
+    )
+    common = {"ior": 1.539, "thickness": 1e-4}
+    return Fabric(
+        threads={
+            "flat": Thread(
+                albedo=(0.035, 0.013, 0.01),
+                isotropic=0.1,
+                gamma_surface=2.5 * DEGREE,
+                gamma_volume=5 * DEGREE,
+                curve=flat,
+                **common,
+            ),
+            "twisted": Thread(
+                albedo=(0.2, 0.07, 0.06),
+                isotropic=0.7,
+                gamma_surface=30 * DEGREE,
+                gamma_volume=60 * DEGREE,
+                **common,
+            ),
+        },
+        weave=Weave((j - 2 * i) % 5 < 4, "satin"),
+        warp=ThreadSet(sequence=(0,), density=10000.0, coverage=0.9),
+        weft=ThreadSet(sequence=(1,), density=4000.0, coverage=0.1),
+    )
+
+
+def lookup_in_numpy(cloth: CompiledFabric, uv: Array) -> dict[str, Array]:
+    """The lookup as one would write it with NumPy arrays, in the precision of `cloth`."""
+    cell = np.floor(uv)
+    xy = (uv - cell).astype(cloth.width.dtype)
+    i, j = np.mod(cell, cloth.grid.shape).astype(np.int32).T
+    top = cloth.grid[i, j].astype(np.int32)
+    over, along = (np.where(top == WARP, xy[:, a], xy[:, 1 - a]) for a in (0, 1))
+    width = cloth.width[top]
+    on_top = np.abs(over - 0.5) <= 0.5 * width
+    beside = ~on_top & (cloth.under == 1 - top)
+    beside &= np.abs(along - 0.5) <= 0.5 * cloth.under_width
+    share = np.where(on_top, 1, 1 - width)
+    strip = np.where(over < 0.5, over, over - width)
+    seen = np.where(on_top, along, strip / np.where(share > 0, share, 1))
+    w = 2 * np.where(on_top, (over - 0.5) / width, (along - 0.5) / cloth.under_width)
+    runs = cloth.runs[i, j, np.where(on_top, 0, cloth.runs.shape[2] - 1)]
+    s = np.minimum((runs[:, 0] + seen) / runs[:, 1], cloth.last)
+    hit = np.where(on_top, top, 1 - top)
+    lengths = cloth.sequence_length[hit]
+    place = np.mod(np.where(hit == WARP, cell[:, 0], cell[:, 1]), lengths).astype(np.int32)
+    thread = cloth.sequence[hit, place]
+    piece = (s[:, None] >= cloth.curve_start[thread]).sum(axis=1) - 1
+    angle = cloth.curve_angle[thread, piece]
+    angle = angle + (s - cloth.curve_start[thread, piece]) * cloth.curve_slope[thread, piece]
+    return {
+        "set": np.where(on_top | beside, hit, GAP), "thread": thread, "angle": angle,
+        "w": np.where(hit == WARP, -w, w), "cell": np.stack((i, j)), "top": top,
+        "along": np.where(on_top, along, seen),
+        "across": np.where(on_top, (over - 0.5) / width, (along - 0.5) / cloth.under_width) + 0.5,
+        "slot": np.where(on_top, 0, cloth.runs.shape[2] - 1),
+    }  # fmt: skip
+
+
+def horizon_in_numpy(shadow: Shadow, hit: dict[str, Array], wi: Array) -> Array:
+    """The horizon table, interpolated with NumPy arrays."""
+    table = shadow.table
+    part = wi[0] / (np.abs(wi[0]) + np.abs(wi[1]))
+    turn = np.where(wi[1] >= 0, 1 - part, 3 + part) * (table.shape[5] / 4)
+    a = np.minimum(turn.astype(np.int32), table.shape[5] - 1)
+    rows, columns = table.shape[3:5]
+    p, q = (np.clip(hit[k] * n - 0.5, 0, n - 1) for k, n in (("along", rows), ("across", columns)))
+    r, c = np.minimum(p.astype(np.int32), rows - 2), np.minimum(q.astype(np.int32), columns - 2)
+    i, j = hit["cell"]
+    sine = 0
+    for dr, dc, da in itertools.product((0, 1), repeat=3):
+        weight = np.abs(1 - dr - (p - r)) * np.abs(1 - dc - (q - c)) * np.abs(1 - da - (turn - a))
+        azimuth = (a + da) % table.shape[5]
+        sine = sine + weight * table[i, j, hit["slot"], r + dr, c + dc, azimuth]
+    sine = sine / 255
+    flat = np.sqrt(wi[0] ** 2 + wi[1] ** 2)
+    t = (wi[2] * np.sqrt(np.maximum(0, 1 - sine * sine)) - flat * sine) / shadow.softness + 0.5
+    t = np.clip(t, 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def all_in_numpy(
+    fabric: Fabric, cloth: CompiledFabric, shadow: Shadow, uv: Array, wi: Array, wo: Array
+) -> Array:
+    hit = lookup_in_numpy(cloth, uv)
+    g = horizon_in_numpy(shadow, hit, wi)
+    c, s = np.cos(hit["angle"]), np.sin(hit["angle"])
+    turned = []
+    for x, y, z in (wi, wo):
+        warp = hit["set"] == WARP
+        along = np.where(warp, y, x)
+        turned.append(np.stack((c * along - s * z, np.where(warp, -x, y), s * along + c * z)))
+    out = np.zeros_like(wi)
+    for k, thread in enumerate(fabric.thread_list):
+        on = (hit["thread"] == k) & (hit["set"] != GAP)
+        out[:, on] = g[on] * microcylinder_in_numpy(thread, turned[0][:, on], turned[1][:, on])
+    return out
+
+
+def best(function: Callable[[], Any], repeats: int) -> float:
+    """Seconds of the fastest of `repeats` calls, after one that compiles."""
+    function()
+    seconds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        function()
+        seconds.append(time.perf_counter() - start)
+    return min(seconds)
+
+
+def upper(generator: np.random.Generator, n: int) -> Array:
+    w = generator.standard_normal((3, n), dtype=np.float32)
+    w[2] = np.abs(w[2])
+    return w / np.sqrt((w * w).sum(axis=0))
+
+
+def errors(fabric: Fabric, uv: Array) -> None:
+    """How far the float32 lookup is from the float64 one."""
+    exact = lookup(compile_fabric(fabric, precision=np.float64), uv)
+    quick = lookup(compile_fabric(fabric, precision=np.float32), uv)
+    same = exact.set == quick.set
+    print(f"\nfloat32 against float64 at {len(uv)} places out to 10^4 threads")
+    print(f"another thread, within rounding of an edge: {np.count_nonzero(~same)}")
+    for name, unit in (("position", "of the run"), ("across", ""), ("angle", "rad")):
+        error = np.abs(getattr(exact, name) - getattr(quick, name))[same]
+        print(f"{name}: 99.9th percentile {np.quantile(error, 0.999):.1e} {unit}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--places", type=int, default=500_000)
+    parser.add_argument("--repeats", type=int, default=15)
+    parser.add_argument("--workers", type=int, default=2)
+    options = parser.parse_args()
+    n, workers = options.places, min(options.workers, numba.config.NUMBA_NUM_THREADS)
+    fabric = satin()
+    generator = np.random.default_rng(0)
+    uv = generator.uniform(-1e4, 1e4, (n, 2))
+    wi, wo = upper(generator, n), upper(generator, n)
+    cloth, shadow = compile_fabric(fabric), compile_shadow(fabric)
+    law = surface_tables(fabric, precision=np.float32)
+    real: Any = np.float32
+    places = np.empty(n, np.uint8), np.empty(n, np.int32), *np.empty((4, n), real)
+    out = np.empty_like(wi)
+
+    def find() -> None:
+        find_all(real, cloth, uv, *places)
+
+    def weave_level() -> None:
+        weave_all(real, cloth, shadow, law, uv, wi, wo, out)
+
+    few = max(2, options.repeats // 5)
+    m = n // 4
+    slow_find = m / best(lambda: lookup_in_numpy(cloth, uv[:m]), few)
+    slow_all = m / best(
+        lambda: all_in_numpy(fabric, cloth, shadow, uv[:m], wi[:, :m], wo[:, :m]), few
+    )
+    weave_level()
+    expected = evaluate(fabric, wi[:, :m].T, wo[:, :m].T, uv[:m], "weave", "horizon").T
+    gap = np.abs(out[:, :m] - expected) / (np.abs(expected) + 1e-3)
+    print(f"float32 against float64: 99.9 % within {np.quantile(gap, 0.999):.1e}")
+    print(f"{n} places, float32, best of {options.repeats}; M places/s, and times plain NumPy")
+    print(f"{'NumPy, lookup':52}{slow_find / 1e6:8.1f}{1.0:8.1f}")
+    print(f"{'NumPy, lookup + horizon + thread BSDF':52}{slow_all / 1e6:8.1f}{1.0:8.1f}")
+    for count in sorted({1, workers}):
+        numba.set_num_threads(count)
+        for label, function, slow in (
+            ("lookup", find, slow_find),
+            ("lookup + horizon + level weave", weave_level, slow_all),
+        ):
+            rate = n / best(function, options.repeats)
+            print(f"{f'{label}, {count} worker(s)':52}{rate / 1e6:8.1f}{rate / slow:8.1f}")
+    errors(fabric, uv)
+    cells = np.random.default_rng(1).random((4096, 4096)) < 0.5
+    vast = replace(fabric, weave=Weave(cells, "vast"))
+    seconds = best(lambda: compile_fabric(vast), 3)
+    size = sum(x.nbytes for x in compile_fabric(vast) if isinstance(x, np.ndarray))
+    print(f"\na grid of 4096 x 4096 compiles in {seconds:.2f} s to {size / 1e6:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,79 @@
+"""A machine's first picture, and the next ones: seconds of wall and of processors.
+
+    python bench/tracer/bench_first.py [--runs 5] [--size 256] [--spp 4]
+
+Runs `fabricusd render` on the draped cloth of `samples`, first with an empty folder for numba's
+compiled kernels, as after an installation, then with what that run left there; and once more from
+an empty folder at level `weave`, as for a close-up, which needs more kernels. Processor time is
+that of the command with all processes that it started. The first figure needs two idle processors;
+the load is printed beside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(
+    scene: Path, size: int, spp: int, kernels: Path, level: str = "auto"
+) -> tuple[float, float]:
+    """(wall, processors) [s] of one picture, with compiled kernels kept in `kernels`."""
+    command = [
+        sys.executable, "-m", "fabricusd", "render", str(scene), "-o", f"{scene}.exr",
+        "--width", str(size), "--height", str(size), "--spp", str(spp), "-q",
+        "--level", level,
+    ]  # fmt: skip
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(kernels), "PYTHONPATH": str(ROOT)}
+    # An installer compiles modules too.
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    begun = time.perf_counter()
+    subprocess.run(command, check=True, env=environment)
+    wall = time.perf_counter() - begun
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    busy = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return wall, busy
+
+
+def main() -> None:
+    """Print both figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=5, help="of the next pictures")
+    parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--spp", type=int, default=4)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        # In a process of its own: this one's children are what is measured.
+        make = f"import sys; sys.path.insert(0, {str(ROOT / 'samples')!r})\n"
+        make += "from pathlib import Path; from make_samples import make_drape\n"
+        make += f"make_drape(Path({name!r}))"
+        subprocess.run(
+            [sys.executable, "-c", make], check=True, env={**os.environ, "PYTHONPATH": str(ROOT)}
+        )
+        scene = folder / "drape.usda"
+        print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}")
+        wall, busy = run(scene, options.size, options.spp, folder / "kernels")
+        print(f"first picture: {wall:.1f} s, processors {busy:.1f} s")
+        times = [
+            run(scene, options.size, options.spp, folder / "kernels") for _ in range(options.runs)
+        ]
+        wall, busy = (statistics.median(column) for column in zip(*times, strict=True))
+        print(f"next pictures, median of {options.runs}: {wall:.2f} s, processors {busy:.2f} s")
+        wall, busy = run(scene, options.size, options.spp, folder / "others", level="weave")
+        print(f"first picture, level weave: {wall:.1f} s, processors {busy:.1f} s")
+        print(f"load {os.getloadavg()[0]:.1f}")
+
+
+if __name__ == "__main__":
+    main()

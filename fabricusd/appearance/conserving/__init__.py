@@ -1,0 +1,1 @@
+"""The law of fabrics whose threads conserve energy."""

@@ -1,0 +1,1 @@
+"""The published law: masked, reweighted threads at the levels far, weave and thread."""

@@ -1,0 +1,206 @@
+"""Level `far`: the whole repeat at once, what a distant view sees.
+
+`L_o = 1/Q sum_j a_j < f_s M P cos theta_i >`, `Q = sum_j a_j <P>_j + gap (N.wo)`, the means taken
+over the tangent curves by the nodes of `surface_tables`. `P` costs a dozen operations a node, so
+`Q` is summed directly: a table of it would cost as much to read and be less exact. Both directions
+above the cloth, else 0. Source: `docs/model.md` section 4, [Sadeghi2013].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.published.blocks import (
+    ACROSS_I,
+    ACROSS_O,
+    AXIS_I,
+    AXIS_O,
+    BLOCK,
+    BLUE,
+    GREEN,
+    NORMALIZATION,
+    NOTHING,
+    RED,
+    ROWS,
+    UP_I,
+    UP_O,
+    add_masking,
+    divide,
+    masking_at,
+    node_range,
+    prepare,
+)
+from fabricusd.appearance.published.segment import along_set, cell_lobes, seen_along, segment
+from fabricusd.appearance.published.tables import NODE_COS, NODE_HALF, NODE_SIN, NODE_WEIGHT
+from fabricusd.appearance.scattering.terms import (
+    ALBEDO_B,
+    ALBEDO_G,
+    ALBEDO_R,
+    MODEL,
+    THESIS,
+)
+from fabricusd.kernels.real import INLINE, KERNEL, PART, index
+
+
+@njit(**INLINE)
+def normalization(R, tables, ix, iy, iz, ox, oy, oz):
+    """`Q(wi, wo)`, both directions above the cloth."""
+    q = tables.gap * oz
+    for thread_set in (WEFT, WARP):
+        first, last = node_range(tables, thread_set)
+        a_i, _, scale_i, a_o, _, scale_o, u = along_set(
+            R, thread_set, tables.overlap_precision, ix, iy, iz, ox, oy, oz
+        )
+        for k in range(first, last):
+            p = seen_along(
+                R, tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN],
+                a_i, iz, scale_i, a_o, oz, scale_o, u,
+            )  # fmt: skip
+            q += tables.nodes[k, NODE_WEIGHT] * p
+    return q
+
+
+@njit(**INLINE)
+def node_terms(R, tables, k, a_i, b_i, iz, a_o, b_o, oz):
+    """`f_s M cos theta_i` at node k: (surface, volume without `A`)."""
+    thread = tables.node_thread[k]
+    c, s, half = tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN], tables.nodes[k, NODE_HALF]
+    row = tables.threads[thread]
+    thesis = row[MODEL] == R(THESIS)
+    if half > R(0):
+        surface, volume = segment(
+            R, thesis, tables.smooth[thread], tables.overlap_precision,
+            c, s, a_i, b_i, iz, a_o, b_o, oz,
+        )  # fmt: skip
+        surface_lobe, volume_lobe = cell_lobes(R, row, half, c, s, a_i, b_i, iz, a_o, b_o, oz)
+        return surface * surface_lobe, volume * volume_lobe
+    surface, volume = segment(
+        R, thesis, row, tables.overlap_precision, c, s, a_i, b_i, iz, a_o, b_o, oz
+    )
+    return surface, volume
+
+
+@njit(**PART)
+def far_value(R, tables, ix, iy, iz, ox, oy, oz):
+    """(r, g, b) of level `far` for one pair of directions, published models."""
+    none = R(0)
+    if iz <= none or oz <= none:
+        return none, none, none
+    q = tables.gap * oz
+    red, green, blue = none, none, none
+    for thread_set in (WEFT, WARP):
+        first, last = node_range(tables, thread_set)
+        a_i, b_i, scale_i, a_o, b_o, scale_o, u = along_set(
+            R, thread_set, tables.overlap_precision, ix, iy, iz, ox, oy, oz
+        )
+        for k in range(first, last):
+            p = seen_along(
+                R, tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN],
+                a_i, iz, scale_i, a_o, oz, scale_o, u,
+            )  # fmt: skip
+            p *= tables.nodes[k, NODE_WEIGHT]
+            q += p
+            # A node turned away from either direction adds nothing; NaN goes on.
+            if p == none or tables.published[k] == 0:
+                continue
+            surface, volume = node_terms(R, tables, k, a_i, b_i, iz, a_o, b_o, oz)
+            row = tables.threads[tables.node_thread[k]]
+            red += p * (surface + volume * row[ALBEDO_R])
+            green += p * (surface + volume * row[ALBEDO_G])
+            blue += p * (surface + volume * row[ALBEDO_B])
+    if q <= R(NOTHING):
+        return none, none, none
+    inverse = R(1) / q
+    return red * inverse, green * inverse, blue * inverse
+
+
+@njit(**KERNEL)
+def far_values(R, tables, wi, wo, out, begin, end):
+    """`far_value` of the pairs from `begin` to before `end`: wi, wo, out (3, n) real.
+
+    The same functions as in the scalar kernel, with the loop over directions innermost so that LLVM
+    vectorises it. All partial sums lie in one array: pointers of its own would have to be checked
+    for overlap, and there would be too many.
+    """
+    block = np.empty(ROWS * BLOCK, wi.dtype)
+    for start in range(begin, end, BLOCK):
+        size = min(BLOCK, end - start)
+        for x in range(size):
+            block[NORMALIZATION + x] = tables.gap * wo[2, index(start, x)]
+            block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
+        for thread_set in (WEFT, WARP):
+            first, last = node_range(tables, thread_set)
+            if first == last:
+                continue
+            prepare(R, thread_set, tables.overlap_precision, wi, wo, start, size, block)
+            for k in range(first, last):
+                _add_node(R, tables, k, size, block)
+        divide(R, out, start, size, block)
+
+
+@njit(**PART)
+def _add_node(R, tables, k, size, block):
+    """Node k's share of `Q` and of the value, for a block, by the loop that its kind needs."""
+    thread = tables.node_thread[k]
+    row = tables.threads[thread]
+    if tables.published[k] == 0:
+        add_masking(R, tables, k, size, block)
+    elif tables.nodes[k, NODE_HALF] > R(0):
+        if row[MODEL] == R(THESIS):
+            _add_cell(R, True, tables, k, row, tables.smooth[thread], size, block)
+        else:
+            _add_cell(R, False, tables, k, row, tables.smooth[thread], size, block)
+    elif row[MODEL] == R(THESIS):
+        _add_point(R, True, tables, k, row, size, block)
+    else:
+        _add_point(R, False, tables, k, row, size, block)
+
+
+@njit(**INLINE)
+def _add_point(R, thesis, tables, k, row, size, block):
+    c, s, weight = (
+        tables.nodes[k, NODE_COS],
+        tables.nodes[k, NODE_SIN],
+        tables.nodes[k, NODE_WEIGHT],
+    )
+    red, green, blue = row[ALBEDO_R], row[ALBEDO_G], row[ALBEDO_B]
+    for x in range(size):
+        p = weight * masking_at(R, c, s, block, x)
+        surface, volume = segment(
+            R, thesis, row, tables.overlap_precision, c, s,
+            block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x],
+            block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x],
+        )  # fmt: skip
+        block[NORMALIZATION + x] += p
+        block[RED + x] += p * (surface + volume * red)
+        block[GREEN + x] += p * (surface + volume * green)
+        block[BLUE + x] += p * (surface + volume * blue)
+
+
+@njit(**INLINE)
+def _add_cell(R, thesis, tables, k, row, smooth, size, block):
+    c, s, weight = (
+        tables.nodes[k, NODE_COS],
+        tables.nodes[k, NODE_SIN],
+        tables.nodes[k, NODE_WEIGHT],
+    )
+    half = tables.nodes[k, NODE_HALF]
+    red, green, blue = row[ALBEDO_R], row[ALBEDO_G], row[ALBEDO_B]
+    for x in range(size):
+        p = weight * masking_at(R, c, s, block, x)
+        surface, volume = segment(
+            R, thesis, smooth, tables.overlap_precision, c, s,
+            block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x],
+            block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x],
+        )  # fmt: skip
+        surface_lobe, volume_lobe = cell_lobes(
+            R, row, half, c, s, block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x],
+            block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x],
+        )  # fmt: skip
+        surface, volume = surface * surface_lobe, volume * volume_lobe
+        block[NORMALIZATION + x] += p
+        block[RED + x] += p * (surface + volume * red)
+        block[GREEN + x] += p * (surface + volume * green)
+        block[BLUE + x] += p * (surface + volume * blue)

@@ -1,0 +1,218 @@
+"""Levels `weave` and `thread`: the thread under a point, and the place across it.
+
+`L_o(x) = f_s M P(x)/Q cos theta_i` with `far`'s own `Q`, so the mean over the repeat is `far`; at
+level `thread` the two terms are modulated across the width by factors whose mean is 1, so the mean
+over the width is `weave`. Both directions above the cloth, else 0; a gap reflects nothing.
+Shadowing multiplies the value and is applied by the caller. Source: `docs/model.md` section 4,
+[Bisker2011] eq. 5.1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fabricusd.appearance.frame import WARP, WEFT, cos_inclination, unit_azimuth
+from fabricusd.appearance.published.blocks import (
+    ACROSS_I,
+    ACROSS_O,
+    AXIS_I,
+    AXIS_O,
+    BLOCK,
+    BLUE,
+    GREEN,
+    NORMALIZATION,
+    NOTHING,
+    OVERLAP,
+    RED,
+    SCALE_I,
+    SCALE_O,
+    UP_I,
+    UP_O,
+    add_masking,
+    divide,
+    prepare,
+)
+from fabricusd.appearance.published.far import normalization
+from fabricusd.appearance.published.segment import across, along_set, seen_along, segment
+from fabricusd.appearance.scattering.terms import (
+    ALBEDO_B,
+    ALBEDO_G,
+    ALBEDO_R,
+    CONSERVING,
+    MICROCYLINDER,
+    MODEL,
+    THESIS,
+    VOLUME_GAUSSIAN,
+)
+from fabricusd.kernels.real import INLINE, KERNEL, PART, cos, index, sin
+
+_WARP = 13 * BLOCK
+"""Where the warp's nine rows start; the weft's are the block's own."""
+_IS_WARP, _COS, _SIN, _ACROSS = 22 * BLOCK, 23 * BLOCK, 24 * BLOCK, 25 * BLOCK
+_THREAD = 26 * BLOCK
+"""Where the columns of each point's own thread start: those before TRANSMISSION's."""
+_COLUMNS = VOLUME_GAUSSIAN + 2
+POINT_ROWS = 26 + _COLUMNS
+_NO_MODEL = -1.0
+
+
+@njit(**PART)
+def point_value(R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz):
+    """(r, g, b) on `thread` of `thread_set` at tangent angle psi0 [rad], published models.
+
+    across_too : level `thread` at `w` in [-1, 1] across the visible width; else level `weave`
+    """
+    none = R(0)
+    row = tables.threads[thread]
+    if iz <= none or oz <= none or row[MODEL] == R(CONSERVING):
+        return none, none, none
+    q = normalization(R, tables, ix, iy, iz, ox, oy, oz)
+    if q <= R(NOTHING):
+        return none, none, none
+    a_i, b_i, scale_i, a_o, b_o, scale_o, u = along_set(
+        R, thread_set, tables.overlap_precision, ix, iy, iz, ox, oy, oz
+    )
+    c, s = cos(R, psi0), sin(R, psi0)
+    p = seen_along(R, c, s, a_i, iz, scale_i, a_o, oz, scale_o, u)
+    surface, volume = _bit_of_thread(
+        R, row[MODEL] == R(THESIS), across_too, row, tables.overlap_precision,
+        c, s, w, a_i, b_i, iz, a_o, b_o, oz,
+    )  # fmt: skip
+    p /= q
+    surface *= p
+    volume *= p
+    return (
+        surface + volume * row[ALBEDO_R],
+        surface + volume * row[ALBEDO_G],
+        surface + volume * row[ALBEDO_B],
+    )
+
+
+@njit(**INLINE)
+def _bit_of_thread(R, thesis, across_too, row, precision, c, s, w, a_i, b_i, iz, a_o, b_o, oz):
+    """`segment`, with the factors across the width where they are asked for."""
+    surface, volume = segment(R, thesis, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz)
+    if across_too:
+        n_i, n_o = s * a_i + c * iz, s * a_o + c * oz
+        on_surface, on_volume = across_at(R, row, w, b_i, n_i, b_o, n_o)
+        return surface * on_surface, volume * on_volume
+    return surface, volume
+
+
+@njit(**INLINE)
+def across_at(R, row, w, b_i, n_i, b_o, n_o):
+    """`across` of two directions' components b and n in the thread frame."""
+    sin_i, cos_i = unit_azimuth(R, b_i, n_i, cos_inclination(R, b_i, n_i))
+    sin_o, cos_o = unit_azimuth(R, b_o, n_o, cos_inclination(R, b_o, n_o))
+    return across(R, row, w, sin_i, cos_i, sin_o, cos_o)
+
+
+@njit(**KERNEL)
+def point_values(R, tables, across_too, sets, threads, psi0, w, wi, wo, out, begin, end):
+    """`point_value` at the places from `begin` to before `end`.
+
+    sets, threads : (n,) ints; psi0, w : (n,) real; wi, wo, out : (3, n) real
+    """
+    block = np.empty(POINT_ROWS * BLOCK, wi.dtype)
+    for start in range(begin, end, BLOCK):
+        point_block(
+            R, tables, across_too, sets, threads, psi0, w, start, wi, wo, out, start,
+            min(BLOCK, end - start), block,
+        )  # fmt: skip
+
+
+@njit(**PART)
+def point_block(
+    R, tables, across_too, sets, threads, psi0, w, first, wi, wo, out, start, size, block
+):
+    """`size` of `point_values`: places from `first` on, directions and answers from `start` on.
+
+    block : (POINT_ROWS*BLOCK,) real, written over
+
+    The numbers of each point's thread are copied into rows of the block first, in a loop of their
+    own, so that LLVM vectorises the one that computes. A set that is neither weft nor warp is a
+    gap.
+    """
+    for x in range(size):
+        block[NORMALIZATION + x] = tables.gap * wo[2, index(start, x)]
+        block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
+    prepare(R, WEFT, tables.overlap_precision, wi, wo, start, size, block)
+    prepare(R, WARP, tables.overlap_precision, wi, wo, start, size, block, _WARP)
+    for k in range(tables.warp_start):
+        add_masking(R, tables, k, size, block)
+    for k in range(tables.warp_start, tables.nodes.shape[0]):
+        add_masking(R, tables, k, size, block, _WARP)
+    _copy_threads(R, tables, sets, threads, psi0, w, first, size, block)
+    if _has_model(R, tables, THESIS):
+        _of_model(R, True, across_too, tables.overlap_precision, size, block)
+    if _has_model(R, tables, MICROCYLINDER):
+        _of_model(R, False, across_too, tables.overlap_precision, size, block)
+    divide(R, out, start, size, block)
+
+
+@njit(**INLINE)
+def _has_model(R, tables, model):
+    found = False
+    for thread in range(tables.threads.shape[0]):
+        found |= tables.threads[thread, MODEL] == R(model)
+    return found
+
+
+@njit(**INLINE)
+def _copy_threads(R, tables, sets, threads, psi0, w, first, size, block):
+    """Set, tangent angle, place across and the thread's numbers of a block of points."""
+    for x in range(size):
+        k = index(first, x)
+        which, thread = sets[k], np.uintp(threads[k])
+        block[_IS_WARP + x] = R(1) if which == WARP else R(0)
+        block[_ACROSS + x] = w[k]
+        for column in range(_COLUMNS):
+            block[_THREAD + column * BLOCK + x] = tables.threads[thread, column]
+        if which != WEFT and which != WARP:
+            block[_THREAD + MODEL * BLOCK + x] = R(_NO_MODEL)
+    for x in range(size):
+        k = index(first, x)
+        block[_COS + x], block[_SIN + x] = cos(R, psi0[k]), sin(R, psi0[k])
+
+
+@njit(**INLINE)
+def _row_at(block, x):
+    """The columns of the point's thread, to be read as a row of the table."""
+    x += _THREAD
+    return (
+        block[x], block[x + BLOCK], block[x + 2 * BLOCK], block[x + 3 * BLOCK],
+        block[x + 4 * BLOCK], block[x + 5 * BLOCK], block[x + 6 * BLOCK], block[x + 7 * BLOCK],
+        block[x + 8 * BLOCK], block[x + 9 * BLOCK], block[x + 10 * BLOCK], block[x + 11 * BLOCK],
+        block[x + 12 * BLOCK],
+    )  # fmt: skip
+
+
+@njit(**INLINE)
+def _own(block, x, warp):
+    """The entry at x of the point's own set. Both are loaded: a selection, not a branch."""
+    weft_value, warp_value = block[x], block[x + _WARP]
+    return warp_value if warp else weft_value
+
+
+@njit(**INLINE)
+def _of_model(R, thesis, across_too, precision, size, block):
+    """The value without `1/Q` of the points whose thread has the model, into the sums' rows."""
+    model = R(THESIS) if thesis else R(MICROCYLINDER)
+    for x in range(size):
+        row = _row_at(block, x)
+        c, s, warp = block[_COS + x], block[_SIN + x], block[_IS_WARP + x] > R(0)
+        iz, oz = block[UP_I + x], block[UP_O + x]
+        a_i, b_i = _own(block, AXIS_I + x, warp), _own(block, ACROSS_I + x, warp)
+        a_o, b_o = _own(block, AXIS_O + x, warp), _own(block, ACROSS_O + x, warp)
+        scale_i, scale_o = _own(block, SCALE_I + x, warp), _own(block, SCALE_O + x, warp)
+        u = _own(block, OVERLAP + x, warp)
+        p = seen_along(R, c, s, a_i, iz, scale_i, a_o, oz, scale_o, u)
+        surface, volume = _bit_of_thread(
+            R, thesis, across_too, row, precision, c, s, block[_ACROSS + x],
+            a_i, b_i, iz, a_o, b_o, oz,
+        )  # fmt: skip
+        share = p if row[MODEL] == model else R(0)
+        block[RED + x] += share * (surface + volume * row[ALBEDO_R])
+        block[GREEN + x] += share * (surface + volume * row[ALBEDO_G])
+        block[BLUE + x] += share * (surface + volume * row[ALBEDO_B])

@@ -1,0 +1,1 @@
+"""Scattering of one thread."""

@@ -1,0 +1,1 @@
+"""Heights of the threads, and the shadows they throw on one another."""

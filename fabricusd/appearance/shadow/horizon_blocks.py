@@ -1,0 +1,84 @@
+"""Reading the horizon table at a block of places, in loops that LLVM vectorises.
+
+The rows of a block are `place_blocks`'; the interpolation is `horizon_lookup.horizon_at`'s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.published.blocks import BLOCK
+from fabricusd.appearance.shadow.horizon_lookup import cell_of_texels, diamond
+from fabricusd.appearance.shadow.place_blocks import (
+    FIRST,
+    LIT,
+    SECOND,
+    SET,
+    SHARES,
+    TABLE_I,
+    TABLE_J,
+    TOP,
+    X,
+    Y,
+)
+from fabricusd.appearance.weave.coverage import GAP
+from fabricusd.kernels.real import PART, index
+
+
+@njit(**PART)
+def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
+    """Where in the flat table each of a block of places reads, and the three shares it mixes.
+
+    wi : (3, n), the block's from `begin` on. Fills the rows FIRST, SECOND (of both azimuths) and
+    SHARES.
+    """
+    rows, columns, azimuths = table.shape[3], table.shape[4], table.shape[5]
+    picks, slots = table.shape[1], table.shape[2]
+    weft_width, warp_width = cloth.width[WEFT], cloth.width[WARP]
+    for k in range(size):
+        p, q, top, which = reals[X + k], reals[Y + k], ints[TOP + k], ints[SET + k]
+        # A gap, and what is not a number, reads somewhere; the caller has its answer already.
+        sound = p >= R(0) and which != GAP
+        warp = top == WARP
+        along, over = (q, p) if warp else (p, q)
+        width = warp_width if warp else weft_width
+        on_top = which == top
+        seen = (over if over < R(0.5) else over - width) / max(R(1) - width, cloth.tiny)
+        across = (over if on_top else along) - R(0.5)
+        across = across / max(width if on_top else cloth.under_width, cloth.tiny) + R(0.5)
+        row, a = cell_of_texels(R, (along if on_top else seen) if sound else R(0.5), rows)
+        column, b = cell_of_texels(R, across if sound else R(0.5), columns)
+        m = index(begin, k)
+        x, y = wi[0, m], wi[1, m]
+        turn = diamond(R, x, y) * R(0.25 * azimuths)
+        turn = turn if abs(x) + abs(y) < R(2) else R(0)
+        first = min(np.int32(turn), np.int32(azimuths - 1))
+        second = first + 1 if first + 1 < azimuths else 0
+        slot = 0 if on_top else slots - 1
+        texel = (
+            ((ints[TABLE_I + k] * picks + ints[TABLE_J + k]) * slots + slot) * rows + row
+        ) * columns + column
+        ints[FIRST + k], ints[SECOND + k] = texel * azimuths + first, texel * azimuths + second
+        reals[SHARES + k], reals[SHARES + BLOCK + k] = a, b
+        reals[SHARES + 2 * BLOCK + k] = turn - R(first)
+
+
+@njit(**PART)
+def mix_texels(R, texels, columns, azimuths, size, ints, reals):
+    """The horizon's sine at a block of places, from the flat table, into the row LIT."""
+    step = np.uintp(columns * azimuths)
+    beside = np.uintp(azimuths)
+    for k in range(size):
+        m, n = np.uintp(ints[FIRST + k]), np.uintp(ints[SECOND + k])
+        a, b = reals[SHARES + k], reals[SHARES + BLOCK + k]
+        c = reals[SHARES + 2 * BLOCK + k]
+        g00, h00 = R(texels[m]), R(texels[n])
+        g01, h01 = R(texels[m + beside]), R(texels[n + beside])
+        g10, h10 = R(texels[m + step]), R(texels[n + step])
+        g11, h11 = R(texels[m + step + beside]), R(texels[n + step + beside])
+        g0, h0 = g00 + (g01 - g00) * b, h00 + (h01 - h00) * b
+        g1, h1 = g10 + (g11 - g10) * b, h10 + (h11 - h10) * b
+        g, h = g0 + (g1 - g0) * a, h0 + (h1 - h0) * a
+        reals[LIT + k] = (g + (h - g) * c) * R(1.0 / 255.0)

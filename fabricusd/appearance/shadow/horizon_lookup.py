@@ -1,0 +1,92 @@
+"""Reading the horizon table at one place; `texel_blocks` reads it at a block of them.
+
+The azimuth is the diamond angle: from 0 to 4, one per quadrant, linear in `y/(|x| + |y|)` inside
+it. Between texels and azimuths the *sine* of the elevation is interpolated, which is what the light
+is compared with.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from fabricusd.appearance.frame import WARP
+from fabricusd.appearance.weave.lookup import FARTHEST, split, wrap
+from fabricusd.kernels.real import INLINE
+
+
+@njit(**INLINE)
+def diamond(R, x, y):
+    """Azimuth of (x, y) from 0 to 4: one per quadrant, linear in y/(|x| + |y|) inside it."""
+    part = x / max(abs(x) + abs(y), R(1e-30))
+    return R(1) - part if y >= R(0) else R(3) + part
+
+
+@njit(**INLINE)
+def cell_of_texels(R, place, count):
+    """Lower of the two texels around `place` in [0, 1], and the share of the upper one."""
+    x = max(R(0), min(place * R(count) - R(0.5), R(count - 1)))
+    k = min(int(x), count - 2)
+    return k, x - R(k)
+
+
+@njit(**INLINE)
+def _between(R, table, i, j, slot, row, column, first, second, c):
+    """A texel's horizon between two azimuths, c of the way from the first."""
+    low = R(table[i, j, slot, row, column, first])
+    return low + (R(table[i, j, slot, row, column, second]) - low) * c
+
+
+@njit(**INLINE)
+def split_table(table, u, v):
+    """Cell of the table at weave coordinates, float64; where they are not sound, the first one."""
+    sound = abs(u) <= FARTHEST and abs(v) <= FARTHEST
+    return (
+        wrap(np.floor(u) if sound else 0.0, table.shape[0]),
+        wrap(np.floor(v) if sound else 0.0, table.shape[1]),
+    )
+
+
+@njit(**INLINE)
+def horizon_at(R, cloth, table, u, v, which, x, y):
+    """Sine of the horizon's elevation at (u, v) on the thread of set `which` towards (x, y)."""
+    i, j, _, _, p, q = split(R, cloth, u, v)
+    in_u, in_v = split_table(table, u, v)
+    top = int(cloth.grid[i, j])
+    along, over = (q, p) if top == WARP else (p, q)
+    width = cloth.width[top]
+    on_top = which == top
+    # Selections, not branches: neither thread nor azimuth can be predicted.
+    seen = (over if over < R(0.5) else over - width) / max(R(1) - width, cloth.tiny)
+    across = ((over if on_top else along) - R(0.5)) / (width if on_top else cloth.under_width)
+    slot = 0 if on_top else table.shape[2] - 1
+    along, across = along if on_top else seen, across + R(0.5)
+    row, a = cell_of_texels(R, along, table.shape[3])
+    column, b = cell_of_texels(R, across, table.shape[4])
+    azimuths = table.shape[5]
+    turn = diamond(R, x, y) * R(0.25 * azimuths)
+    first = min(int(turn), azimuths - 1)
+    c = turn - R(first)
+    second = first + 1 if first + 1 < azimuths else 0
+    here = _between(R, table, in_u, in_v, slot, row, column, first, second, c)
+    beside = _between(R, table, in_u, in_v, slot, row, column + 1, first, second, c)
+    ahead = _between(R, table, in_u, in_v, slot, row + 1, column, first, second, c)
+    both = _between(R, table, in_u, in_v, slot, row + 1, column + 1, first, second, c)
+    near = here + (beside - here) * b
+    far = ahead + (both - ahead) * b
+    return (near + (far - near) * a) * R(1.0 / 255.0)
+
+
+@njit(**INLINE)
+def soft_edge(R, above, softness):
+    """A smooth step from 0 to 1 over `softness`, in how far the light stands above the horizon."""
+    t = max(R(0), min(R(1), above / softness + R(0.5)))
+    return t * t * (R(3) - R(2) * t)
+
+
+@njit(**INLINE)
+def above_horizon(R, sine, flat, z):
+    """Sine of the angle from the horizon up to light of elevation (flat, z)."""
+    return z * math.sqrt(max(R(0), R(1) - sine * sine)) - flat * sine

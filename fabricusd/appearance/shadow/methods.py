@@ -1,0 +1,415 @@
+"""Thread-to-thread shadowing: four answers to "does this light reach this point of the weave?".
+
+`g(x, wi)` from 0 to 1, `docs/model.md` section 5. Every method reads the same height field, and
+each is 1 on pile, which has none, and 0 for light at or below the cloth:
+
+none    : 1, the neighbouring threads are left to the masking term
+peak    : the nearest of the highest points is the horizon in every direction, [Bisker2011] 5.2.3
+horizon : a table of the horizon by place on the thread and azimuth, [Max1988]; marched instead
+          where the repeat is too large for a table
+traced  : the height field is marched along the ray, the answer that the others are measured by
+
+What a cloth sends back is multiplied by `shade`. By `peak` that is `g`, as the thesis has it. By
+`horizon` and `traced` it is `g` over its mean over the threads of the same set: the masking term
+already holds the mean of this shade, and `g` says where it falls. See docs/decisions/004.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import ArrayLike, NDArray
+
+from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.published.blocks import BLOCK
+from fabricusd.appearance.shadow.height import crown_of, highest_point, level_is_round, steepest
+from fabricusd.appearance.shadow.horizon import (
+    AZIMUTHS,
+    ELEVATIONS,
+    TEXELS,
+    horizon_error,
+    horizon_table,
+    mean_light,
+)
+from fabricusd.appearance.shadow.horizon_blocks import choose_texels, mix_texels
+from fabricusd.appearance.shadow.horizon_lookup import (
+    above_horizon,
+    diamond,
+    horizon_at,
+    soft_edge,
+)
+from fabricusd.appearance.shadow.place_blocks import (
+    FIRST,
+    FREE,
+    INT_ROWS,
+    LIT,
+    REAL_ROWS,
+    SECOND,
+    SET,
+    SHARES,
+    X,
+    look_up_block,
+)
+from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
+from fabricusd.appearance.weave.coverage import GAP
+from fabricusd.appearance.weave.curve import crest, peak
+from fabricusd.appearance.weave.lookup import find, height_on, wrap
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+from fabricusd.kernels.real import INLINE, KERNEL, PART, index
+
+METHODS = ("none", "peak", "horizon", "traced")
+NONE, PEAK, HORIZON, TRACED = range(4)
+
+TRACED_SOFTNESS = 1e-3
+"""Width [rad] of the edge with which the mean of the marched `g` is taken; its own is hard."""
+
+PEAK_SOFTNESS = math.radians(5.0)
+"""Width of the edge of a `peak` shadow. The horizon it asks about is a guess; a sharper edge would
+only alias."""
+
+SEARCH = 64
+"""Cells around a point in which `peak` looks for the highest point; beyond it the horizon of every
+published fabric is under a quarter of a degree."""
+
+
+class Shadow(NamedTuple):
+    """What a shadowing method needs beside the compiled fabric.
+
+    method : int - NONE, PEAK, HORIZON or TRACED
+    rounded : int - 1 where threads are round across their width (level `thread`)
+    highest : real - greatest height of the field [m]
+    softness : real - width of the shadow's edge in the light's elevation [rad]; `traced` has none
+    crest_first, crest_last : (k, q) real - stretches of each type's run as high as its peak, empty
+        where the last is less than the first
+    crest_height : (k,) real - height there, in run lengths
+    table : (I, J, slots, along, across, azimuths) uint8 - sine of the horizon's elevation times
+        255, see `horizon`; one zero for the other methods
+    texels : the same memory in one row
+    mean : (2, elevations, azimuths + 1) real - what `shade` divides by on each set, see
+        `horizon.mean_light`; ones for `none` and `peak`
+    """
+
+    method: int
+    rounded: int
+    highest: Any
+    softness: Any
+    crest_first: NDArray[Any]
+    crest_last: NDArray[Any]
+    crest_height: NDArray[Any]
+    table: NDArray[np.uint8]
+    texels: NDArray[np.uint8]
+    mean: NDArray[Any]
+
+
+def compile_shadow(
+    fabric: Fabric,
+    method: str = "horizon",
+    *,
+    level: str = "weave",
+    softness: float | None = None,
+    azimuths: int = AZIMUTHS,
+    texels: tuple[int, int] = TEXELS,
+    precision: type[np.floating[Any]] = np.float32,
+) -> Shadow:
+    """The tables of shadowing `method`, one of METHODS, for `fabric`.
+
+    level : "weave" or "thread", whether threads are flat or round across their width
+    softness : angular width of the light, over which a shadow's edge is spread [rad]; None takes
+        the table's own error for `horizon` and PEAK_SOFTNESS for `peak`
+    azimuths, texels : size of the horizon table, directions and (along, across) a thread in a cell
+
+    A repeat too large for a horizon table, a figured cloth of hundreds of ends and picks, is traced
+    instead: the answer's `method` is then TRACED, which is slower and nearer to the truth.
+    """
+    if method not in METHODS:
+        raise FabricError("shadow", f"is '{method}'; it must be one of {', '.join(METHODS)}")
+    if softness is not None and not softness > 0:
+        raise FabricError("softness", f"is {softness}; it must be above 0")
+    rounded = level_is_round(level)
+    cloth = compile_fabric(fabric, precision=np.float64)
+    highest = highest_point(fabric, cloth)
+    table = np.zeros((1, 1, 1, 1, 1, 1), np.uint8)
+    if method == "horizon":
+        found_table = horizon_table(fabric, cloth, rounded, highest, azimuths, texels)
+        if found_table is None:
+            method = "traced"
+        else:
+            table = found_table
+            softness = softness or horizon_error(cloth, rounded, highest, table)
+    mean = np.ones((2, ELEVATIONS, AZIMUTHS + 1))
+    if method in ("horizon", "traced"):
+        kept = table if method == "horizon" else None
+        edge = softness if method == "horizon" and softness else TRACED_SOFTNESS
+        mean = mean_light(fabric, cloth, rounded, highest, edge, kept)
+    found = [crest(t.curve) for t in fabric.thread_list]
+    first = np.ones((len(found), max(len(c) for c in found)))
+    last = np.zeros_like(first)
+    for row, stretches in enumerate(found):
+        first[row, : len(stretches)], last[row, : len(stretches)] = stretches.T
+    return Shadow(
+        method=METHODS.index(method),
+        rounded=rounded,
+        highest=precision(highest),
+        softness=precision(PEAK_SOFTNESS if softness is None else softness),
+        crest_first=first.astype(precision),
+        crest_last=last.astype(precision),
+        crest_height=np.array([peak(t.curve) for t in fabric.thread_list], precision),
+        table=table,
+        texels=table.reshape(-1),
+        mean=mean.astype(precision),
+    )
+
+
+@njit(**INLINE)
+def mean_lit(R, shadow, which, x, y, z):
+    """Mean of `g` over the threads of a set for light from (x, y, z) above the cloth."""
+    row, column, a, b = _cell_of_mean(R, shadow, x, y, z)
+    return _between_means(shadow, which, np.uintp(row), np.uintp(column), a, b)
+
+
+@njit(**INLINE)
+def _cell_of_mean(R, shadow, x, y, z):
+    """(row, column) of the mean's table for light from (x, y, z), and the shares of the next."""
+    rows, columns = shadow.mean.shape[1], shadow.mean.shape[2]
+    e = math.sqrt(min(max(z, R(0)), R(1))) * R(rows - 1)
+    turn = diamond(R, x, y) * R(0.25 * (columns - 1))
+    row, column = min(np.int32(e), np.int32(rows - 2)), min(np.int32(turn), np.int32(columns - 2))
+    return row, column, e - R(row), turn - R(column)
+
+
+@njit(**INLINE)
+def _between_means(shadow, which, row, column, a, b):
+    """The mean between four entries of its set's table; in a gap it is nobody's."""
+    k = np.uintp(1 if which == WARP else 0)
+    ahead, beside = row + np.uintp(1), column + np.uintp(1)
+    low = shadow.mean[k, row, column]
+    low += (shadow.mean[k, row, beside] - low) * b
+    high = shadow.mean[k, ahead, column]
+    high += (shadow.mean[k, ahead, beside] - high) * b
+    return low + (high - low) * a
+
+
+@njit(**INLINE)
+def shade(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
+    """What the value at a point is multiplied by for light from (x, y, z): see the module's text.
+
+    Arguments as for `lit`.
+    """
+    g = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
+    if shadow.method < HORIZON or not g > R(0):
+        return g
+    return g / mean_lit(R, shadow, which, x, y, z)
+
+
+@njit(**INLINE)
+def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
+    """Share of light from direction (x, y, z) in the surface frame that reaches a point: `g`.
+
+    u, v : weave coordinates, float64; the next five are what `weave.find` gave there
+
+    What is not a number stays so, and never indexes a table.
+    """
+    flat = math.sqrt(x * x + y * y)
+    if not (s >= R(0) and flat < R(2) and z < R(2)):
+        return R(np.nan)
+    if z <= R(0):
+        return R(0)
+    if shadow.method == NONE or which == GAP or cloth.pile[thread] != 0:
+        return R(1)
+    if flat <= R(1e-6) * z:
+        return R(1)
+    if shadow.method == HORIZON:
+        sine = horizon_at(R, cloth, shadow.table, u, v, which, x, y)
+        return soft_edge(R, above_horizon(R, sine, flat, z), shadow.softness)
+    axis = height_on(R, cloth, thread, s, length)
+    if shadow.method == PEAK:
+        # [Bisker2011] gives a place on the thread one height, whatever the level: no round here.
+        drop = shadow.highest - axis - cloth.half_thickness[which, thread]
+        if drop <= R(1e-6) * shadow.highest:
+            return R(1)
+        # No horizon lower than this one can touch the shadow's edge.
+        lowest = max(z / flat - shadow.softness * (R(1) + z * z / (flat * flat)), R(1e-6))
+        distance = R(_to_crest(cloth, shadow, u, v, float(drop / lowest)))
+        reach = math.sqrt(drop * drop + distance * distance)
+        return soft_edge(R, (z * distance - flat * drop) / reach, shadow.softness)
+    crown = crown_of(R, cloth, shadow.rounded, which, thread, w)
+    slope = float(z) / float(flat)
+    found = steepest(
+        cloth, shadow.rounded, float(shadow.highest), u, v,
+        which, float(crown), float(axis + crown),
+        float(x) / float(flat), float(y) / float(flat), slope, True,
+    )  # fmt: skip
+    return R(0) if found > slope else R(1)
+
+
+@njit(**PART)
+def _to_crest(cloth, shadow, u, v, most):
+    """Distance on the cloth [m] to the nearest of the highest points, at most `most`."""
+    end, pick = np.floor(u), np.floor(v)
+    pitch_u, pitch_v = float(cloth.pitch[WARP]), float(cloth.pitch[WEFT])
+    best = most
+    for ring in range(SEARCH):
+        if (ring - 1) * min(pitch_u, pitch_v) > best:
+            break
+        for di in range(-ring, ring + 1):
+            step = 1 if abs(di) == ring else max(1, 2 * ring)
+            for dj in range(-ring, ring + 1, step):
+                best = _crest_in_cell(cloth, shadow, u, v, end + di, pick + dj, best)
+    return best
+
+
+@njit(**PART)
+def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
+    """The smaller of `best` and the distance [m] to the highest points in one cell."""
+    i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
+    top = int(cloth.grid[i, j])
+    width = float(cloth.width[top])
+    low = 0.5 - 0.5 * width
+    for slot in range(2 if cloth.under == 1 - top else 1):
+        which = top if slot == 0 else 1 - top
+        visible = width if slot == 0 else float(cloth.under_width)
+        if which == WARP:
+            thread = int(cloth.sequence[WARP, wrap(end, cloth.sequence_length[WARP])])
+        else:
+            thread = int(cloth.sequence[WEFT, wrap(pick, cloth.sequence_length[WEFT])])
+        share = 1.0 if slot == 0 else 1.0 - width
+        place = float(cloth.runs[i, j, slot, 0])
+        cells = float(cloth.runs[i, j, slot, 1])
+        height = cells * share * float(cloth.pitch[1 - which]) * float(
+            shadow.crest_height[thread]
+        ) + float(cloth.half_thickness[which, thread])
+        if visible <= 0.0 or cloth.pile[thread] != 0 or height < 0.999999 * shadow.highest:
+            continue
+        across = 0.5 * visible
+        for q in range(shadow.crest_first.shape[1]):
+            a = max(0.0, float(shadow.crest_first[thread, q]) * cells - place)
+            b = min(1.0, float(shadow.crest_last[thread, q]) * cells - place)
+            if a > b:
+                continue
+            if slot == 1:
+                a, b = a * share, b * share
+                a, b = a if a < low else a + width, b if b < low else b + width
+            if which == WARP:
+                du = max(0.0, abs(u - end - 0.5) - across)
+                dv = max(0.0, a - (v - pick), (v - pick) - b)
+            else:
+                du = max(0.0, a - (u - end), (u - end) - b)
+                dv = max(0.0, abs(v - pick - 0.5) - across)
+            best = min(
+                best,
+                math.hypot(du * float(cloth.pitch[WARP]), dv * float(cloth.pitch[WEFT])),
+            )
+    return best
+
+
+@njit(**PART)
+def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
+    """`lit` by the horizon table at a block of places that `look_up_block` has found, into LIT.
+
+    wi : (3, n), the block's from `begin` on
+    """
+    table = shadow.table
+    choose_texels(R, cloth, table, wi, begin, size, ints, reals)
+    mix_texels(R, shadow.texels, table.shape[4], table.shape[5], size, ints, reals)
+    for k in range(size):
+        m = index(begin, k)
+        x, y, z = wi[0, m], wi[1, m], wi[2, m]
+        flat = math.sqrt(x * x + y * y)
+        g = soft_edge(R, above_horizon(R, reals[LIT + k], flat, z), shadow.softness)
+        g = R(1) if ints[FREE + k] != 0 else g
+        g = g if z > R(0) else R(0)
+        sound = reals[X + k] >= R(0) and flat < R(2) and z < R(2)
+        reals[LIT + k] = g if sound else R(np.nan)
+
+
+@njit(**PART)
+def mean_block(R, shadow, wi, begin, size, ints, reals):
+    """Divide the row LIT by the mean of `g`, in loops as those of `texel_blocks`."""
+    for k in range(size):
+        m = index(begin, k)
+        # What is not a number has its answer, and must not index the table.
+        sound = reals[LIT + k] >= R(0)
+        x, y, z = wi[0, m] if sound else R(0), wi[1, m] if sound else R(0), wi[2, m]
+        ints[FIRST + k], ints[SECOND + k], a, b = _cell_of_mean(
+            R, shadow, x, y, z if sound else R(0)
+        )
+        reals[SHARES + k], reals[SHARES + BLOCK + k] = a, b
+    for k in range(size):
+        row, column = np.uintp(ints[FIRST + k]), np.uintp(ints[SECOND + k])
+        reals[LIT + k] /= _between_means(
+            shadow, ints[SET + k], row, column, reals[SHARES + k], reals[SHARES + BLOCK + k]
+        )
+
+
+@njit(**PART)
+def _one_by_one(R, cloth, shadow, shaded, uv, begin, wi, out):
+    """`shade`, or else `lit`, at as many places from `begin` on as `out` holds."""
+    for k in range(out.size):
+        u, v = uv[begin + k, 0], uv[begin + k, 1]
+        x, y, z = wi[0, begin + k], wi[1, begin + k], wi[2, begin + k]
+        which, thread, s, w, _, length = find(R, cloth, u, v)
+        g = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
+        if shaded and shadow.method >= HORIZON and g > R(0):
+            g /= mean_lit(R, shadow, which, x, y, z)
+        out[k] = g
+
+
+@njit(parallel=True, **KERNEL)
+def lit_all(R, cloth, shadow, shaded, uv, wi, out):
+    """`lit`, or `shade` if `shaded`, at places uv (n, 2) float64 for light wi (3, n): out (n,)."""
+    n = uv.shape[0]
+    for b in prange((n + BLOCK - 1) // BLOCK):
+        begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
+        found = out[begin : begin + size]
+        if shadow.method != HORIZON:
+            _one_by_one(R, cloth, shadow, shaded, uv, begin, wi, found)
+        else:
+            ints, reals = np.empty(INT_ROWS * BLOCK, np.int32), np.empty(REAL_ROWS * BLOCK, R)
+            look_up_block(R, cloth, shadow.table, uv, begin, size, ints, reals)
+            horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
+            if shaded:
+                mean_block(R, shadow, wi, begin, size, ints, reals)
+            found[:] = reals[LIT : LIT + size]
+
+
+def shadowing(
+    fabric: Fabric,
+    wi: ArrayLike,
+    uv_threads: ArrayLike,
+    method: str = "horizon",
+    *,
+    level: str = "weave",
+    compiled: tuple[CompiledFabric, Shadow] | None = None,
+) -> NDArray[Any]:
+    """`g` (n,) for light from unit directions wi (n, 3) at weave coordinates uv_threads (n, 2).
+
+    compiled : the fabric and `compile_shadow` of it, where the caller has them; `method` and
+        `level` are then the shadow's. Otherwise both are made, in float64.
+    """
+    if compiled is None:
+        cloth = compile_fabric(fabric, precision=np.float64)
+        shadow = compile_shadow(fabric, method, level=level, precision=np.float64)
+    else:
+        cloth, shadow = compiled
+    real = cloth.curve_start.dtype.type
+    uv = np.ascontiguousarray(uv_threads, np.float64)
+    light = np.ascontiguousarray(wi, real)
+    if uv.ndim != 2 or uv.shape[1] != 2 or light.shape != (len(uv), 3):
+        raise FabricError(
+            "wi, uv_threads", f"have shapes {light.shape}, {uv.shape}; they must be (n, 3), (n, 2)"
+        )
+    for name, values in (("wi", light), ("uv_threads", uv)):
+        bad = ~np.isfinite(values).all(axis=1)
+        if bad.any():
+            raise FabricError(
+                name,
+                f"has {int(bad.sum())} of {len(uv)} rows that are not finite, the first at "
+                f"{int(np.argmax(bad))}",
+            )
+    out = np.empty(len(uv), real)
+    lit_all(real, cloth, shadow, False, uv, np.ascontiguousarray(light.T), out)
+    return out

@@ -1,0 +1,130 @@
+"""Looking up a block of places of the weave, in loops that LLVM vectorises.
+
+The integers noted about a block lie row behind row in one array and the reals in another: pointers
+of their own would have to be checked for overlap, and there would be too many. Loops that gather
+from tables stand apart from those that compute, since the former stay scalar.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.published.blocks import BLOCK
+from fabricusd.appearance.shadow.horizon_lookup import split_table
+from fabricusd.appearance.weave.coverage import GAP
+from fabricusd.appearance.weave.lookup import angle_on, cell_of, place_on, whole_threads, wrap
+from fabricusd.kernels.real import INLINE, PART, index
+
+CELL_I, CELL_J, END, PICK = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
+"""Rows of int32: the cell of the grid and the places in the sequences of threads."""
+TOP, SET, THREAD, FREE = 4 * BLOCK, 5 * BLOCK, 6 * BLOCK, 7 * BLOCK
+"""The set on top of the cell, the set or GAP and the thread that are seen, and 1 where nothing
+keeps light off: gap or pile."""
+TABLE_I, TABLE_J = 8 * BLOCK, 9 * BLOCK
+"""The cell of the horizon table."""
+FIRST, SECOND = 10 * BLOCK, 11 * BLOCK
+"""For `horizon_lookup.choose_texels`."""
+_WARP_THREAD, _WEFT_THREAD = 12 * BLOCK, 13 * BLOCK
+INT_ROWS = 14
+
+X, Y, S, ANGLE = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
+"""Rows of reals: the place in the cell, on the thread's run, and the tangent angle [rad] there."""
+SHARES, LIT = 4 * BLOCK, 7 * BLOCK
+"""Three rows for `horizon_lookup.choose_texels`; the share of light that reaches the place."""
+_UPPER_PLACE, _UPPER_CELLS, _LOWER_PLACE, _LOWER_CELLS = (row * BLOCK for row in range(8, 12))
+REAL_ROWS = 12
+
+
+@njit(**PART)
+def look_up_block(R, cloth, table, uv, begin, size, ints, reals):
+    """`weave.find` of `size` places uv (n, 2) float64 from `begin` on, and their cells of `table`.
+
+    ints : (INT_ROWS*BLOCK,) int32; reals : (REAL_ROWS*BLOCK,) - FIRST, SECOND, SHARES and LIT are
+    left for `shadow.horizon_block`
+    """
+    _cells(R, cloth, uv, begin, size, ints, reals)
+    _cells_of_table(cloth, table, uv, begin, size, ints)
+    _gather(cloth, size, ints, reals)
+    _place(R, cloth, size, ints, reals)
+    for k in range(size):
+        thread = np.uintp(ints[THREAD + k])
+        reals[ANGLE + k] = angle_on(R, cloth, thread, reals[S + k])
+        ints[FREE + k] = ints[SET + k] == GAP or cloth.pile[thread] != 0
+
+
+@njit(**INLINE)
+def _cells(R, cloth, uv, begin, size, ints, reals):
+    """`weave.split` of a block; the places in the sequences only where they repeat otherwise."""
+    for k in range(size):
+        p = index(begin, k)
+        i, j, x, y = cell_of(R, cloth, uv[p, 0], uv[p, 1])
+        ints[CELL_I + k], ints[CELL_J + k] = i, j
+        reals[X + k], reals[Y + k] = x, y
+    _places_in_sequence(cloth, WARP, uv, begin, size, ints, END, CELL_I)
+    _places_in_sequence(cloth, WEFT, uv, begin, size, ints, PICK, CELL_J)
+
+
+@njit(**INLINE)
+def _places_in_sequence(cloth, which, uv, begin, size, ints, row, cell_row):
+    """The places in a set's sequence, which are those in the grid unless it repeats otherwise."""
+    # Read once: for all that LLVM knows the loop writes over it.
+    period, cells = cloth.sequence_length[which], cloth.grid.shape[0 if which == WARP else 1]
+    if period == 1:
+        for k in range(size):
+            ints[row + k] = 0
+    elif period == cells:
+        for k in range(size):
+            ints[row + k] = ints[cell_row + k]
+    else:
+        for k in range(size):
+            p = index(begin, k)
+            end, pick, _ = whole_threads(uv[p, 0], uv[p, 1])
+            ints[row + k] = wrap(end if which == WARP else pick, period)
+
+
+@njit(**INLINE)
+def _cells_of_table(cloth, table, uv, begin, size, ints):
+    """The cells of the horizon table, which is the grid's unless it repeats later."""
+    if table.shape[0] == cloth.grid.shape[0] and table.shape[1] == cloth.grid.shape[1]:
+        for k in range(size):
+            ints[TABLE_I + k], ints[TABLE_J + k] = ints[CELL_I + k], ints[CELL_J + k]
+    else:
+        for k in range(size):
+            p = index(begin, k)
+            ints[TABLE_I + k], ints[TABLE_J + k] = split_table(table, uv[p, 0], uv[p, 1])
+
+
+@njit(**INLINE)
+def _gather(cloth, size, ints, reals):
+    """What the tables hold about each cell, its end and its pick."""
+    lower = cloth.runs.shape[2] - 1
+    for k in range(size):
+        i, j = np.uintp(ints[CELL_I + k]), np.uintp(ints[CELL_J + k])
+        ints[TOP + k] = cloth.grid[i, j]
+        ints[_WARP_THREAD + k] = cloth.sequence[WARP, np.uintp(ints[END + k])]
+        ints[_WEFT_THREAD + k] = cloth.sequence[WEFT, np.uintp(ints[PICK + k])]
+        reals[_UPPER_PLACE + k] = cloth.runs[i, j, 0, 0]
+        reals[_UPPER_CELLS + k] = cloth.runs[i, j, 0, 1]
+        reals[_LOWER_PLACE + k] = cloth.runs[i, j, lower, 0]
+        reals[_LOWER_CELLS + k] = cloth.runs[i, j, lower, 1]
+
+
+@njit(**INLINE)
+def _place(R, cloth, size, ints, reals):
+    """The thread that is seen, and where on its run."""
+    weft_width, warp_width = cloth.width[WEFT], cloth.width[WARP]
+    for k in range(size):
+        top, x = ints[TOP + k], reals[X + k]
+        which, s, _, _ = place_on(
+            R, cloth, top, warp_width if top == WARP else weft_width,
+            reals[_UPPER_PLACE + k], reals[_UPPER_CELLS + k],
+            reals[_LOWER_PLACE + k], reals[_LOWER_CELLS + k], x, reals[Y + k],
+        )  # fmt: skip
+        warp_thread, weft_thread = ints[_WARP_THREAD + k], ints[_WEFT_THREAD + k]
+        thread = warp_thread if which == WARP else weft_thread
+        sound = x >= R(0)
+        ints[SET + k] = which if sound else WEFT
+        ints[THREAD + k] = thread if sound and which != GAP else 0
+        reals[S + k] = s if sound else R(np.nan)

@@ -1,0 +1,1 @@
+"""Which thread lies at a point of the cloth, and how it runs there."""

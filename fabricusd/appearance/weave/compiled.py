@@ -1,0 +1,202 @@
+"""The weave of a fabric as contiguous arrays: what the lookup and the shadows read.
+
+`compile_fabric` turns the frozen dataclasses of `fabricusd.fabric` into a `CompiledFabric`, once
+per fabric and precision. Index conventions: sets are WEFT and WARP of `coverage`, thread types
+count as `Fabric.threads`, the grid is `[end, pick]`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabricusd.appearance.weave.coverage import GAP, Coverage, coverage, sets
+from fabricusd.appearance.weave.curve import is_pile, pieces
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+
+Reals = NDArray[Any]
+"""float32 or float64, by the precision that the fabric was compiled for."""
+
+
+class CompiledFabric(NamedTuple):
+    """Arrays and scalars of one fabric; `real` below is the precision asked for.
+
+    grid : (m, n) uint8 - 1 where end i lies over pick j
+    runs : (m, n, slots, 2) uint16, uint32 beyond 65535 threads - in slot 0 for the thread on top,
+        in slot 1 for the one underneath (only where `under` is a set): place of the cell in the
+        visible run (cells from its start along the thread), and length of that run (cells)
+    sequence : (2, k) int32 - thread types of each set, in as many columns as the longer one takes
+    sequence_length : (2,) int64 - after how many threads the types repeat
+    width : (2,) real - share of its cells' width that a set takes where it is on top
+    under : int - the set that is seen underneath the other, or GAP
+    under_width : real - share of its width that it shows there
+    area : (2, k) real - share of the cloth that type k of set j covers
+    gap : real - share that no thread covers
+    pitch : (2,) real - distance from one thread of the set to the next [m]
+    half_thickness : (2, k) real - [m]; half the visible width where the thread states none
+    curve_start : (k, p) real - start of each linear piece of a type's curve, in run lengths; padded
+        with 2 to a power of two
+    curve_angle, curve_slope : (k, p) real - angle there [rad], change of angle per run length
+    curve_height : (k, p) real - height there, in run lengths
+    pile : (k,) uint8 - 1 where the type's curve has no height field
+    last, tiny : real - the largest number below 1, the smallest normal number
+    """
+
+    grid: NDArray[np.uint8]
+    runs: NDArray[Any]
+    sequence: NDArray[np.int32]
+    sequence_length: NDArray[np.int64]
+    width: Reals
+    under: int
+    under_width: Any
+    area: Reals
+    gap: Any
+    pitch: Reals
+    half_thickness: Reals
+    curve_start: Reals
+    curve_angle: Reals
+    curve_slope: Reals
+    curve_height: Reals
+    pile: NDArray[np.uint8]
+    last: Any
+    tiny: Any
+
+
+def compile_fabric(
+    fabric: Fabric,
+    *,
+    precision: type[np.floating[Any]] = np.float32,
+) -> CompiledFabric:
+    """Arrays of `fabric` in `precision`, np.float32 or np.float64."""
+    if precision not in (np.float32, np.float64):
+        raise FabricError("precision", f"is {precision!r}; it must be float32 or float64")
+    real = precision
+
+    def reals(x: Any) -> Reals:
+        return np.ascontiguousarray(x, dtype=real)
+
+    share = coverage(fabric)
+    lengths = np.array([len(s.sequence) for s in sets(fabric)])
+    sequence = np.zeros((2, lengths.max()), np.int32)
+    for row, thread_set in zip(sequence, sets(fabric), strict=True):
+        row[: len(thread_set.sequence)] = thread_set.sequence
+    pitch = np.array([s.pitch for s in sets(fabric)])
+    return CompiledFabric(
+        grid=np.ascontiguousarray(fabric.weave.cells, dtype=np.uint8),
+        runs=_run_table(fabric.weave.cells, share.under),
+        sequence=sequence,
+        sequence_length=lengths,
+        width=reals(share.width),
+        under=share.under,
+        under_width=real(share.under_width),
+        area=reals(share.type_area),
+        gap=real(share.gap),
+        pitch=reals(pitch),
+        half_thickness=reals(_half_thickness(fabric, share, pitch)),
+        **{name: reals(table) for name, table in _curve_tables(fabric).items()},
+        pile=np.array([is_pile(t.curve) for t in fabric.thread_list], np.uint8),
+        last=np.nextafter(real(1), real(0)),
+        tiny=np.finfo(real).tiny,
+    )
+
+
+def true_repeat(fabric: Fabric) -> tuple[int, int]:
+    """Ends and picks after which the weave and the sequences of threads both start again."""
+    return (
+        math.lcm(fabric.weave.ends, len(fabric.warp.sequence)),
+        math.lcm(fabric.weave.picks, len(fabric.weft.sequence)),
+    )
+
+
+def _run_table(cells: NDArray[np.bool_], under: int) -> NDArray[Any]:
+    """`runs` of the grid: those of the warp go along the picks, those of the weft along the ends.
+
+    Along a thread a run is the same stretch of equal cells whether it is on top there or
+    underneath, so one table per direction serves both slots.
+    """
+    kind: Any = np.uint16 if max(cells.shape) <= np.iinfo(np.uint16).max else np.uint32
+    found = np.empty((*cells.shape, 1 if under == GAP else 2, 2), kind)
+    cells = np.ascontiguousarray(cells)
+    by_end = np.empty((*cells.shape, 2), kind)
+    _fill_runs(cells, by_end)
+    by_pick = np.empty((*cells.shape[::-1], 2), kind)
+    _fill_runs(np.ascontiguousarray(cells.T), by_pick)
+    _share_out(cells, by_end, by_pick, found)
+    return found
+
+
+@njit(cache=True)
+def _share_out(cells, by_end, by_pick, out):
+    """Runs along the warp (m, n, 2) and along the weft (n, m, 2) -> out (m, n, slots, 2)."""
+    block = 64
+    for i0 in range(0, cells.shape[0], block):
+        for j0 in range(0, cells.shape[1], block):
+            for i in range(i0, min(i0 + block, cells.shape[0])):
+                for j in range(j0, min(j0 + block, cells.shape[1])):
+                    for k in range(2):
+                        if cells[i, j]:
+                            out[i, j, 0, k] = by_end[i, j, k]
+                            if out.shape[2] > 1:
+                                out[i, j, 1, k] = by_pick[j, i, k]
+                        else:
+                            out[i, j, 0, k] = by_pick[j, i, k]
+                            if out.shape[2] > 1:
+                                out[i, j, 1, k] = by_end[i, j, k]
+
+
+@njit(cache=True)
+def _fill_runs(lines, out):
+    """(r, n) cells along r threads -> out (r, n, 2): place in its run, length of the run.
+
+    Runs wrap round the repeat; a run without end is one repeat, counted from its border.
+    """
+    n = lines.shape[1]
+    for r in range(lines.shape[0]):
+        # Start where a run starts, so that the one that wraps is met whole.
+        first = 0
+        while first < n and lines[r, first] == lines[r, first - 1]:
+            first += 1
+        start = 0 if first == n else first
+        left = n
+        while left > 0:
+            count, k = 1, start + 1 if start + 1 < n else 0
+            while count < left and lines[r, k] == lines[r, start]:
+                count += 1
+                k = k + 1 if k + 1 < n else 0
+            for place in range(count):
+                out[r, start, 0] = place
+                out[r, start, 1] = count
+                start = start + 1 if start + 1 < n else 0
+            left -= count
+
+
+def _half_thickness(fabric: Fabric, share: Coverage, pitch: NDArray[np.float64]) -> Reals:
+    """(2, k) half the thickness of each type in each set [m]."""
+    stated = np.array([t.thickness for t in fabric.thread_list])
+    visible = np.maximum(share.width, np.where(np.arange(2) == share.under, 1.0, 0.0)) * pitch
+    return 0.5 * np.where(stated > 0, stated, visible[:, None])
+
+
+def _curve_tables(fabric: Fabric) -> dict[str, NDArray[np.float64]]:
+    """The linear pieces of every type's curve, padded to a power of two by unreachable starts."""
+    found = [pieces(t.curve) for t in fabric.thread_list]
+    longest = max(len(p.start) for p in found)
+    shape = (len(found), 1 << (longest - 1).bit_length())
+    start, angle = np.full(shape, 2.0), np.zeros(shape)
+    slope, height = np.zeros(shape), np.zeros(shape)
+    for row, (p, thread) in enumerate(zip(found, fabric.thread_list, strict=True)):
+        used = slice(0, len(p.start))
+        start[row, used], angle[row, used] = p.start, p.first
+        slope[row, used] = (p.last - p.first) / p.length
+        height[row, used] = 0.0 if is_pile(thread.curve) else p.height
+    return {
+        "curve_start": start,
+        "curve_angle": angle,
+        "curve_slope": slope,
+        "curve_height": height,
+    }

@@ -1,0 +1,1 @@
+"""How far a bake is from the truth, and which one meets a bound."""

@@ -1,0 +1,200 @@
+"""How far a baked set is from the truth, in delta E 2000 of re-lit swatches.
+
+A swatch is a block of texels; it is re-lit by the loader under pairs of directions, and compared
+with appearance level `weave` twice: at points, which asks whether the texels are fine enough, and
+with its mean over each texel, which asks whether they hold the right thing. Colours are those of a
+display that shows a perfect white as 1: radiance times pi over the light's cosine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.appearance.accuracy import spread_pairs
+from fabricusd.appearance.surface import evaluate
+from fabricusd.bake.error.relight import NEEDED, relight
+from fabricusd.bake.layout.raster import NOBODY, owners
+from fabricusd.bake.texels.blocks import bake_block
+from fabricusd.bake.texels.maps import REGISTRY
+from fabricusd.bake.texels.sheet import Sheet, texel_start, texel_step
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+from fabricusd.quality.colors import delta_e_2000
+
+Floats = NDArray[np.float64]
+
+PAIRS = 32
+"""Pairs of directions that an error is measured under."""
+
+TEXELS, MEANS = 256, 128
+"""Texels of a swatch that are compared at points, and with their means."""
+
+INSIDE = 12
+"""Samples along a texel's side that its true mean is taken from."""
+
+MARGIN = 1.5
+"""How far above the measured mean the stated bound lies: other pairs see other lobes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SwatchError:
+    """Mean delta E 2000 over texels and pairs, the worst pair's, and the bound that is stated.
+
+    point : against level `weave` at points; texel : against its mean over each texel
+    """
+
+    point: float
+    texel: float
+    worst_pair: float
+    bound: float
+
+
+def pairs_between(count: int, skip: int = 0) -> tuple[Floats, Floats]:
+    """(count, 3) lights and viewers, 10 degrees or more above the cloth; leaves out `skip`."""
+    wi, wo = spread_pairs(8 * (count + skip) + 64)
+    low = math.sin(math.radians(10.0))
+    high = np.flatnonzero((wi[2] > low) & (wo[2] > low))[skip : skip + count]
+    return wi[:, high].T.copy(), wo[:, high].T.copy()
+
+
+def display(radiance: Floats, wi: Floats) -> Floats:
+    """Colours of (n, 3) values, cosine included, under light wi (3,)."""
+    return np.asarray(np.clip(radiance * (math.pi / wi[2]), 0.0, 1.0))
+
+
+def fullest_block(sheet: Sheet) -> tuple[int, int, int]:
+    """(bx, by, lay) of the block near the middle that one lay covers most of."""
+    middle = sheet.across // 2
+    best, found = -1, (middle, middle, 0)
+    order = sorted(
+        ((x, y) for x in range(sheet.across) for y in range(sheet.across)),
+        key=lambda p: abs(p[0] - middle) + abs(p[1] - middle),
+    )
+    for x, y in order[:64]:
+        owner, _ = owners(sheet.corners, sheet.garment.lay, sheet.window(x, y), 0, sheet.resolution)
+        counts = np.bincount(owner[owner != NOBODY], minlength=len(sheet.garment.lays))
+        if counts.max() > best:
+            best, found = int(counts.max()), (x, y, int(counts.argmax()))
+        if best == sheet.block**2:
+            break
+    return found
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Swatch:
+    """The fullest block of a sheet at one mip level, and texels of it that are its lay's.
+
+    block : (bx, by)
+    maps : names to (h, w, channels)
+    """
+
+    sheet: Sheet
+    block: tuple[int, int]
+    lay: int
+    level: int
+    maps: dict[str, NDArray[Any]]
+
+    @property
+    def mine(self) -> NDArray[np.bool_]:
+        """(h, w) where the texels are the lay's."""
+        return np.asarray(self.maps["lay"][..., 0] == self.lay)
+
+    def texels(self, rng: np.random.Generator) -> NDArray[np.int64]:
+        """(TEXELS, 2) rows and columns."""
+        mine = np.argwhere(self.mine)
+        if not len(mine):
+            raise FabricError(
+                self.sheet.garment.name, "covers no texel; bake it at a higher resolution"
+            )
+        return mine[rng.integers(0, len(mine), TEXELS)]
+
+
+def swatch_of(sheet: Sheet, names: Collection[str], level: int = 0) -> Swatch:
+    """A sheet's swatch with the maps `names`, computed as they would be written."""
+    bx, by, lay = fullest_block(sheet)
+    maps = [REGISTRY[name] for name in {*names, "lay"}]
+    found, _, _ = bake_block(sheet, maps, bx, by)
+    return Swatch(
+        sheet=sheet,
+        block=(bx, by),
+        lay=lay,
+        level=level,
+        maps={t.name: found[k][level] for k, t in enumerate(maps)},
+    )
+
+
+def swatch_error(
+    sheet: Sheet, *, level: int = 0, pairs: tuple[Floats, Floats] | None = None, seed: int = 0
+) -> SwatchError:
+    """Error of a sheet at mip `level` with the maps that lose least."""
+    return swatch_errors(sheet, (NEEDED,), level=level, pairs=pairs, seed=seed)[0]
+
+
+def bound_of(worst: float) -> float:
+    """The stated bound where `worst` is the largest mean delta E 2000 of the pairs measured."""
+    return MARGIN * worst
+
+
+def swatch_errors(
+    sheet: Sheet,
+    choices: Sequence[Sequence[str]],
+    *,
+    level: int = 0,
+    pairs: tuple[Floats, Floats] | None = None,
+    seed: int = 0,
+    means: bool = True,
+) -> list[SwatchError]:
+    """Error of a sheet at mip `level` with each of several choices of maps, see `relight.RELIT`.
+
+    means : False measures at points alone, which is quick, and leaves the rest 0
+    """
+    swatch = swatch_of(sheet, {name for names in choices for name in names}, level)
+    rng = np.random.default_rng(seed)
+    chosen = swatch.texels(rng)
+    step = texel_step(sheet, swatch.lay, 1 << level)
+    start = texel_start(sheet, swatch.lay, *(k * sheet.block for k in swatch.block))
+    corner = chosen[:, None, ::-1]
+    points = start + (corner + rng.random((TEXELS, 1, 2))) @ step.T
+    strata = np.stack(np.meshgrid(np.arange(INSIDE), np.arange(INSIDE)), axis=-1).reshape(-1, 2)
+    inside = (strata + rng.random((MEANS, INSIDE**2, 2))) / INSIDE
+    areas = start + (corner[:MEANS] + inside) @ step.T
+    texels = [{n: swatch.maps[n][chosen[:, 0], chosen[:, 1]] for n in names} for names in choices]
+    fabric = sheet.garment.lays[swatch.lay].fabric
+    lit = pairs or pairs_between(PAIRS)
+    at_points = compared(texels, fabric, points, lit)
+    of_texels = compared(texels, fabric, areas, lit) if means else np.zeros_like(at_points)
+    return [
+        SwatchError(
+            point=float(point.mean()),
+            texel=float(texel.mean()),
+            worst_pair=float(texel.max()),
+            bound=bound_of(float(texel.max())),
+        )
+        for point, texel in zip(at_points, of_texels, strict=True)
+    ]
+
+
+def compared(
+    choices: Sequence[dict[str, NDArray[Any]]],
+    fabric: Fabric,
+    weave: Floats,
+    pairs: tuple[Floats, Floats],
+) -> Floats:
+    """(choices, pairs) mean delta E of maps (n, ...) against places (m, samples, 2), m <= n."""
+    errors = np.zeros((len(choices), len(pairs[0])))
+    n, samples = weave.shape[:2]
+    for k, (wi, wo) in enumerate(zip(*pairs, strict=True)):
+        true = evaluate(
+            fabric, np.repeat(wi[None], n * samples, axis=0), wo, weave.reshape(-1, 2), "weave"
+        ).reshape(n, samples, 3)
+        mean = display(true.mean(axis=1), wi)
+        for choice, texels in enumerate(choices):
+            got = relight({name: a[:n] for name, a in texels.items()}, fabric, wi, wo)
+            errors[choice, k] = delta_e_2000(display(got, wi), mean).mean()
+    return errors

@@ -1,0 +1,1 @@
+"""Where texels lie: garments, UVs, tiles, tangents."""

@@ -1,0 +1,1 @@
+"""What a texel holds: layers, maps, encodings."""

@@ -1,0 +1,98 @@
+"""What a sample adds to the planes, by its thread and tangent angle: all but height and light.
+
+Rows of numbers that lie side by side are added by the vector unit; worked out for each sample, they
+took twice as long.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.appearance.weave.coverage import WARP
+from fabricusd.appearance.weave.curve import height_at
+from fabricusd.appearance.weave.quadrature import CELLS, Rule, curve_nodes
+from fabricusd.bake.texels import planes as p
+from fabricusd.bake.texels.reflectance import ANGLES, reflectance_table
+from fabricusd.fabric import PILE_ANGLE, Fabric
+
+STEPS = 721
+"""Angles from -90 to 90 degrees, a quarter of a degree apart: a tenth of the narrowest lobe."""
+
+FINE = Rule(CELLS, math.radians(0.1))
+"""Tangent angles as they lie along the curves."""
+
+HEIGHTS = 1025
+"""Places that the height along a run is kept at, linear between."""
+
+
+def steepness(fabric: Fabric) -> NDArray[np.float64]:
+    """(2,) |tangent angle| [rad] that parts each set's angles into a gentle and a steep half.
+
+    Where the angles on either side vary least about their mean: spreads are then narrow against
+    the lobes, and it matters little how the angles lie inside them.
+    """
+    nodes = curve_nodes(fabric, FINE)
+    found = np.zeros(2)
+    for which in range(2):
+        mine = slice(0, nodes.warp_start) if which != WARP else slice(nodes.warp_start, None)
+        angle, weight = np.abs(nodes.psi0[mine]), nodes.weight[mine]
+        best = math.inf
+        for border in np.linspace(0.0, 0.5 * math.pi, 91):
+            total = 0.0
+            for side in (angle <= border, angle > border):
+                w = weight[side]
+                if w.sum() > 0:
+                    mean = (w @ angle[side]) / w.sum()
+                    total += float(w @ (angle[side] - mean) ** 2)
+            if total < best - 1e-12:
+                best, found[which] = total, border
+    return found
+
+
+def part_of(psi: NDArray[np.float64], split: float) -> NDArray[np.int64]:
+    """Part of each angle [rad]: falling gently or steeply, rising gently or steeply."""
+    return 2 * (psi < 0) + (np.abs(psi) > split)
+
+
+def angle_rows(fabric: Fabric) -> NDArray[np.float32]:
+    """(2, k, STEPS, LIT) planes before LIT, by thread set (weft, warp), thread type and angle.
+
+    An upright tangent, as pile has, counts as one of PILE_ANGLE: its own is no number.
+    """
+    psi = np.linspace(-0.5 * math.pi, 0.5 * math.pi, STEPS)
+    rows = np.zeros((2, len(fabric.threads), STEPS, p.LIT))
+    slope = -np.tan(np.clip(psi, -PILE_ANGLE, PILE_ANGLE))
+    split, reflected = steepness(fabric), reflectance_table(fabric)
+    known = np.linspace(-0.5 * math.pi, 0.5 * math.pi, ANGLES)
+    for which in range(2):
+        part = p.PARTS * which + part_of(psi, split[which])
+        # A thread is a cylinder: across it every normal is there, along it the lobe's width.
+        along = 1 if which == WARP else 0
+        for kind, thread in enumerate(fabric.thread_list):
+            row = rows[which, kind]
+            row[:, p.COVER] = 1.0
+            at = np.arange(STEPS)
+            row[at, p.SHARE + part] = 1.0
+            row[at, p.ANGLE + part] = psi
+            row[at, p.ANGLE_2 + part] = psi * psi
+            row[:, p.TINT + 3 * which : p.TINT + 3 * which + 3] = thread.albedo
+            row[:, p.SLOPE + along] = slope
+            row[:, p.SLOPE_2 + along] = slope * slope
+            row[:, p.LOBE_2 + along] = min(thread.gamma_surface**2, 1.0)
+            row[:, p.LOBE_2 + 1 - along] = 1.0
+            surface, volume, fuzz = (
+                np.interp(psi, known, reflected[which, kind, :, c]) for c in range(3)
+            )
+            row[:, p.SURFACE], row[:, p.FUZZ] = surface, fuzz
+            row[:, p.VOLUME : p.VOLUME + 3] = volume[:, None] * np.array(thread.albedo)
+            row[:, p.FRESNEL] = ((thread.ior - 1.0) / (thread.ior + 1.0)) ** 2
+    return rows.astype(np.float32)
+
+
+def height_rows(fabric: Fabric) -> NDArray[np.float32]:
+    """(k, HEIGHTS) height of each type's curve, in run lengths, at even places of the run."""
+    places = np.linspace(0.0, 1.0, HEIGHTS)
+    return np.stack([height_at(t.curve, places) for t in fabric.thread_list]).astype(np.float32)

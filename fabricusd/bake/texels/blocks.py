@@ -1,0 +1,86 @@
+"""One block of a texture set: its texels at every level that fits inside the block.
+
+Blocks are computed in any order and do not know one another, so memory is flat in the resolution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.bake.layout.raster import NOBODY, owners
+from fabricusd.bake.texels.layers import Layer, Place, layer_of
+from fabricusd.bake.texels.maps import TextureMap
+from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.sheet import Sheet
+
+Layers = Mapping[int, Layer]
+"""By number of the lay."""
+
+
+def layers_of(sheet: Sheet, bx: int, by: int) -> Iterator[Layers]:
+    """The layers of a block, level by level from the finest."""
+    window = sheet.window(bx, by)
+    owner, _ = owners(sheet.corners, sheet.garment.lay, window, sheet.margin, sheet.resolution)
+    layers: Layers = {
+        int(k): layer_of(
+            Place(sheet=sheet, lay=int(k), window=window), (owner == k).astype(np.float32)
+        )
+        for k in np.unique(owner)
+        if k != NOBODY
+    }
+    yield layers
+    for _ in range(1, sheet.levels):
+        layers = {k: layer.halved() for k, layer in layers.items()}
+        yield layers
+
+
+def bake_block(
+    sheet: Sheet, maps: Sequence[TextureMap], bx: int, by: int
+) -> tuple[list[list[NDArray[Any]]], NDArray[np.float32], NDArray[np.float32]]:
+    """Levels of every map (h, w, c) in a block, and the block's `top`.
+
+    Returns ([map][level] arrays, planes, owned share).
+    """
+    found: list[list[NDArray[Any]]] = [[] for _ in maps]
+    layers: Layers = {}
+    for level, layers in enumerate(layers_of(sheet, bx, by)):
+        for k, one in enumerate(maps):
+            found[k].append(composed(one, layers, sheet.block >> level))
+    return found, *top(sheet, layers)
+
+
+def top(sheet: Sheet, layers: Layers) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """(lays, PLANES) planes and (lays,) owned share of the one texel that a block shrinks to.
+
+    The levels above it are made from these.
+    """
+    lays = len(sheet.garment.lays)
+    planes, share = np.zeros((lays, PLANES), np.float32), np.zeros(lays, np.float32)
+    for k, layer in layers.items():
+        planes[k], share[k] = layer.planes_at(0, 0), layer.owned[0, 0]
+    return planes, share
+
+
+def composed(one: TextureMap, layers: Layers, size: int) -> NDArray[Any]:
+    """(size, size, channels) of a map, each texel from the lay that owns most of it."""
+    shape = (size, size, len(one.channels))
+    if len(layers) == 1:
+        (only,) = layers.values()
+        if only.owned.min() > 0:
+            return np.ascontiguousarray(only.values(one, None), one.kind).reshape(shape)
+    most = np.zeros((size, size), np.float32)
+    winner = np.full((size, size), NOBODY, np.int32)
+    for k, layer in layers.items():
+        better = layer.owned > most
+        winner[better], most[better] = k, layer.owned[better]
+    out = np.empty(shape, one.kind)
+    out[...] = one.empty
+    for k, layer in layers.items():
+        mine = winner == k
+        if mine.any():
+            out[mine] = layer.values(one, mine)
+    return out

@@ -1,0 +1,211 @@
+"""Texels by where they lie in the repeat: computed once, looked up everywhere.
+
+A lay is one affine map, so all texels of a level span the same stretch of the weave and differ by
+the place of their centre in the repeat alone, their phase. A table holds the texel at each phase of
+a raster, FINEST (or at least COARSEST) steps a texel and PER_THREAD a thread; a texel of the sheet
+takes the one whose phase is nearest. A coarser level is the mean of four texels of the level below,
+read between its phases.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabricusd.appearance.weave.compiled import true_repeat
+from fabricusd.bake.layout.garment import Garment, Lay
+from fabricusd.bake.texels.maps import Texels, TextureMap
+from fabricusd.bake.texels.moments import samples_for, spans_repeats, texels
+from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.recipe import Recipe
+from fabricusd.kernels.real import LEAN
+
+FINEST, COARSEST = 15, 9
+"""Phases along a texel's side: its centre is found within 1/30, at worst 1/18 of a texel. Odd, so
+that the centres of a raster that divides the thread's pitch lie on phases, not between two."""
+
+PER_THREAD = 16
+"""Phases along a thread's pitch, where a texel spans several."""
+
+FEWEST_SAMPLES, MOST_SAMPLES = 8, 32
+"""Along each side of a texel: a table can afford more than a sheet, so that it hardly has noise."""
+
+SAMPLES = 2**22
+"""Of a table, where FEWEST_SAMPLES do not ask for more: a third of a second."""
+
+MOST_PHASES = 2**19
+"""Phases of all tables of a garment: 210 MB, planes and maps."""
+
+WORTH = 0.5
+"""Share of the sheet's own samples that a table may cost at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellLevel:
+    """Texels of one level by phase: entry `b * counts[0] + a` is centred at phase (a, b) + 1/2.
+
+    counts : phases along U and V
+    planes : (PLANES, phases) float32
+    """
+
+    counts: tuple[int, int]
+    planes: NDArray[np.float32]
+    _values: dict[str, NDArray[Any]] = field(default_factory=dict)
+
+    def values(self, one: TextureMap, recipe: Recipe, lay: Lay) -> NDArray[Any]:
+        """(phases, channels) of a map that depends on the planes alone, kept once made."""
+        if one.name not in self._values:
+            texels = Texels.of_planes(self.planes, recipe, lay)
+            self._values[one.name] = np.ascontiguousarray(one.function(texels), one.kind)
+        return self._values[one.name]
+
+
+@dataclass(frozen=True, eq=False)
+class CellTable:
+    """The levels of one lay on one sheet's raster, finest first."""
+
+    levels: tuple[CellLevel, ...]
+
+
+def tables_of(
+    garment: Garment, recipes: Sequence[Recipe], resolution: int, levels: int
+) -> tuple[CellTable | None, ...]:
+    """For each lay its table, None where computing each texel by itself is cheaper.
+
+    Lays that differ by their offset alone share one.
+    """
+    left = MOST_PHASES
+    made: dict[tuple[int, bytes], CellTable | None] = {}
+    for lay, recipe in zip(garment.lays, recipes, strict=True):
+        key = (id(recipe), lay.matrix.tobytes())
+        if key not in made:
+            step = lay.matrix @ np.diag((1.0, -1.0)) / resolution
+            repeat = true_repeat(lay.fabric)
+            raster = affordable_raster(step, repeat, resolution**2, left)
+            made[key] = None
+            if raster is not None:
+                left -= math.prod(raster.counts)
+                made[key] = cell_table(recipe, step, repeat, raster, levels)
+    return tuple(
+        made[id(r), lay.matrix.tobytes()] for lay, r in zip(garment.lays, recipes, strict=True)
+    )
+
+
+class Raster(NamedTuple):
+    """How a table is laid out: phases a texel, phases along U and V, samples a texel's side."""
+
+    steps: int
+    counts: tuple[int, int]
+    side: int
+
+
+def affordable_raster(
+    step: NDArray[np.float64], repeat: tuple[int, int], texels: int, most: int
+) -> Raster | None:
+    """The finest raster; None where `texels` texels cost less than any table of `most` phases."""
+    worth = WORTH * texels * max(samples_for(step, repeat), 1) ** 2
+    for steps in (FINEST, COARSEST):
+        counts = phase_counts(step, repeat, steps)
+        phases = math.prod(counts)
+        side = min(max(math.isqrt(int(min(worth, SAMPLES) / phases)), FEWEST_SAMPLES), MOST_SAMPLES)
+        if phases <= most and phases * side**2 <= worth:
+            return Raster(steps, counts, side)
+    return None
+
+
+def phase_counts(step: NDArray[np.float64], repeat: tuple[int, int], steps: int) -> tuple[int, int]:
+    """Phases along U and V, `steps` a texel; one where a texel takes the repeat's mean."""
+    if spans_repeats(step, repeat):
+        return 1, 1
+    apart = np.minimum(np.abs(step).sum(axis=1) / steps, 1.0 / PER_THREAD)
+    return math.ceil(repeat[0] / apart[0]), math.ceil(repeat[1] / apart[1])
+
+
+def cell_table(
+    recipe: Recipe,
+    step: NDArray[np.float64],
+    repeat: tuple[int, int],
+    raster: Raster,
+    levels: int,
+) -> CellTable:
+    """Texels that span `step` (2, 2) threads at each phase of the repeat, and coarser ones."""
+    found = [CellLevel(raster.counts, _finest(recipe, step, repeat, raster))]
+    for _ in range(1, levels):
+        counts = phase_counts(2.0 * step, repeat, raster.steps)
+        found.append(CellLevel(counts, _coarser(found[-1], step, repeat, counts, recipe)))
+        step = 2.0 * step
+    return CellTable(tuple(found))
+
+
+def _finest(
+    recipe: Recipe, step: NDArray[np.float64], repeat: tuple[int, int], raster: Raster
+) -> NDArray[np.float32]:
+    """(PLANES, phases) from samples of the weave."""
+    counts = raster.counts
+    planes = np.empty((PLANES, counts[1], counts[0]), np.float32)
+    apart = np.diag(np.array(repeat) / np.array(counts))
+    start = apart @ np.full(2, 0.5) - step @ np.full(2, 0.5)
+    side = 0 if spans_repeats(step, repeat) else raster.side
+    texels(
+        recipe, apart, step, start, (0, 0), np.zeros(counts[::-1], np.int32), 0, side,
+        np.empty(PLANES, np.float32), planes,
+    )  # fmt: skip
+    return planes.reshape(PLANES, -1)
+
+
+def _coarser(
+    finer: CellLevel,
+    step: NDArray[np.float64],
+    repeat: tuple[int, int],
+    counts: tuple[int, int],
+    recipe: Recipe,
+) -> NDArray[np.float32]:
+    """(PLANES, phases) as means of four texels of the `finer` level, which span `step`."""
+    planes = np.empty((PLANES, counts[0] * counts[1]), np.float32)
+    if counts == (1, 1):
+        planes[:, 0] = recipe.mean
+        return planes
+    # Places on the finer raster: of this level's first phase, and of four texels around it.
+    scale = np.array(finer.counts) / np.array(repeat)
+    apart = np.array(finer.counts) / np.array(counts)
+    corners = np.array([[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]])
+    starts = (corners @ step.T) * scale + (0.5 * apart - 0.5)
+    taps = [_taps(starts[:, k], apart[k], counts[k], finer.counts[k]) for k in range(2)]
+    below = finer.planes.reshape(PLANES, finer.counts[1], finer.counts[0])
+    _means_of_four(below, *taps[0], *taps[1], planes.reshape(PLANES, counts[1], counts[0]))
+    return planes
+
+
+def _taps(
+    starts: NDArray[np.float64], apart: float, count: int, finer: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32]]:
+    """(4, count) entries before and behind each place of an axis, and the share of the latter."""
+    place = starts[:, None] + apart * np.arange(count)
+    low = np.floor(place)
+    first = np.mod(low, finer).astype(np.int32)
+    return first, (first + 1) % np.int32(finer), (place - low).astype(np.float32)
+
+
+@njit(**LEAN)
+def _means_of_four(  # type: ignore[no-untyped-def]
+    finer, left, right, s, upper, lower, t, out
+):
+    """out[:, b, a]: mean over k of `finer` between left, right [k, a] and upper, lower [k, b]."""
+    R = np.float32
+    for p in range(out.shape[0]):
+        for b in range(out.shape[1]):
+            for a in range(out.shape[2]):
+                out[p, b, a] = R(0)
+            for k in range(left.shape[0]):
+                j, n, f = upper[k, b], lower[k, b], t[k, b]
+                for a in range(out.shape[2]):
+                    i, m, e = left[k, a], right[k, a], s[k, a]
+                    first = finer[p, j, i] + e * (finer[p, j, m] - finer[p, j, i])
+                    second = finer[p, n, i] + e * (finer[p, n, m] - finer[p, n, i])
+                    out[p, b, a] += R(0.25) * (first + f * (second - first))

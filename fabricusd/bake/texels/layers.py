@@ -1,0 +1,289 @@
+"""A square of texels as one lay of a fabric sees it, level by level.
+
+Two layers with the same face: one computes every texel, the other looks texels up by their phase
+and computes those alone that the layout's border cuts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabricusd.appearance.weave.compiled import true_repeat
+from fabricusd.appearance.weave.lookup import find
+from fabricusd.bake.texels import moments as m
+from fabricusd.bake.texels.cell_table import CellLevel, CellTable
+from fabricusd.bake.texels.maps import Texels, TextureMap
+from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.sheet import Sheet, Window, texel_start, texel_step
+from fabricusd.kernels.real import LEAN
+
+Planes = NDArray[np.float32]
+
+LOOKED_UP = -1
+"""Instead of a column of own planes: the table holds the texel."""
+
+NONE: Planes = np.empty((PLANES, 0), np.float32)
+
+
+class Layer(Protocol):
+    """Texels of one lay at one level. owned : (h, w) float32 - share of each that is the lay's."""
+
+    owned: NDArray[np.float32]
+
+    def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
+        """(n, channels) of a map, of the texels in `mine` (h, w), or of all."""
+
+    def halved(self) -> Layer:
+        """The next coarser level."""
+
+    def planes_at(self, j: int, i: int) -> Planes:
+        """(PLANES,) of one texel."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Centres:
+    """What lies at the texels' centres: weave coordinates (h, w, 2) modulo the repeat, set and
+    thread type (h, w) there."""
+
+    weave: NDArray[np.float64]
+    sets: NDArray[np.uint8]
+    threads: NDArray[np.int32]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Place:
+    """Which texels, and which lay's."""
+
+    sheet: Sheet
+    lay: int
+    window: Window
+    level: int = 0
+
+    @property
+    def size(self) -> int:
+        """Texels along a side."""
+        return (self.window[2] - self.window[0]) >> self.level
+
+    def halved(self) -> Place:
+        """The same place one level coarser."""
+        return Place(sheet=self.sheet, lay=self.lay, window=self.window, level=self.level + 1)
+
+    @cached_property
+    def centres(self) -> Centres:
+        """What lies at the texels' centres."""
+        n = self.size
+        found = Centres(
+            weave=np.empty((n, n, 2)),
+            sets=np.empty((n, n), np.uint8),
+            threads=np.empty((n, n), np.int32),
+        )
+        _centres(
+            self.sheet.recipes[self.lay].cloth, *self._raster(), found.weave, found.sets,
+            found.threads,
+        )  # fmt: skip
+        return found
+
+    def phases(self, counts: tuple[int, int]) -> NDArray[np.int32]:
+        """(h, w) entries of a table with `counts` phases along U and V."""
+        found = np.empty((self.size, self.size), np.int32)
+        _phases(*self._raster(), *counts, found)
+        return found
+
+    def _raster(self) -> tuple[NDArray[np.float64], ...]:
+        """(2,) weave coordinates of the first texel's corner, (2, 2) step, (2,) repeat."""
+        return (
+            texel_start(self.sheet, self.lay, *self.window[:2]),
+            texel_step(self.sheet, self.lay, 1 << self.level),
+            np.array(true_repeat(self.sheet.garment.lays[self.lay].fabric), np.float64),
+        )
+
+    def texels(self, planes: Planes, mine: NDArray[np.bool_] | None) -> Texels:
+        """What a map is a function of. planes : (PLANES, n) of the texels in `mine`, or of all"""
+        lay = self.sheet.garment.lays[self.lay]
+        chosen: Any = slice(None) if mine is None else mine
+        return Texels(
+            planes=planes,
+            usual=self.sheet.recipes[self.lay].mean,
+            along=lay.along,
+            weave=self.centres.weave[chosen].reshape(-1, 2),
+            hit=(self.centres.sets[chosen].ravel(), self.centres.threads[chosen].ravel()),
+            types=len(lay.fabric.threads),
+            lay=self.lay,
+        )
+
+
+class ComputedLayer:
+    """Every texel has planes of its own, (PLANES, h, w)."""
+
+    def __init__(self, place: Place, planes: Planes, owned: NDArray[np.float32]) -> None:
+        self.place, self.planes, self.owned = place, planes, owned
+
+    @classmethod
+    def finest(cls, place: Place, owned: NDArray[np.float32]) -> ComputedLayer:
+        """Planes from samples of the weave, where `owned` is not 0."""
+        sheet, lay = place.sheet, place.lay
+        planes = np.zeros((PLANES, *owned.shape), np.float32)
+        step = texel_step(sheet, lay)
+        side = m.samples_for(step, true_repeat(sheet.garment.lays[lay].fabric))
+        start = texel_start(sheet, lay, *place.window[:2])
+        m.texels(
+            sheet.recipes[lay], step, step, start, place.window[:2], owned.astype(np.int32), 1,
+            side, np.empty(PLANES, np.float32), planes,
+        )  # fmt: skip
+        return cls(place, planes, owned)
+
+    def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
+        """(n, channels) of a map."""
+        planes = self.planes.reshape(PLANES, -1) if mine is None else self.planes[:, mine]
+        return one.function(self.place.texels(planes, mine))
+
+    def halved(self) -> ComputedLayer:
+        """The next coarser level."""
+        return ComputedLayer(self.place.halved(), *m.halve(self.planes, self.owned))
+
+    def planes_at(self, j: int, i: int) -> Planes:
+        """(PLANES,) of one texel."""
+        return self.planes[:, j, i]
+
+
+class TableLayer:
+    """Texels looked up by phase; those that are owned in part have planes of their own.
+
+    own : (PLANES, n) - of the texels whose owned share is neither 0 nor 1, row by row
+    """
+
+    def __init__(
+        self, place: Place, table: CellTable, owned: NDArray[np.float32], own: Planes = NONE
+    ) -> None:
+        self.place, self.table, self.owned, self.own = place, table, owned, own
+
+    @cached_property
+    def phases(self) -> NDArray[np.int32]:
+        """(h, w) entries of the table."""
+        return self.place.phases(self.cell.counts)
+
+    @cached_property
+    def rows(self) -> NDArray[np.int32]:
+        """(h, w) columns of `own`, LOOKED_UP where a texel has none."""
+        return numbered(cut_texels(self.owned))
+
+    @property
+    def cell(self) -> CellLevel:
+        """The table's level."""
+        return self.table.levels[self.place.level]
+
+    def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
+        """(n, channels) of a map."""
+        if one.exact:
+            return one.function(self.place.texels(self.own, mine))
+        lay, sheet = self.place.lay, self.place.sheet
+        chosen: Any = slice(None) if mine is None else mine
+        known = self.cell.values(one, sheet.recipes[lay], sheet.garment.lays[lay])
+        found = _gathered(known, self.phases[chosen].ravel())
+        if self.own.shape[1]:
+            rows = self.rows[chosen].ravel()
+            cut = rows != LOOKED_UP
+            texels = Texels.of_planes(
+                self.own[:, rows[cut]], sheet.recipes[lay], sheet.garment.lays[lay]
+            )
+            found[cut] = one.function(texels)
+        return found
+
+    def halved(self) -> TableLayer:
+        """The next coarser level."""
+        owned = shares(self.owned, 1)
+        places = np.argwhere(cut_texels(owned))
+        own = np.empty((PLANES, len(places)), np.float32)
+        if len(places):
+            _cut_planes(places, self.owned, self.rows, self.own, self.phases, self.cell.planes, own)
+        return TableLayer(self.place.halved(), self.table, owned, own)
+
+    def planes_at(self, j: int, i: int) -> Planes:
+        """(PLANES,) of one texel."""
+        row = self.rows[j, i]
+        if row != LOOKED_UP:
+            return self.own[:, row]
+        return self.cell.planes[:, self.phases[j, i]]
+
+
+def layer_of(place: Place, owned: NDArray[np.float32]) -> Layer:
+    """The finest layer of a lay. owned : (h, w) float32, 1 where it lies and 0 elsewhere"""
+    table = place.sheet.tables[place.lay]
+    if table is None:
+        return ComputedLayer.finest(place, owned)
+    return TableLayer(place, table, owned)
+
+
+def _gathered(known: NDArray[Any], phases: NDArray[np.int32]) -> NDArray[Any]:
+    """(n, channels) rows of `known` (phases, channels), a row copied as one number."""
+    channels = known.shape[1]
+    packed = known.view(np.dtype((np.void, known.itemsize * channels))).ravel()
+    return packed.take(phases).view(known.dtype).reshape(-1, channels)
+
+
+def shares(owned: NDArray[np.float32], levels: int) -> NDArray[np.float32]:
+    """(h, w) owned shares so many levels coarser; exact, being multiples of a power of 1/4."""
+    n, size = owned.shape[0] >> levels, 1 << levels
+    return owned.reshape(n, size, n, size).mean(axis=(1, 3), dtype=np.float32)
+
+
+def cut_texels(owned: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Where a texel is owned in part."""
+    return (owned > 0) & (owned < 1)
+
+
+def numbered(cut: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """(h, w) number of each texel in `cut`, row by row, LOOKED_UP elsewhere."""
+    rows = np.full(cut.shape, LOOKED_UP, np.int32)
+    rows[cut] = np.arange(np.count_nonzero(cut))
+    return rows
+
+
+@njit(**LEAN)
+def _phases(start, step, repeat, along, down, out):  # type: ignore[no-untyped-def]
+    """Phases, `along` of them along U and `down` along V, of texels; see `_centres`."""
+    for j in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            u = (start[0] + step[0, 0] * (i + 0.5) + step[0, 1] * (j + 0.5)) / repeat[0]
+            v = (start[1] + step[1, 0] * (i + 0.5) + step[1, 1] * (j + 0.5)) / repeat[1]
+            a = np.int32((u - np.floor(u)) * along)
+            b = np.int32((v - np.floor(v)) * down)
+            out[j, i] = min(b, down - 1) * along + min(a, along - 1)
+
+
+@njit(**LEAN)
+def _centres(cloth, start, step, repeat, weave, sets, threads):  # type: ignore[no-untyped-def]
+    """Fill what `Centres` holds; start, step as `moments.texels`, repeat (2,) float64."""
+    for j in range(sets.shape[0]):
+        for i in range(sets.shape[1]):
+            u = start[0] + step[0, 0] * (i + 0.5) + step[0, 1] * (j + 0.5)
+            v = start[1] + step[1, 0] * (i + 0.5) + step[1, 1] * (j + 0.5)
+            u -= repeat[0] * np.floor(u / repeat[0])
+            v -= repeat[1] * np.floor(v / repeat[1])
+            weave[j, i, 0], weave[j, i, 1] = u, v
+            sets[j, i], threads[j, i], _, _, _, _ = find(np.float32, cloth, u, v)
+
+
+@njit(**LEAN)
+def _cut_planes(places, owned, rows, own, phases, table, out):  # type: ignore[no-untyped-def]
+    """Planes of texels (n, 2) from what is owned of their four texels one level finer."""
+    R = np.float32
+    for k in range(places.shape[0]):
+        weight = R(0)
+        for p in range(out.shape[0]):
+            out[p, k] = R(0)
+        for q in range(4):
+            j, i = 2 * places[k, 0] + q // 2, 2 * places[k, 1] + q % 2
+            share, row = owned[j, i], rows[j, i]
+            weight += share
+            for p in range(out.shape[0]):
+                value = own[p, row] if row >= 0 else table[p, phases[j, i]]
+                out[p, k] += share * value
+        for p in range(out.shape[0]):
+            out[p, k] /= weight

@@ -1,0 +1,222 @@
+"""What every map is made of: means over a texel of what the weave shows there.
+
+A plane of moments is linear: the mean of four texels' planes is the plane of the texel that holds
+them. So mip levels are means of planes, and each map is computed from the planes of its own level;
+that is why a slope, a variance or a direction is right at every level. Tangent angles and slopes
+carry second moments, after [Olano2010]; horizons the mean of the squared sine, which is the share
+of a cosine-weighted sky that they hide.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabricusd.appearance.shadow.methods import lit
+from fabricusd.appearance.weave.coverage import GAP, WARP
+from fabricusd.appearance.weave.lookup import crown_on, find, wrap
+from fabricusd.bake.texels.angle_rows import HEIGHTS, STEPS
+from fabricusd.bake.texels.planes import AZIMUTHS, HEIGHT, HORIZON, LIT, PLANES, SLOPE, SLOPE_2
+from fabricusd.kernels.real import INLINE, LEAN
+
+ROUNDEST = 0.95
+"""Place across a thread beyond which its round gets no steeper: at its edge the slope is infinite,
+and its square has no mean."""
+
+WHOLE = 2.0
+"""Repeats that a texel must span along both axes before it takes the repeat's mean. What it would
+show besides is how the repeat beats against the texel, which is moire."""
+
+MOST_SAMPLES = 8
+"""Along each side of a texel."""
+
+
+def samples_for(step: NDArray[np.float64], repeat: tuple[int, int]) -> int:
+    """Samples along each side of a texel that spans `step` (2, 2) threads; 0 to take the mean.
+
+    Three to a thread, from four to MOST_SAMPLES.
+    """
+    if spans_repeats(step, repeat):
+        return 0
+    span = float(np.abs(step).sum(axis=1).max())
+    return int(min(max(math.ceil(3.0 * span), 4), MOST_SAMPLES))
+
+
+def spans_repeats(step: NDArray[np.float64], repeat: tuple[int, int]) -> bool:
+    """Whether a texel that spans `step` (2, 2) threads takes the repeat's mean."""
+    return bool((np.abs(step).sum(axis=1) >= WHOLE * np.array(repeat)).all())
+
+
+@njit(**LEAN)
+def texels(  # type: ignore[no-untyped-def]
+    made, apart, step, start, corner, owner, mine, side, sums, out
+):
+    """Planes of the texels that are owned by `mine`, into out (PLANES, h, w); others stay.
+
+    apart : (2, 2) float64 - threads from a texel to the next: columns for right and for down
+    step : (2, 2) float64 - threads that a texel spans; as `apart`, but where texels overlap
+    start : (2,) float64 - weave coordinates of the first texel's outer corner
+    corner : (x, y) of the first texel on its sheet
+    side : samples along each side of a texel, 0 to take the repeat's mean
+    sums : (PLANES,) float32 - room to add samples up in
+
+    A sample lies anywhere in its square of a texel, by a hash of the texel's place on the sheet:
+    a regular raster would see a weave of the same pitch wrongly, and alike in all texels.
+    """
+    R = np.float32
+    height, width = owner.shape
+    for j in range(height):
+        for i in range(width):
+            if owner[j, i] != mine:
+                continue
+            if side == 0:
+                for p in range(PLANES):
+                    out[p, j, i] = made.mean[p]
+                continue
+            for p in range(PLANES):
+                sums[p] = R(0)
+            seed = _mixed(np.uint64(corner[0] + i) << np.uint64(32) | np.uint64(corner[1] + j))
+            left = start[0] + apart[0, 0] * i + apart[0, 1] * j
+            top = start[1] + apart[1, 0] * i + apart[1, 1] * j
+            for b in range(side):
+                for a in range(side):
+                    seed = _mixed(seed + np.uint64(0x9E3779B97F4A7C15))
+                    x = (a + (seed >> np.uint64(32)) * 2.0**-32) / side
+                    y = (b + (seed & np.uint64(0xFFFFFFFF)) * 2.0**-32) / side
+                    u = left + step[0, 0] * x + step[0, 1] * y
+                    v = top + step[1, 0] * x + step[1, 1] * y
+                    _add(made, u, v, sums)
+            share = R(1.0 / (side * side))
+            for p in range(PLANES):
+                out[p, j, i] = sums[p] * share
+
+
+@njit(**LEAN)
+def threads_under(cloth, weave, sets, threads):  # type: ignore[no-untyped-def]
+    """Set and thread type under weave coordinates (n, 2) float64, into sets (n,), threads (n,)."""
+    for k in range(weave.shape[0]):
+        sets[k], threads[k], _, _, _, _ = find(np.float32, cloth, weave[k, 0], weave[k, 1])
+
+
+@njit(**INLINE)
+def _mixed(x):  # type: ignore[no-untyped-def]
+    """A hash of 64 bits to 64 bits, [Steele2014]."""
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
+
+
+@njit(**INLINE)
+def _add(made, u, v, out):  # type: ignore[no-untyped-def]
+    """Add what is seen at weave coordinates (u, v) to a texel's sums."""
+    R = np.float32
+    which, thread, s, w, angle, length = find(R, made.cloth, u, v)
+    if which == GAP:
+        if made.light[2] > R(0):
+            out[LIT] += R(1)
+        return
+    step = int((angle * R(1.0 / math.pi) + R(0.5)) * R(STEPS - 1) + R(0.5))
+    step = min(max(step, 0), STEPS - 1)
+    for p in range(LIT):
+        out[p] += made.rows[which, thread, step, p]
+    place = s * R(HEIGHTS - 1)
+    low = min(int(place), HEIGHTS - 2)
+    rise = made.heights[thread, low]
+    rise += (made.heights[thread, low + 1] - rise) * (place - R(low))
+    lift = made.cloth.half_thickness[which, thread]
+    if made.rounded != 0:
+        lift = crown_on(R, made.cloth, which, thread, w)
+        _add_round(made, which, thread, w, step, out)
+    out[HEIGHT] += length * rise + lift
+    if made.light[2] > R(0):
+        out[LIT] += lit(
+            R, made.cloth, made.shadow, u, v, which, thread, s, w, length,
+            made.light[0], made.light[1], made.light[2],
+        )  # fmt: skip
+    _add_horizon(made, u, v, which, out)
+
+
+@njit(**INLINE)
+def _add_round(made, which, thread, w, step, out):  # type: ignore[no-untyped-def]
+    """Add the slope across a round thread, at `w` in [-1, 1] across its width."""
+    R = np.float32
+    edge = min(max(w, R(-ROUNDEST)), R(ROUNDEST))
+    share = made.cloth.width[which] if made.cloth.width[which] > R(0) else R(1)
+    reach = R(0.5) * share * made.cloth.pitch[which]
+    steep = made.cloth.half_thickness[which, thread] / reach
+    across = -edge / R(math.sqrt(R(1) - edge * edge)) * steep
+    along = 1 if which == WARP else 0
+    # w grows along -U on the warp, along +V on the weft.
+    across = -across if which == WARP else across
+    out[SLOPE + 1 - along] += across
+    out[SLOPE_2 + 1 - along] += across * across
+    out[SLOPE_2 + 2] += across * made.rows[which, thread, step, SLOPE + along]
+
+
+@njit(**INLINE)
+def _add_horizon(made, u, v, which, out):  # type: ignore[no-untyped-def]
+    """The nearest texel of the horizon table: the mean over a texel's samples interpolates."""
+    R = np.float32
+    table = made.table
+    if table.shape[5] != AZIMUTHS:
+        return
+    end, pick = math.floor(u), math.floor(v)
+    a, b = wrap(end, table.shape[0]), wrap(pick, table.shape[1])
+    p, q = R(u - end), R(v - pick)
+    cloth = made.cloth
+    top = int(cloth.grid[wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])])
+    if top == WARP:
+        p, q = q, p
+    width = cloth.width[top]
+    slot = 0
+    if which == top:
+        along, across = p, (q - R(0.5)) / width + R(0.5)
+    else:
+        slot = 1
+        seen = q if q < R(0.5) else q - width
+        along, across = seen / (R(1) - width), (p - R(0.5)) / cloth.under_width + R(0.5)
+    row = min(max(int(along * table.shape[3]), 0), table.shape[3] - 1)
+    column = min(max(int(across * table.shape[4]), 0), table.shape[4] - 1)
+    for k in range(AZIMUTHS):
+        sine = R(table[a, b, slot, row, column, k]) * R(1.0 / 255.0)
+        out[HORIZON + k] += sine * sine
+
+
+def halve(
+    planes: NDArray[np.float32], owned: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """The next mip level: means of 2 by 2 texels over what of them is owned.
+
+    planes : (p, h, w), owned : (h, w) share of each texel that belongs to the layout
+    """
+    p, h, w = planes.shape
+    half = np.empty((p, h // 2, w // 2), np.float32)
+    share = np.empty((h // 2, w // 2), np.float32)
+    _halve(planes, owned, half, share)
+    return half, share
+
+
+@njit(**LEAN)
+def _halve(planes, owned, half, share):  # type: ignore[no-untyped-def]
+    R = np.float32
+    height, width = share.shape
+    for j in range(height):
+        for i in range(width):
+            share[j, i] = R(0.25) * (
+                (owned[2 * j, 2 * i] + owned[2 * j, 2 * i + 1])
+                + (owned[2 * j + 1, 2 * i] + owned[2 * j + 1, 2 * i + 1])
+            )
+    for p in range(planes.shape[0]):
+        for j in range(height):
+            for i in range(width):
+                total = (
+                    planes[p, 2 * j, 2 * i] * owned[2 * j, 2 * i]
+                    + planes[p, 2 * j, 2 * i + 1] * owned[2 * j, 2 * i + 1]
+                ) + (
+                    planes[p, 2 * j + 1, 2 * i] * owned[2 * j + 1, 2 * i]
+                    + planes[p, 2 * j + 1, 2 * i + 1] * owned[2 * j + 1, 2 * i + 1]
+                )
+                half[p, j, i] = R(0.25) * total / max(share[j, i], R(1e-20))

@@ -1,0 +1,106 @@
+"""How much a bit of thread reflects in the cloth, by its tangent angle: the maps' colours.
+
+Reflectance is the integral of level `weave` over all lights, for a viewer straight above. Its mean
+over the repeat is that of level `far`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.surface import points_all
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+
+ANGLES = 181
+"""Tangent angles from -90 to 90 degrees, one a degree: the narrowest published lobe has 2.5."""
+
+COLUMNS = 3
+"""Surface term, volume term without `A`, and what both gain at a grazing view."""
+
+GRAZING = math.radians(75.0)
+"""View that the fuzz is measured at: farther out the published models have hardly any light."""
+
+_POLAR, _AZIMUTHAL, _VIEWS = 24, 48, 4
+
+
+@lru_cache(maxsize=16)
+def reflectance_table(fabric: Fabric) -> NDArray[np.float64]:
+    """(2, k, ANGLES, COLUMNS) by thread set (weft, warp), thread type and tangent angle.
+
+    Raises FabricError for the `conserving` model.
+    """
+    refuse_conserving(fabric)
+    table = np.zeros((2, len(fabric.threads), ANGLES, COLUMNS))
+    for column, tint in ((0, 0.0), (1, 1.0)):
+        painted = {
+            name: replace(t, albedo=(tint, tint, tint)) for name, t in fabric.threads.items()
+        }
+        tables = surface_tables(replace(fabric, threads=painted))
+        for thread_set in range(2):
+            for thread in range(len(fabric.threads)):
+                above = _reflected(tables, thread_set, thread, 0.0)
+                table[thread_set, thread, :, column] = above
+                if column == 1:
+                    grazing = _reflected(tables, thread_set, thread, GRAZING)
+                    table[thread_set, thread, :, 2] = np.maximum(grazing - above, 0.0)
+    # With A = 1 both terms are there; the volume's own share is the difference.
+    table[..., 1] = np.maximum(table[..., 1] - table[..., 0], 0.0)
+    brightness = np.array([np.mean(t.albedo) for t in fabric.thread_list])
+    table[..., 2] *= np.minimum(brightness, 1.0)[None, :, None]
+    return table
+
+
+def refuse_conserving(fabric: Fabric) -> None:
+    """Raise FabricError where a thread's model is one that the baker does not know."""
+    for name, thread in fabric.threads.items():
+        if fabric.model_of(thread) == "conserving":
+            raise FabricError(
+                f"{fabric.name} {name} model",
+                "is 'conserving', whose light goes from thread to thread and is not baked; it must "
+                "be 'microcylinder' or 'thesis'",
+            )
+
+
+def _reflected(tables: Any, thread_set: int, thread: int, view: float) -> NDArray[np.float64]:
+    """(ANGLES,) reflectance for a viewer `view` [rad] from the normal, mean over azimuths."""
+    x, weight = np.polynomial.legendre.leggauss(_POLAR)
+    z = 0.5 * (x + 1.0)
+    phi = (np.arange(_AZIMUTHAL) + 0.5) * (2.0 * math.pi / _AZIMUTHAL)
+    flat = np.sqrt(1.0 - z * z)
+    wi = np.stack(
+        np.broadcast_arrays(
+            flat[:, None] * np.cos(phi),
+            flat[:, None] * np.sin(phi),
+            np.repeat(z[:, None], len(phi), 1),
+        )
+    ).reshape(3, -1)
+    solid = np.repeat(0.5 * weight * 2.0 * math.pi / _AZIMUTHAL, _AZIMUTHAL)
+    psi0 = np.radians(np.linspace(-90.0, 90.0, ANGLES))
+    turns = 1 if view == 0 else _VIEWS
+    total = np.zeros(ANGLES)
+    for turn in range(turns):
+        azimuth = 2.0 * math.pi * (turn + 0.5) / turns
+        wo = np.array(
+            [math.sin(view) * math.cos(azimuth), math.sin(view) * math.sin(azimuth), math.cos(view)]
+        )
+        n = wi.shape[1]
+        lights = np.ascontiguousarray(np.tile(wi, (1, ANGLES)))
+        out = np.empty_like(lights)
+        sets = np.full(n * ANGLES, thread_set, np.uint8)
+        threads = np.full(n * ANGLES, thread, np.int32)
+        viewers = np.ascontiguousarray(np.repeat(wo[:, None], n * ANGLES, axis=1))
+        real: Any = np.float64
+        points_all(
+            real, tables, False, sets, threads, np.repeat(psi0, n), np.zeros(n * ANGLES), lights,
+            viewers, out,
+        )  # fmt: skip
+        total += (out[0].reshape(ANGLES, n) * solid).sum(axis=1)
+    return total / turns

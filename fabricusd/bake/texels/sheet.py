@@ -1,0 +1,100 @@
+"""One texture of a set: a UDIM tile of a garment at a resolution, cut into blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.appearance.weave.compiled import true_repeat
+from fabricusd.bake.layout.garment import Garment
+from fabricusd.bake.layout.raster import texel_triangles
+from fabricusd.bake.texels.cell_table import CellTable, tables_of
+from fabricusd.bake.texels.recipe import Recipe
+
+SMALLEST, LARGEST = 64, 32768
+"""Texels along a side: beyond it a texture is more than most tools open; use more UDIM tiles."""
+
+BLOCK = 256
+"""Texels along a block's side: 12 MB of planes."""
+
+Window = tuple[int, int, int, int]
+"""(x0, y0, x1, y1): texels of the finest level from x0 to before x1, and so on."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sheet:
+    """One texture of a set: a UDIM tile of a garment at a resolution.
+
+    corners : (m, 3, 2) float64 - the garment's triangles in texels of this tile
+    tables : of each lay, None where its texels are computed one by one
+    """
+
+    garment: Garment
+    recipes: tuple[Recipe, ...]
+    tile: tuple[int, int]
+    number: int
+    resolution: int
+    margin: int
+    corners: NDArray[np.float64]
+    tables: tuple[CellTable | None, ...] = ()
+
+    @property
+    def block(self) -> int:
+        """Texels along a block's side."""
+        return min(BLOCK, self.resolution)
+
+    @property
+    def across(self) -> int:
+        """Blocks along the sheet's side."""
+        return self.resolution // self.block
+
+    @property
+    def levels(self) -> int:
+        """Mip levels inside a block, down to one texel."""
+        return self.block.bit_length()
+
+    def window(self, bx: int, by: int) -> Window:
+        """Texels of a block."""
+        size = self.block
+        return bx * size, by * size, (bx + 1) * size, (by + 1) * size
+
+
+def sheets_of(
+    garment: Garment,
+    recipes: tuple[Recipe, ...],
+    tiles: Mapping[int, tuple[int, int]],
+    resolution: int,
+    margin: int,
+) -> list[Sheet]:
+    """The sheets of a garment's tiles, by UDIM number; they share their tables."""
+    found = [
+        Sheet(
+            garment=garment,
+            recipes=recipes,
+            tile=tile,
+            number=number,
+            resolution=resolution,
+            margin=margin,
+            corners=texel_triangles(garment.uv, tile, resolution),
+        )
+        for number, tile in tiles.items()
+    ]
+    tables = tables_of(garment, recipes, resolution, found[0].levels)
+    return [replace(sheet, tables=tables) for sheet in found]
+
+
+def texel_step(sheet: Sheet, lay: int, scale: int = 1) -> NDArray[np.float64]:
+    """(2, 2) threads that one texel of side `scale` spans: columns for right and for down."""
+    return sheet.garment.lays[lay].matrix @ np.diag((1.0, -1.0)) * (scale / sheet.resolution)
+
+
+def texel_start(sheet: Sheet, lay: int, x: float, y: float) -> NDArray[np.float64]:
+    """(2,) weave coordinates of the texel corner (x, y), reduced modulo the repeat in float64."""
+    one = sheet.garment.lays[lay]
+    uv = np.array(
+        [sheet.tile[0] + x / sheet.resolution, sheet.tile[1] + 1.0 - y / sheet.resolution]
+    )
+    return np.asarray(np.mod(one.matrix @ uv + one.offset, true_repeat(one.fabric)))

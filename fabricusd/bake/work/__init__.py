@@ -1,0 +1,1 @@
+"""How a bake is carried out, kept and gone on with."""

@@ -1,0 +1,169 @@
+"""Computing the blocks of a bake and putting the textures together, on several workers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd import __version__
+from fabricusd.bake.texels.blocks import Layers, composed
+from fabricusd.bake.texels.encoding import FORMATS, encoding_of
+from fabricusd.bake.texels.layers import ComputedLayer, Place
+from fabricusd.bake.texels.maps import TextureMap
+from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.sheet import Sheet
+from fabricusd.bake.work.kept import Kept, kept, read_top
+from fabricusd.bake.work.scratch import Scratch
+from fabricusd.images.files import write_16_bit, write_mip_exr
+from fabricusd.run.workers import Batches
+
+Progress = Callable[[str, int, int], Any]
+"""Told what is counted, how many there are, and how many are done."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Files:
+    """Where textures go and what they are called."""
+
+    folder: Path
+    udim: bool
+    file_format: str
+
+    def path(self, sheet: Sheet, one: TextureMap) -> Path:
+        """A texture: garment, map, and the tile's number where there are tiles."""
+        number = f".{sheet.number}" if self.udim else ""
+        name = f"{sheet.garment.name}.{one.name}{number}{FORMATS[self.file_format]}"
+        return self.folder / name
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Work:
+    """The sheets and maps of one bake, where they are kept and go, and who works on them."""
+
+    scratch: Scratch
+    sheets: Sequence[Sheet]
+    maps: Sequence[TextureMap]
+    files: Files
+    workers: int
+    progress: Progress | None
+
+    def missing(self, sheet: Sheet) -> list[int]:
+        """Maps whose texture of this sheet is not there yet."""
+        paths = (self.files.path(sheet, one) for one in self.maps)
+        return [k for k, path in enumerate(paths) if not self.scratch.is_done(path)]
+
+    def run(self, task: Callable[[int, int], None], count: int, noun: str) -> bool:
+        """`count` jobs of `task`, reported as `noun`; False where interrupted."""
+        report = partial(self.progress, noun, count) if self.progress else None
+        return Batches(self.workers, task).run(count, report)
+
+
+def compute(work: Work) -> bool:
+    """Every block that is not there yet; False where interrupted."""
+    jobs = []
+    for sheet in work.sheets:
+        if work.missing(sheet):
+            jobs += [(sheet, x, y) for y in range(sheet.across) for x in range(sheet.across)]
+    ways = {id(sheet): kept(sheet, work.maps) for sheet in work.sheets}
+
+    def one_block(_: int, k: int) -> None:
+        sheet, x, y = jobs[k]
+        path = work.scratch.block(sheet, x, y)
+        way = ways[id(sheet)]
+        if not way.is_sound(path):
+            way.write(path, x, y)
+
+    return work.run(one_block, len(jobs), "blocks")
+
+
+def assemble(work: Work) -> bool:
+    """Every texture that is not there yet; False where interrupted."""
+    for sheet in work.sheets:
+        todo = work.missing(sheet)
+        if not todo:
+            continue
+        task = partial(_write_texture, work, sheet, todo, uppermost(work.scratch, sheet))
+        if not work.run(task, len(todo), "textures"):
+            return False
+        work.scratch.drop(sheet)
+    return True
+
+
+def _write_texture(
+    work: Work, sheet: Sheet, todo: Sequence[int], upper: Layers, _worker: int, job: int
+) -> None:
+    """One texture, from the blocks and the levels above them."""
+    k = todo[job]
+    files, one, way = work.files, work.maps[k], kept(sheet, work.maps)
+    path, encoding = files.path(sheet, one), None
+    levels: list[Any] = [
+        partial(bands, work.scratch, sheet, way, k, level) for level in range(sheet.levels)
+    ]
+    metadata = {
+        "fabricusd:map": one.name,
+        "fabricusd:meaning": one.meaning,
+        "Software": f"fabricusd {__version__}",
+    }
+    if files.file_format == "exr":
+        metadata["oiio:ColorSpace"] = "lin_rec709" if one.color else "Raw"
+        levels += [partial(_whole, level) for level in upper_levels(one, upper, sheet.across)]
+        write_mip_exr(path, levels, sheet.resolution, one.channels, one.kind, metadata)
+    else:
+        encoding = encoding_of(one, levels[0]())
+        metadata["oiio:ColorSpace"] = "sRGB" if one.color else "Raw"
+        metadata["fabricusd:encoding"] = json.dumps(asdict(encoding))
+        rows = (encoding.encoded(band) for band in levels[0]())
+        write_16_bit(path, rows, sheet.resolution, len(one.channels), metadata)
+    work.scratch.mark_done(path, encoding)
+
+
+def _whole(level: np.ndarray[Any, Any]) -> Any:
+    return iter((level,))
+
+
+def bands(scratch: Scratch, sheet: Sheet, way: Kept, k: int, level: int) -> Iterator[NDArray[Any]]:
+    """Rows of a map's level that lies inside the blocks, from the top, in heights for tiles."""
+    waiting: list[NDArray[Any]] = []
+    for by in range(sheet.across):
+        row = [
+            way.values(scratch.block(sheet, x, by), x, by, k, level) for x in range(sheet.across)
+        ]
+        waiting.append(np.concatenate(row, axis=1))
+        if len(waiting) * (sheet.block >> level) >= 64 or by == sheet.across - 1:
+            yield np.ascontiguousarray(np.concatenate(waiting))
+            waiting = []
+
+
+def uppermost(scratch: Scratch, sheet: Sheet) -> Layers:
+    """Layers of the level at which each block is one texel."""
+    lays, n = len(sheet.garment.lays), sheet.across
+    planes, owned = np.empty((lays, PLANES, n, n), np.float32), np.empty((lays, n, n), np.float32)
+    for by in range(n):
+        for bx in range(n):
+            found = read_top(scratch.block(sheet, bx, by), sheet)
+            planes[:, :, by, bx], owned[:, by, bx] = found
+    window = (0, 0, sheet.resolution, sheet.resolution)
+    return {
+        k: ComputedLayer(
+            Place(sheet=sheet, lay=k, window=window, level=sheet.levels - 1), planes[k], owned[k]
+        )
+        for k in range(lays)
+        if owned[k].any()
+    }
+
+
+def upper_levels(one: TextureMap, layers: Layers, size: int) -> list[NDArray[Any]]:
+    """The levels of a map above the blocks' own, whole; layers : as `uppermost` gives them"""
+    found = []
+    while size > 1:
+        layers = {k: layer.halved() for k, layer in layers.items()}
+        size //= 2
+        found.append(composed(one, layers, size))
+    return found

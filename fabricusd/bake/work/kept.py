@@ -1,0 +1,235 @@
+"""What is kept of a block until the textures are put together.
+
+Of a sheet whose lays all have a table the layout alone is kept, and each texture looks its texels
+up when it is written: that costs less than writing all maps and reading them again. Of any other
+sheet all maps are. Either way a killed bake goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.bake.layout.raster import NOBODY
+from fabricusd.bake.texels.blocks import Layers, bake_block, composed, layers_of, top
+from fabricusd.bake.texels.layers import Place, TableLayer, cut_texels, shares
+from fabricusd.bake.texels.maps import TextureMap
+from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.sheet import Sheet
+from fabricusd.files import whole_file
+
+DIGEST = 16
+"""Bytes of a checksum at a file's end; the block's top is before it."""
+
+MOST = np.float32(1e12)
+"""Greatest value of a map or plane: sums of squares of it are within single precision."""
+
+Floats = NDArray[np.float32]
+
+
+class Kept(Protocol):
+    """How the blocks of one sheet are kept in files, and the maps read from them."""
+
+    @property
+    def bytes_needed(self) -> int:
+        """Of all blocks, at most."""
+
+    def write(self, path: Path, bx: int, by: int) -> None:
+        """Keep a block."""
+
+    def is_sound(self, path: Path) -> bool:
+        """Whether a block's file is there and can be what was written."""
+
+    def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
+        """(h, w, channels) of map `k` in a block."""
+
+
+def kept(sheet: Sheet, maps: Sequence[TextureMap]) -> Kept:
+    """The way that suits a sheet."""
+    if all(table is not None for table in sheet.tables):
+        return KeptLayout(sheet, maps)
+    return KeptValues(sheet, maps)
+
+
+class KeptValues:
+    """All levels of all maps."""
+
+    def __init__(self, sheet: Sheet, maps: Sequence[TextureMap]) -> None:
+        self.sheet, self.maps = sheet, maps
+        self.places = [
+            [
+                (sheet.block >> level) ** 2 * len(one.channels) * np.dtype(one.kind).itemsize
+                for level in range(sheet.levels)
+            ]
+            for one in maps
+        ]
+        ends = np.cumsum([0, *(count for row in self.places for count in row)])
+        self.offsets = ends[:-1].reshape(len(maps), sheet.levels)
+        self.bytes_needed = int(ends[-1]) * sheet.across**2
+
+    def write(self, path: Path, bx: int, by: int) -> None:
+        """Keep a block."""
+        found, planes, share = bake_block(self.sheet, self.maps, bx, by)
+        write_block(path, [*(level for one in found for level in one), planes, share])
+
+    def is_sound(self, path: Path) -> bool:
+        """Whether a block's file is whole."""
+        end = int(self.offsets[-1, -1]) + self.places[-1][-1]
+        size = end + top_bytes(self.sheet) + DIGEST
+        data = sound_data(path, size, size)
+        if data is None:
+            return False
+        parts = [
+            np.frombuffer(data, one.kind, sum(places) // np.dtype(one.kind).itemsize, first)
+            for one, places, first in zip(self.maps, self.places, self.offsets[:, 0], strict=True)
+        ]
+        return all(map(are_values, (*parts, np.frombuffer(data[end:-DIGEST], np.float32))))
+
+    def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
+        """(h, w, channels) of a map."""
+        one, side = self.maps[k], self.sheet.block >> level
+        with path.open("rb") as stream:
+            stream.seek(self.offsets[k, level])
+            data = stream.read(self.places[k][level])
+        return np.frombuffer(data, one.kind).reshape(side, side, len(one.channels))
+
+
+class KeptLayout:
+    """Whose each texel is, and the planes of texels that are owned in part.
+
+    A file holds owners (h, w) int16, one number where all are alike; then of each lay in it, by
+    number, and each level from the second, planes (PLANES, n) of the n cut texels.
+    """
+
+    def __init__(self, sheet: Sheet, maps: Sequence[TextureMap]) -> None:
+        self.sheet, self.maps = sheet, maps
+        self.bytes_needed = 2 * sheet.resolution**2
+
+    def write(self, path: Path, bx: int, by: int) -> None:
+        """Keep a block."""
+        n = self.sheet.block
+        levels = list(layers_of(self.sheet, bx, by))
+        owner = np.full((n, n), NOBODY, np.int16)
+        for k, layer in levels[0].items():
+            owner[layer.owned > 0] = k
+        parts: list[NDArray[Any]] = [owner if np.ptp(owner) else owner[0, :1]]
+        for k in sorted(levels[0]):
+            parts += [
+                layer.own
+                for layer in (one[k] for one in levels[1:])
+                if isinstance(layer, TableLayer)
+            ]
+        write_block(path, [*parts, *top(self.sheet, levels[-1])])
+
+    def is_sound(self, path: Path) -> bool:
+        """Whether a block's file is whole, and its owners are lays of the sheet."""
+        n, lays = self.sheet.block, len(self.sheet.garment.lays)
+        tail = top_bytes(self.sheet) + DIGEST
+        # Lays that share a texel have a texel each below it, so a level has at most n * n parts.
+        planes = 4 * PLANES * n * n * self.sheet.levels
+        data = sound_data(path, 2 + tail, 2 * n * n + planes + tail)
+        if data is None:
+            return False
+        if not are_values(np.frombuffer(data[-tail:-DIGEST], np.float32)):
+            return False
+        if len(data) == 2 + tail:
+            return NOBODY <= int(np.frombuffer(data, np.int16, 1)[0]) < lays
+        if len(data) < 2 * n * n + tail:
+            return False
+        owner = np.frombuffer(data, np.int16, n * n).reshape(n, n)
+        if owner.min() < NOBODY or owner.max() >= lays:
+            return False
+        if len(data) != 2 * n * n + 4 * PLANES * self._cut(owner) + tail:
+            return False
+        return are_values(np.frombuffer(data[2 * n * n : -tail], np.float32))
+
+    def _cut(self, owner: NDArray[np.int16]) -> int:
+        """Texels of all levels and lays that are owned in part."""
+        count = 0
+        for number in np.unique(owner[owner != NOBODY]).tolist():
+            owned = (owner == number).astype(np.float32)
+            for _ in range(1, self.sheet.levels):
+                owned = shares(owned, 1)
+                count += int(np.count_nonzero(cut_texels(owned)))
+        return count
+
+    def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
+        """(h, w, channels) of a map."""
+        return composed(self.maps[k], self._layers(path, bx, by, level), self.sheet.block >> level)
+
+    def _layers(self, path: Path, bx: int, by: int, level: int) -> Layers:
+        n, tail = self.sheet.block, top_bytes(self.sheet) + DIGEST
+        data = path.read_bytes()
+        if len(data) == 2 + tail:
+            number = int(np.frombuffer(data, np.int16, 1)[0])
+            whole = np.broadcast_to(np.float32(1), (n >> level, n >> level))
+            return {} if number == NOBODY else {number: self._layer(number, bx, by, level, whole)}
+        owner = np.frombuffer(data, np.int16, n * n).reshape(n, n)
+        planes = np.frombuffer(data[2 * n * n : -tail], np.float32)
+        found, begin = {}, 0
+        for number in np.unique(owner[owner != NOBODY]).tolist():
+            owned = (owner == number).astype(np.float32)
+            for one in range(self.sheet.levels):
+                count = int(np.count_nonzero(cut_texels(owned))) * PLANES
+                if one == level:
+                    own = planes[begin : begin + count].reshape(PLANES, -1)
+                    found[number] = self._layer(number, bx, by, level, owned, own)
+                begin += count
+                owned = shares(owned, 1) if one + 1 < self.sheet.levels else owned
+        return found
+
+    def _layer(
+        self, number: int, bx: int, by: int, level: int, owned: Floats, *own: Floats
+    ) -> TableLayer:
+        place = Place(sheet=self.sheet, lay=number, window=self.sheet.window(bx, by), level=level)
+        table = self.sheet.tables[number]
+        assert table is not None
+        return TableLayer(place, table, owned, *own)
+
+
+def write_block(path: Path, parts: Sequence[NDArray[Any]]) -> None:
+    """A block's file, whole or not at all, its checksum at the end."""
+    digest = hashlib.blake2b(digest_size=DIGEST)
+    with whole_file(path, durable=False) as temporary, temporary.open("wb") as stream:
+        for part in parts:
+            data = np.ascontiguousarray(part).tobytes()
+            digest.update(data)
+            stream.write(data)
+        stream.write(digest.digest())
+
+
+def sound_data(path: Path, least: int, most: int) -> bytes | None:
+    """What a block's file holds; None where it is not there, its size is not between `least` and
+    `most`, or its checksum is wrong."""
+    try:
+        if not path.is_file() or not least <= path.stat().st_size <= most:
+            return None
+        data = path.read_bytes()
+    except OSError:
+        return None
+    known = hashlib.blake2b(data[:-DIGEST], digest_size=DIGEST).digest()
+    return data if known == data[-DIGEST:] else None
+
+
+def are_values(numbers: NDArray[Any]) -> bool:
+    """Whether all could be values of maps or planes, finite and not out of all bounds."""
+    return bool((np.abs(numbers) <= MOST).all())
+
+
+def top_bytes(sheet: Sheet) -> int:
+    """Bytes of a block's top before its checksum, see `read_top`."""
+    return 4 * len(sheet.garment.lays) * (PLANES + 1)
+
+
+def read_top(path: Path, sheet: Sheet) -> tuple[Floats, Floats]:
+    """(lays, PLANES) planes and (lays,) owned share of the texel that a block shrinks to."""
+    lays = len(sheet.garment.lays)
+    with path.open("rb") as stream:
+        stream.seek(-DIGEST - top_bytes(sheet), 2)
+        values = np.frombuffer(stream.read(top_bytes(sheet)), np.float32)
+    return values[: lays * PLANES].reshape(lays, PLANES), values[lays * PLANES :]

@@ -1,0 +1,1 @@
+"""What every compiled kernel rests on: elementary functions, parts of kernels, the cache."""

@@ -1,0 +1,1 @@
+"""Materials of other renderers fitted to a fabric."""

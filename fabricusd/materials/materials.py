@@ -1,0 +1,207 @@
+"""From a bake folder to the materials that other tools read."""
+
+from __future__ import annotations
+
+import os
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from pxr import Sdf, Tf, Usd, UsdGeom
+
+from fabricusd import __version__
+from fabricusd.bake.manifest import write_json
+from fabricusd.bake.manifest_file import file_in
+from fabricusd.bake.work.lock import locked, refuse_locked
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+from fabricusd.files import remove_partial_files
+from fabricusd.materials.bake_folder import BakeFolder, read_bake_folder
+from fabricusd.materials.networks.surfaces import GRAPHS, MAPS
+from fabricusd.materials.recipes import Progress, Settings, Written, recipes
+from fabricusd.materials.targets.layer import write_baked_look, write_scene_look
+from fabricusd.materials.targets.mtlx import write_mtlx
+from fabricusd.materials.targets.osl import write_osl
+from fabricusd.materials.targets.package import write_usdz
+from fabricusd.materials.targets.paths import asset_path
+from fabricusd.materials.targets.u3m import write_u3m
+from fabricusd.materials.wearers import Dressed, find_wearers
+
+
+def write_materials(
+    bake: str | os.PathLike[str],
+    out: str | os.PathLike[str] | None = None,
+    settings: Settings | None = None,
+    *,
+    scene: str | os.PathLike[str] | None = None,
+    clobber: bool = True,
+    dry_run: bool = False,
+    progress: Progress | None = None,
+) -> Written:
+    """Write a look for a bake: a USD layer, the MaterialX document beside it, and a report.
+
+    bake : the folder that `fabricusd bake` made; it is only read
+    out : the layer, by default `look.usda` in that folder
+    scene : USD scene that was baked, to write the look over its prims; without it the look goes
+        over the baked meshes
+
+    Raises FabricError for a folder without a bake, a layer that fabricusd did not write and would
+    overwrite, a scene that was not baked.
+    """
+    settings = settings or Settings()
+    refuse_locked(Path(bake))
+    folder = read_bake_folder(bake)
+    _check_surfaces(folder, settings)
+    path = Path(out) if out is not None else folder.path / "look.usda"
+    _check_target(path, clobber)
+    _refuse_links(folder.path, path)
+    made = Written()
+    for name, file in folder.missing:
+        made.notes.append(f"{folder.path / file} is missing; {_without(name)}")
+    dressed = find_wearers(Path(scene), folder.garments) if scene is not None else None
+    made.notes += dressed.notes if dressed else ()
+    if dry_run:
+        made.files = [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
+        return made
+    with ExitStack() as locks:
+        for place in _written_folders(path, settings):
+            locks.enter_context(locked(place))
+        remove_partial_files(path.with_name(f"{path.stem}_maps"))
+        _write(folder, path, settings, made, dressed, scene, clobber, progress)
+    return made
+
+
+def _write(
+    folder: BakeFolder,
+    path: Path,
+    settings: Settings,
+    made: Written,
+    dressed: Dressed | None,
+    scene: str | os.PathLike[str] | None,
+    clobber: bool,
+    progress: Progress | None,
+) -> None:
+    """All files of a look, whose folders nobody else writes."""
+    made_of, documents = recipes(folder, path, settings, made, progress)
+    custom = {
+        "version": __version__,
+        "bake": asset_path(folder.path / "manifest.json", path.parent),
+    }
+    if dressed is not None:
+        assert scene is not None
+        write_scene_look(path, Path(scene), dressed, made_of, custom)
+        made.files += [path.with_suffix(".uv.usdc")] if dressed.uv else []
+    else:
+        write_baked_look(path, folder.garments, made_of, custom, _up_axis(folder))
+    write_mtlx(path.with_suffix(".mtlx"), documents)
+    write_json(path.with_suffix(".json"), _report(made))
+    made.files += [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
+    _write_more(folder, path, settings, made, clobber)
+
+
+def _written_folders(path: Path, settings: Settings) -> list[Path]:
+    """Folders that get files of a look, each once, in an order that all runs keep."""
+    places = [path.parent]
+    places += [settings.usdz.parent] if settings.usdz is not None else []
+    places += [settings.u3m] if settings.u3m is not None else []
+    return sorted({place.resolve() for place in places if place.is_dir()})
+
+
+def _refuse_links(folder: Path, path: Path) -> None:
+    """Raise FabricError where a look in its bake's folder would be written through a link out of
+    it: whoever gave the folder away may have laid the link."""
+    if path.parent.resolve() != folder.resolve():
+        return
+    maps = f"{path.stem}_maps"
+    ends = (".mtlx", ".json", ".uv.usdc")
+    for name in (path.name, maps, *(path.with_suffix(end).name for end in ends)):
+        file_in(folder, name)
+    for inside in (folder / maps).iterdir() if (folder / maps).is_dir() else ():
+        file_in(folder, f"{maps}/{inside.name}")
+    for shader in folder.glob(f"{path.stem}.*.osl"):
+        file_in(folder, shader.name)
+
+
+def _without(name: str) -> str:
+    """What a look does where the bake has lost a map."""
+    if name in MAPS:
+        return "a constant stands in for it"
+    if name == "thread_id":
+        return "threads are not fitted one by one"
+    return "the scene's own is used" if name == "mesh" else "no material reads it"
+
+
+def _check_surfaces(folder: BakeFolder, settings: Settings) -> None:
+    known = (*GRAPHS, "hair")
+    for name in settings.surfaces:
+        if name not in known:
+            raise FabricError(f"surface '{name}'", f"is unknown; it must be of {', '.join(known)}")
+    nameless = [lay.name for one in folder.garments for lay in one.lays if lay.fabric is None]
+    if "hair" in settings.surfaces and nameless:
+        raise FabricError(
+            f"fabric '{nameless[0]}'", "is not in the folder; surface 'hair' needs it, bake again"
+        )
+
+
+def _write_more(
+    folder: BakeFolder, path: Path, settings: Settings, made: Written, clobber: bool
+) -> None:
+    """What is written only when asked for."""
+    for name, fabric in _fabrics(folder).items():
+        if settings.osl:
+            shader = path.with_name(f"{path.stem}.{name}.osl")
+            write_osl(fabric, shader)
+            made.files.append(shader)
+        if settings.u3m is not None:
+            swatch = settings.u3m / f"{name}.u3m"
+            made.files += write_u3m(fabric, swatch, fitted=settings.fitted)
+    if settings.usdz is not None:
+        write_usdz(path, settings.usdz, clobber=clobber)
+        made.files.append(settings.usdz)
+
+
+def _fabrics(folder: BakeFolder) -> dict[str, Fabric]:
+    """The fabrics of a bake by their names."""
+    return {lay.name: lay.fabric for one in folder.garments for lay in one.lays if lay.fabric}
+
+
+def _check_target(path: Path, clobber: bool) -> None:
+    """Refuse to overwrite what fabricusd did not write."""
+    if path.suffix not in (".usda", ".usd", ".usdc"):
+        raise FabricError(str(path), "is no USD layer's name; it must end in .usda, .usdc or .usd")
+    if not path.parent.is_dir():
+        raise FabricError(str(path), f"is in '{path.parent}', which is no directory; make it first")
+    if not path.exists():
+        return
+    if not clobber:
+        raise FabricError(str(path), "exists; it must be a new name with --no-clobber")
+    try:
+        layer = Sdf.Layer.FindOrOpen(str(path))
+    except Tf.ErrorException:
+        layer = None
+    if layer is None or "fabricusd" not in (layer.customLayerData or {}):
+        raise FabricError(
+            str(path), "is a file that fabricusd did not write; it must be another name"
+        )
+
+
+def _up_axis(folder: BakeFolder) -> str:
+    for one in folder.garments:
+        if one.mesh.is_file():
+            return str(UsdGeom.GetStageUpAxis(Usd.Stage.Open(str(one.mesh))))
+    raise FabricError(str(folder.path), "has none of its meshes; name the scene with --scene")
+
+
+def _report(made: Written) -> dict[str, Any]:
+    return {
+        "fabricusd": __version__,
+        "fits": {
+            where: {kind: one.as_dict() for kind, one in fits.items()}
+            for where, fits in made.fits.items()
+        },
+        "threads": {
+            where: {str(number): one.as_dict() for number, one in threads.items()}
+            for where, threads in made.threads.items()
+        },
+        "notes": made.notes,
+    }

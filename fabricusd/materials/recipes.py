@@ -1,0 +1,234 @@
+"""What a bake's materials are made of: textures or constants, networks, fitted parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fabricusd.errors import FabricError
+from fabricusd.images.files import read_mip_level, write_png
+from fabricusd.materials.bake_folder import BakeFolder, MapSet
+from fabricusd.materials.fit.fit import Fitted, fit, fit_threads, thread_factors, with_threads
+from fabricusd.materials.fit.texels import draw_texels, mean_texel
+from fabricusd.materials.fit.thread_maps import COLUMNS, Factors, write_thread_maps
+from fabricusd.materials.networks.graph import Texture, Value
+from fabricusd.materials.networks.hair import hair
+from fabricusd.materials.networks.look import Look
+from fabricusd.materials.networks.surfaces import (
+    GRAPHS,
+    MAPS,
+    NO_TINT,
+    Inputs,
+    parameter_values,
+    preview,
+)
+from fabricusd.materials.targets.layer import MaterialRecipe, Recipes
+from fabricusd.schema.names import prim_name
+
+Progress = Callable[[str], None]
+
+BLENDER = "principled:"
+"""Prefix of the material's inputs for Blender's own surface: the hook reads them."""
+
+OPAQUE = 0.9995
+"""Mean cover from which a material has no opacity: blending costs renderers dear."""
+
+NEUTRAL = {
+    "base_color": Value("color3", (0.5, 0.5, 0.5)),
+    "roughness_along": Value("float", 0.5),
+    "roughness_across": Value("float", 0.5),
+    "opacity": Value("float", 1.0),
+    "normal": Value("vector3", (0.5, 0.5, 1.0)),
+    "tangent": Value("vector3", (1.0, 0.0, 0.0)),
+    "specular_tint": NO_TINT,
+}
+"""What stands in for a map that is not there."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What is written.
+
+    surfaces : MaterialX surfaces, names of `surfaces.GRAPHS` or "hair"; USD takes the first, the
+        document all
+    fitted : whether the parameters are sought; otherwise the textures stand as they are
+    usdz : a package of the look to write as well
+    u3m : a folder for a U3M swatch of each fabric as well
+    osl : whether each fabric is written as an OSL shader beside the look
+    """
+
+    surfaces: tuple[str, ...] = ("openpbr",)
+    fitted: bool = True
+    usdz: Path | None = None
+    osl: bool = False
+    u3m: Path | None = None
+
+
+@dataclass(kw_only=True)
+class Written:
+    """The files that were made, what had to be left out, the fits of surfaces and of threads."""
+
+    files: list[Path] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    fits: dict[str, dict[str, Fitted]] = field(default_factory=dict)
+    threads: dict[str, dict[int, Fitted]] = field(default_factory=dict)
+
+
+def recipes(
+    folder: BakeFolder, path: Path, settings: Settings, made: Written,
+    progress: Progress | None,
+) -> tuple[Recipes, list[Any]]:  # fmt: skip
+    """The materials of every garment and fabric, and those of the document."""
+    found: dict[tuple[str, int, str], MaterialRecipe] = {}
+    documents = []
+    for maps in folder.garments:
+        found_looks, fitted = _garment_looks(maps, path, settings, made, progress)
+        textures = texture_inputs(maps, path, made)
+        of_threads = textures if fitted is maps else texture_inputs(fitted, path, made)
+        for number, lay in enumerate(maps.lays):
+            one = maps.name if len(maps.lays) == 1 else f"{maps.name}_{number}"
+            name = prim_name(one, ascii_only=True)
+            looks = found_looks[number]
+            means, of_means = mean_inputs(maps, number), mean_inputs(fitted, number)
+            cover = means["opacity"].value
+            assert isinstance(cover, float)
+            opaque = cover > OPAQUE
+            for variant, plain, inputs in (
+                ("baked", textures, of_threads),
+                ("procedural", means, of_means),
+            ):
+                title = name if variant == "baked" else f"{name}_plain"
+                graphs = {
+                    s: GRAPHS[s](inputs, opaque) if s in GRAPHS else hair(inputs, opaque, lay)
+                    for s in settings.surfaces
+                }
+                first = settings.surfaces[0]
+                found[maps.name, number, variant] = MaterialRecipe(
+                    name=title,
+                    graphs=(
+                        ("", preview(plain, looks["preview"], opaque)),
+                        ("", graphs[first]),
+                    ),
+                    parameters=parameter_values(looks[first])
+                    | parameter_values(looks["principled"], BLENDER),
+                )
+                for surface, graph in graphs.items():
+                    tail = "" if len(graphs) == 1 else f"_{surface}"
+                    documents.append((title + tail, graph, parameter_values(looks[surface])))
+    return found, documents
+
+
+def texture_inputs(maps: MapSet, path: Path, made: Written) -> Inputs:
+    """The textures of a garment, and constants for those that are missing."""
+    found: dict[str, Texture | Value] = {}
+    for name, kind in MAPS.items():
+        pattern = maps.pattern(name)
+        if pattern is not None and name == "normal":
+            pattern = _coded_normals(maps, path, made)
+        found[name] = NEUTRAL[name] if pattern is None else Texture(pattern, kind == "color3")
+    return found
+
+
+def maps_folder(path: Path) -> Path:
+    """The folder beside a look for textures of its own, made where it is not there."""
+    folder = path.with_name(f"{path.stem}_maps")
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise FabricError(
+            str(folder), f"cannot be made: {error.strerror}; name another place"
+        ) from error
+    return folder
+
+
+def _coded_normals(maps: MapSet, path: Path, made: Written) -> Path:
+    """Normals as 16-bit PNG files beside the layer: readers of normal maps ask for codes."""
+    folder = maps_folder(path)
+    for number, source in maps.textures["normal"].items():
+        target = folder / f"{maps.name}.normal.{number}.png"
+        if target in made.files:
+            continue
+        codes = np.clip(0.5 * read_mip_level(source) + 0.5, 0.0, 1.0)
+        # Texels outside the layout hold no direction; they point straight up.
+        codes[np.all(codes == 0.5, axis=-1)] = (0.5, 0.5, 1.0)
+        write_png(target, np.rint(codes * 65535).astype(np.uint16), color_space="raw")
+        made.files.append(target)
+    return folder / f"{maps.name}.normal.{'<UDIM>' if maps.udim else number}.png"
+
+
+def mean_inputs(maps: MapSet, number: int) -> dict[str, Value]:
+    """One constant for each map: the mean texel of a lay."""
+    texel = mean_texel(maps, number)
+    if "normal" in texel:
+        texel["normal"] = tuple(0.5 * x + 0.5 for x in texel["normal"])
+    return {
+        name: Value(kind, texel[name] if kind != "float" else texel[name][0])
+        if name in texel
+        else NEUTRAL[name]
+        for name, kind in MAPS.items()
+    }
+
+
+def _garment_looks(
+    maps: MapSet, path: Path, settings: Settings, made: Written, progress: Progress | None
+) -> tuple[list[dict[str, Look]], MapSet]:
+    """The looks of each lay, and the maps that all surfaces but UsdPreviewSurface take: those of
+    the bake, or where texels resolve threads, with each thread's own fit in them."""
+    looks, factors = [], {}
+    for number in range(len(maps.lays)):
+        of_lay, of_threads = _looks(maps, number, settings, made, progress)
+        looks.append(of_lay)
+        if of_threads:
+            factors[number] = of_threads
+    if not factors:
+        return looks, maps
+    fitted = write_thread_maps(maps, factors, maps_folder(path))
+    made.files += [fitted.textures[name][t] for name in COLUMNS for t in fitted.textures[name]]
+    return looks, fitted
+
+
+def _looks(
+    maps: MapSet, number: int, settings: Settings, made: Written,
+    progress: Progress | None,
+) -> tuple[dict[str, Look], Factors]:  # fmt: skip
+    """The look for each surface that is written, and the factors of each thread, if any."""
+    lay = maps.lays[number]
+    kinds = ("preview", "principled", *(s for s in settings.surfaces if s in GRAPHS))
+    plain = dict.fromkeys(("preview", "principled", *settings.surfaces), Look())
+    if not settings.fitted:
+        return plain, {}
+    if lay.fabric is None:
+        made.notes.append(
+            f"fabric '{lay.name}' is not in the folder; its parameters are not fitted"
+        )
+        return plain, {}
+    texels = draw_texels(maps, number, lay)
+    if texels is None:
+        note = f"{maps.name} lacks maps that a fit needs; its parameters are not fitted"
+        if note not in made.notes:
+            made.notes.append(note)
+        return plain, {}
+
+    def fitting(what: str) -> None:
+        if progress:
+            progress(f"fitting {what} to {lay.name} on {maps.name}")
+
+    factors: Factors = {}
+    own = texels
+    if texels.threads:
+        fitting("threads")
+        threads = fit_threads(texels, lay.fabric)
+        looks = {one: fitted.look for one, fitted in threads.items()}
+        own, factors = with_threads(texels, looks), thread_factors(looks, texels.shares)
+        made.threads[f"{maps.name} {lay.name}"] = threads
+    found = {}
+    for kind in kinds:
+        fitting(kind)
+        takes = texels if kind == "preview" else own
+        found[kind] = fit(kind, takes, lay.fabric, baked=texels)
+    made.fits[f"{maps.name} {lay.name}"] = found
+    return plain | {kind: one.look for kind, one in found.items()}, factors

@@ -1,0 +1,1 @@
+"""What a bake is turned into: USD layers, MaterialX, OSL, U3M, packages."""

@@ -1,0 +1,62 @@
+"""The thread model as an OSL shader, with one fabric's tables as its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from fabricusd.appearance.weave.coverage import coverage
+from fabricusd.appearance.weave.quadrature import DEFAULT, curve_nodes
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+from fabricusd.files import whole_file
+
+SOURCE = Path(__file__).resolve().parent / "blender" / "fabric_thread.osl"
+
+
+def write_osl(fabric: Fabric, path: Path) -> None:
+    """The shader for `fabric`, whole or not at all.
+
+    Raises FabricError where a thread's model is not `microcylinder`, the one the shader has.
+    """
+    with whole_file(path) as temporary:
+        temporary.write_text(osl_source(fabric), "utf-8")
+
+
+def osl_source(fabric: Fabric) -> str:
+    """Text of the shader: the tables of `fabric` as array parameters with defaults."""
+    for name, thread in fabric.threads.items():
+        if fabric.model_of(thread) != "microcylinder":
+            raise FabricError(
+                f"thread '{name}'",
+                f"has the model '{fabric.model_of(thread)}'; the OSL shader has 'microcylinder'",
+            )
+    nodes = curve_nodes(fabric, DEFAULT)
+    threads = fabric.thread_list
+    sets = [int(k >= nodes.warp_start) for k in range(len(nodes.psi0))]
+    gap = coverage(fabric).gap
+    tables = [
+        _array("float", "thread_albedo", [a for t in threads for a in t.albedo]),
+        _array("float", "thread_ior", [t.ior for t in threads]),
+        _array("float", "thread_isotropic", [t.isotropic for t in threads]),
+        _array("float", "thread_gamma_surface", [t.gamma_surface for t in threads]),
+        _array("float", "thread_gamma_volume", [t.gamma_volume for t in threads]),
+        _array("float", "node_angle", nodes.psi0),
+        _array("float", "node_weight", nodes.weight),
+        _array("int", "node_thread", nodes.thread),
+        _array("int", "node_set", sets),
+        f"    int node_count = {len(nodes.psi0)},\n",
+        f"    float masking_width = {fabric.masking_width:.9g},\n",
+        f"    float gap = {gap:.9g},\n",
+        f"    float open = {0.0 if fabric.opaque else gap:.9g},\n",
+    ]
+    text = SOURCE.read_text("utf-8")
+    return text.replace("    /* tables */\n", "".join(tables))
+
+
+def _array(kind: str, name: str, values: Iterable[Any]) -> str:
+    # Blender takes an array of one for a number.
+    words = [f"{v:.9g}" if kind == "float" else str(int(v)) for v in values]
+    words *= 2 if len(words) == 1 else 1
+    return f"    {kind} {name}[{len(words)}] = {{{', '.join(words)}}},\n"

@@ -1,0 +1,241 @@
+"""U3M 1.1 for garment CAD: one seamless swatch of the fabric, in millimetres.
+
+The format is Vizoo's open one ([U3M2021]). Its images must be RGB, so data sits in three equal
+channels; colours are sRGB. The swatch is a whole number of repeats, baked on a square of its own.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import tempfile
+import uuid
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.appearance.weave.compiled import true_repeat
+from fabricusd.bake.bake import Settings, bake
+from fabricusd.bake.manifest import write_json
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Binding, Fabric
+from fabricusd.images.files import read_mip_level, write_png
+from fabricusd.materials.bake_folder import MapSet, read_bake_folder
+from fabricusd.materials.fit.fit import fit
+from fabricusd.materials.fit.texels import NEEDED, draw_texels
+from fabricusd.materials.networks.look import Look
+from fabricusd.reference.view_transform import srgb_encode
+from fabricusd.weaves.recognise import recognise
+
+THREADS = 32
+"""Threads along a side of the swatch at least: fewer would repeat visibly."""
+
+FIBRES = (
+    "Polyester", "Linen", "Silk", "Cotton", "Wool", "Rayon", "Nylon", "Acetate", "Acrylic",
+    "Cashmere", "Hemp", "Jute", "Lyocell", "Mohair", "Ramie",
+)  # fmt: skip
+"""Words of the format for fibres that a fabric's or thread's name may hold."""
+
+PILE = "velvet", "velour", "corduroy"
+
+
+def write_u3m(
+    fabric: Fabric, path: Path, *, resolution: int = 512, fitted: bool = True
+) -> list[Path]:
+    """The material at `path` (`.u3m`) and its PNG files in `<stem>/` beside it; all of them.
+
+    Raises FabricError for another suffix or a fabric that cannot be baked.
+    """
+    if path.suffix != ".u3m":
+        raise FabricError(str(path), "is no U3M material's name; it must end in .u3m")
+    ends, picks = _threads(fabric)
+    with tempfile.TemporaryDirectory() as folder:
+        maps = _swatch(fabric, Path(folder), ends, picks, resolution)
+        lay = maps.lays[0]
+        texels = draw_texels(maps, 0, lay)
+        look = fit("principled", texels, fabric).look if fitted and texels is not None else Look()
+        images, depth = pictures(maps, look)
+    size = (1e3 * ends * fabric.warp.pitch, 1e3 * picks * fabric.weft.pitch)
+    written = []
+    folder_name = f"{path.stem}_u3m"
+    try:
+        path.with_name(folder_name).mkdir(exist_ok=True)
+    except OSError as error:
+        raise FabricError(str(path), f"cannot be written: {error.strerror}") from error
+    for name, pixels in images.items():
+        target = path.with_name(folder_name) / f"{name}.png"
+        codes = np.rint(np.clip(pixels, 0.0, 1.0) * 65535).astype(np.uint16)
+        write_png(target, codes, color_space="sRGB" if name == "basecolor" else "raw")
+        written.append(target)
+    sheet = _Sheet(folder_name, size, resolution)
+    write_json(path, material(fabric, images, look, depth, sheet))
+    return [path, *written]
+
+
+def _threads(fabric: Fabric) -> tuple[int, int]:
+    """Ends and picks of the swatch: whole repeats, nearly square, THREADS at least."""
+    ends, picks = true_repeat(fabric)
+    across = math.ceil(THREADS / ends)
+    width = across * ends * fabric.warp.pitch
+    down = max(1, round(width / (picks * fabric.weft.pitch)))
+    return across * ends, down * picks
+
+
+def _swatch(fabric: Fabric, folder: Path, ends: int, picks: int, resolution: int) -> MapSet:
+    scene = folder / "swatch.obj"
+    w, h = ends * fabric.warp.pitch, picks * fabric.weft.pitch
+    scene.write_text(
+        f"v 0 0 0\nv {w:.9g} 0 0\nv {w:.9g} {h:.9g} 0\nv 0 {h:.9g} 0\n"
+        "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+    )
+    binding = Binding(fabric=fabric, threads_per_uv=(float(ends), float(picks)))
+    settings = Settings(resolution=resolution, maps=(*NEEDED, "height"))
+    bake(scene, folder / "bake", settings, fabric=binding)
+    return read_bake_folder(folder / "bake").garments[0]
+
+
+def pictures(maps: MapSet, look: Look) -> tuple[dict[str, NDArray[np.float64]], float]:
+    """(h, w, 3) values from 0 to 1 of each image of the material, and the depth of the relief [mm]
+    that 1 stands for in `displacement`."""
+    read = {
+        name: read_mip_level(files[1001]).astype(np.float64)
+        for name, files in maps.textures.items()
+    }
+    smooth = np.minimum((read["roughness_along"] * look.smooth_scale) ** 2, 1.0)
+    rough = np.maximum(np.minimum((read["roughness_across"] * look.rough_scale) ** 2, 1.0), smooth)
+    # The principled shader: aspect^2 = 1 - 0.9 anisotropy, alphas r^2/aspect and r^2 aspect.
+    anisotropy = np.clip((1.0 - smooth / rough) / 0.9, 0.0, 1.0)
+    x, y = -read["tangent"][..., 1], read["tangent"][..., 0]
+    turn = (np.arctan2(y, x) / (2.0 * math.pi)) % 1.0
+    relief = read["height"] - read["height"].min()
+    depth = float(relief.max())
+    single = {
+        "roughness": np.sqrt(np.sqrt(smooth * rough)),
+        "anisotropy": anisotropy,
+        "anisotropy_rotation": turn[..., None],
+        "alpha": read["opacity"],
+        "displacement": relief / max(depth, 1e-9),
+    }
+    found = {name: np.repeat(values, 3, axis=2) for name, values in single.items()}
+    color = np.clip(read["base_color"][..., :3] * np.array(look.base_color_scale), 0.0, 1.0)
+    found["basecolor"] = np.asarray(srgb_encode(color))
+    found["normal"] = 0.5 * read["normal"][..., :3] + 0.5
+    return found, depth
+
+
+class _Sheet:
+    """Writes values as the schema wants them, with the images' common size."""
+
+    def __init__(self, folder: str, size: tuple[float, float], resolution: int) -> None:
+        self.folder, self.size = folder, size
+        self.dpi = {k: resolution / mm * 25.4 for k, mm in zip("xy", size, strict=True)}
+
+    def image(self, name: str) -> dict[str, Any]:
+        """One picture."""
+        return {
+            "path": f"{self.folder}/{name}.png", "width": self.size[0], "height": self.size[1],
+            "dpi": self.dpi, "repeat": {"rotation": 0.0, "mode": "normal"},
+        }  # fmt: skip
+
+    def number(self, constant: float, name: str = "", factor: float = 1.0) -> dict[str, Any]:
+        """A number, with a picture where it has one."""
+        texture = {"factor": factor, "offset": 0.0, "image": self.image(name)} if name else None
+        return {"constant": constant, "texture": texture}
+
+    def color(self, rgb: Iterable[float], name: str = "") -> dict[str, Any]:
+        """A colour, with a picture where it has one."""
+        white = {"r": 1.0, "g": 1.0, "b": 1.0}
+        texture = {"mode": "multiply", "factor": white, "image": self.image(name)} if name else None
+        return {"constant": dict(zip("rgb", map(float, rgb), strict=True)), "texture": texture}
+
+
+def material(
+    fabric: Fabric, images: dict[str, NDArray[np.float64]], look: Look, depth: float, sheet: _Sheet
+) -> dict[str, Any]:
+    """The document, by the schema of version 1.1. depth : of the relief [mm]."""
+    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    digest = hashlib.sha256(repr((fabric.name, fabric.threads, sheet.size)).encode()).digest()
+    return {
+        "schema": "1.1",
+        "custom": None,
+        "material": {
+            "id": str(uuid.UUID(bytes=digest[:16], version=4)),
+            "name": fabric.name, "description": fabric.documentation,
+            "created": now, "modified": now,
+            "front": _front(images, look, depth, sheet), "back": None, "side": None,
+            "physics": physics(fabric), "metadata": None,
+        },
+    }  # fmt: skip
+
+
+def _front(
+    images: dict[str, NDArray[np.float64]], look: Look, depth: float, sheet: _Sheet
+) -> dict[str, Any]:
+    mean = {name: values.mean(axis=(0, 1)) for name, values in images.items()}
+    up = {"x": 0.0, "y": 0.0, "z": 1.0}
+    reflected = ((look.specular_ior - 1.0) / (look.specular_ior + 1.0)) ** 2
+    pictured = {
+        "roughness": "roughness", "anisotropy_value": "anisotropy",
+        "anisotropy_rotation": "anisotropy_rotation", "alpha": "alpha",
+    }  # fmt: skip
+    plain = {
+        "ior": look.specular_ior, "specular_value": reflected / 0.08, "specular_tint": 0.0,
+        "metalness": 0.0, "sheen_value": look.fuzz_weight, "sheen_tint": 1.0,
+        "clearcoat_value": 0.0, "clearcoat_roughness": 0.0, "subsurface_value": 0.0,
+        "subsurface_radius": 0.0, "transmission": 0.0,
+    }  # fmt: skip
+    return {
+        "shader": "principled",
+        "basecolor": sheet.color(mean["basecolor"], "basecolor"),
+        "normal": {"constant": up, "texture": {"scale": 1.0, "image": sheet.image("normal")}},
+        **{key: sheet.number(float(mean[name][0]), name) for key, name in pictured.items()},
+        # A length, so in millimetres as all of the format's.
+        "displacement": sheet.number(depth * float(mean["displacement"][0]), "displacement", depth),
+        **{key: sheet.number(value) for key, value in plain.items()},
+        "clearcoat_normal": {"constant": up, "texture": None},
+        "subsurface_color": sheet.color((0.0, 0.0, 0.0)),
+        "preview": None,
+    }
+
+
+def physics(fabric: Fabric) -> dict[str, Any]:
+    """What is known of the cloth itself, in the format's words."""
+    thick = [t.thickness for t in fabric.thread_list]
+    return {
+        "thickness": 2e3 * max(thick) if all(thick) else None,
+        "weight": None,
+        "composition": {"parts": _composition(fabric)},
+        "devices": {"fab": "null"},
+        "material_type": {"type": "Woven", "name": None},
+        "construction": construction(fabric),
+    }
+
+
+def _composition(fabric: Fabric) -> list[dict[str, Any]]:
+    """One fibre if the names tell of one; shares by mass are not known, so no mixture is stated."""
+    words = " ".join((fabric.name, *fabric.threads)).lower()
+    found = [fibre for fibre in FIBRES if fibre.lower() in words]
+    kind = found[0] if len(found) == 1 else "unknown"
+    return [{"ratio": 1.0, "type": kind, "name": None}]
+
+
+def construction(fabric: Fabric) -> dict[str, Any]:
+    """The weave in the format's words, its own name where there is none."""
+    if any(word in fabric.name.lower() for word in PILE):
+        return {"type": "Velour", "name": None}
+    name = recognise(fabric.weave.cells) or fabric.weave.name
+    first = name.split()[0].lower() if name else ""
+    if first == "twill":
+        hand = {" S": "Twill - left hand (S)", " Z": "Twill - right hand (Z)"}
+        kind = next((full for tail, full in hand.items() if tail in name), "Twill")
+        return {"type": kind, "name": None}
+    known = {"plain": "Plain weave", "satin": "Satin", "sateen": "Satin", "oxford": "Oxford"}
+    if first in known:
+        return {"type": known[first], "name": None}
+    if max(fabric.weave.ends, fabric.weave.picks) > 64:
+        return {"type": "Jacquard", "name": None}
+    return {"type": "other", "name": name} if name else {"type": "unknown", "name": None}

@@ -1,0 +1,107 @@
+"""Shading networks as UsdShade prims."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pxr import Sdf, Usd, UsdShade
+
+from fabricusd.materials.networks.graph import Graph, Link, Parameter, Source, Texture, Value
+from fabricusd.materials.targets.paths import asset_path
+
+_TYPES = {
+    "float": Sdf.ValueTypeNames.Float,
+    "color3": Sdf.ValueTypeNames.Color3f,
+    "vector2": Sdf.ValueTypeNames.Float2,
+    "vector3": Sdf.ValueTypeNames.Float3,
+    "float4": Sdf.ValueTypeNames.Float4,
+    "boolean": Sdf.ValueTypeNames.Bool,
+    "integer": Sdf.ValueTypeNames.Int,
+    "string": Sdf.ValueTypeNames.String,
+    "token": Sdf.ValueTypeNames.Token,
+    "surfaceshader": Sdf.ValueTypeNames.Token,
+    "BSDF": Sdf.ValueTypeNames.Token,
+}
+_PREVIEW_TYPES = {
+    "result": Sdf.ValueTypeNames.Float2,
+    "rgb": Sdf.ValueTypeNames.Float3,
+    "r": Sdf.ValueTypeNames.Float,
+    "surface": Sdf.ValueTypeNames.Token,
+}
+_PREVIEW_INPUTS = {
+    "diffuseColor": Sdf.ValueTypeNames.Color3f,
+    "normal": Sdf.ValueTypeNames.Normal3f,
+}
+
+
+def write_material(
+    stage: Usd.Stage,
+    path: Sdf.Path,
+    graphs: list[tuple[str, Graph]],
+    parameters: dict[str, Value],
+    layer_folder: Path,
+) -> UsdShade.Material:
+    """A Material with one output a graph; textures relative to `layer_folder`.
+
+    graphs : (prefix of the shaders' names, graph)
+    """
+    material = UsdShade.Material.Define(stage, path)
+    for name, value in parameters.items():
+        _set(material.CreateInput(name, _TYPES[value.kind]), value)
+    for prefix, graph in graphs:
+        _write_graph(stage, material, prefix, graph, layer_folder)
+    return material
+
+
+def _write_graph(
+    stage: Usd.Stage, material: UsdShade.Material, prefix: str, graph: Graph, folder: Path
+) -> None:
+    shaders = {}
+    for node in graph.nodes:
+        shader = UsdShade.Shader.Define(stage, material.GetPath().AppendChild(prefix + node.name))
+        shader.CreateIdAttr(node.identifier)
+        shaders[node.name] = shader
+    for node in graph.nodes:
+        for name, source in node.inputs.items():
+            kind = _input_type(graph, node.kind, name, source, material)
+            given = shaders[node.name].CreateInput(name, kind)
+            if isinstance(source, Link):
+                target = shaders[source.node]
+                out = target.CreateOutput(source.output, _output_type(graph, source))
+                given.ConnectToSource(out)
+            elif isinstance(source, Parameter):
+                given.ConnectToSource(material.GetInput(source.name))
+            else:
+                _set(given, source, folder)
+    surface = shaders[graph.terminal].CreateOutput(graph.output, Sdf.ValueTypeNames.Token)
+    material.CreateSurfaceOutput(graph.context).ConnectToSource(surface)
+
+
+def _input_type(
+    graph: Graph, kind: str, name: str, source: Source, material: UsdShade.Material
+) -> Any:
+    if isinstance(source, Texture):
+        return Sdf.ValueTypeNames.Asset
+    if not graph.context and name in _PREVIEW_INPUTS:
+        return _PREVIEW_INPUTS[name]
+    if isinstance(source, Value):
+        return _TYPES[source.kind]
+    if isinstance(source, Parameter):
+        return material.GetInput(source.name).GetTypeName()
+    return _output_type(graph, source)
+
+
+def _output_type(graph: Graph, link: Link) -> Any:
+    node = graph.node(link.node)
+    return _TYPES[node.kind] if node.kind else _PREVIEW_TYPES[link.output]
+
+
+def _set(given: UsdShade.Input, source: Value | Texture, folder: Path | None = None) -> None:
+    if isinstance(source, Texture):
+        assert folder is not None
+        given.Set(Sdf.AssetPath(asset_path(source.path, folder)))
+        if source.color:
+            given.GetAttr().SetColorSpace("lin_rec709")
+    else:
+        given.Set(source.value)

@@ -1,0 +1,171 @@
+"""Which prims of a scene wear which fabric, and how the textures' UVs lie on them."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Usd, UsdGeom
+
+from fabricusd.bake.layout.garment import Garment, fitted, garments
+from fabricusd.errors import FabricError
+from fabricusd.materials.bake_folder import MapSet
+from fabricusd.scene.read import read_scene
+from fabricusd.scene.scene import Scene
+from fabricusd.schema import open_stage
+from fabricusd.schema.access import applies_binding, targets, value
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Wearer:
+    """A mesh or subset that gets a material.
+
+    path : of the prim in the scene
+    maps : its textures; lay : number of its fabric among theirs
+    worn : whether the scene itself binds the fabric there
+    forced : the binding must outdo those below, since `path` is an instance's root
+    """
+
+    path: str
+    maps: MapSet
+    lay: int
+    worn: bool
+    forced: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NewUV:
+    """A mesh's UVs in the textures' layout: values and indices of primvar `st`."""
+
+    path: str
+    values: NDArray[np.float32]
+    indices: NDArray[np.int32] | None
+    interpolation: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Dressed:
+    """A scene that a look goes over."""
+
+    stage: Usd.Stage
+    wearers: tuple[Wearer, ...]
+    uv: tuple[NewUV, ...]
+    notes: tuple[str, ...]
+
+
+def find_wearers(scene: Path, sets: tuple[MapSet, ...]) -> Dressed:
+    """What of `scene` the textures belong to.
+
+    Raises FabricError where it is no USD, has none of the prims, or was baked with `--unwrap`.
+    """
+    if scene.suffix.lower() not in (".usd", ".usda", ".usdc"):
+        raise FabricError(
+            str(scene), "is no USD layer; leave --scene out to write a look over the baked meshes"
+        )
+    stage, _ = open_stage(scene)
+    now = _garments(scene, sets)
+    wearers: list[Wearer] = []
+    uv: list[NewUV] = []
+    notes: list[str] = []
+    for maps in sets:
+        for path in maps.prims:
+            # A garment of an .obj is named after its file, which may be no path of USD.
+            whole = Sdf.Path.IsValidPathString(path) and Sdf.Path(path).IsAbsolutePath()
+            prim = stage.GetPrimAtPath(path) if whole else None
+            if not prim:
+                notes.append(f"{path} is not in {scene.name} any more; it gets no look")
+                continue
+            _compare(maps, now.get(path), path, notes)
+            wearers += _of(prim, maps, notes)
+            name = _uv_name(prim)
+            if path in now and not (maps.own_uv and name == "st"):
+                uv.append(_moved(prim, name, maps, now[path]))
+    if not wearers:
+        raise FabricError(str(scene), "has none of the prims that were baked; bake it again")
+    return Dressed(stage=stage, wearers=tuple(wearers), uv=tuple(uv), notes=tuple(notes))
+
+
+def _garments(scene: Path, sets: tuple[MapSet, ...]) -> dict[str, Garment]:
+    """The garments that were baked as they are in the scene now, by their prims' paths."""
+    found = {}
+    read: dict[str, Scene] = {}
+    for maps in sets:
+        lay = maps.lays[0]
+        if lay.name not in read:
+            read[lay.name] = read_scene(scene, fabric=lay.fabric)
+        for path in maps.prims:
+            # What is no garment any more is said about each prim.
+            with suppress(FabricError):
+                found[path] = garments(read[lay.name], path)[0]
+    return found
+
+
+def _compare(maps: MapSet, now: Garment | None, path: str, notes: list[str]) -> None:
+    if now is None:
+        notes.append(f"{path} wears no fabric any more; its textures are bound all the same")
+        return
+    if now.fingerprint == maps.fingerprint:
+        return
+    if not maps.own_uv and fitted(now).fingerprint == maps.fingerprint:
+        return
+    notes.append(f"{path} has changed since it was baked; bake it again if its UVs or fabric did")
+
+
+def _of(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
+    """The mesh itself, or those of its subsets that wear fabrics of their own."""
+    if prim.IsInstanceProxy():
+        return _instance(prim, maps, notes)
+    found = []
+    for one in (prim, *UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(prim))):
+        one = one.GetPrim() if not isinstance(one, Usd.Prim) else one
+        if applies_binding(one):
+            found_at = targets(one, "fabric:binding")
+            name = found_at[0].name if found_at else ""
+            lay = next((k for k, lay in enumerate(maps.lays) if lay.name == name), 0)
+            found.append(Wearer(path=str(one.GetPath()), maps=maps, lay=lay, worn=True))
+    return found or [Wearer(path=str(prim.GetPath()), maps=maps, lay=0, worn=False)]
+
+
+def _instance(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
+    root = prim
+    while root.IsInstanceProxy():
+        root = root.GetParent()
+    meshes = [p for p in Usd.PrimRange(root, Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
+    if len(meshes) > 1:
+        notes.append(
+            f"{prim.GetPath()} is in an instance with other meshes, which cannot be changed one by "
+            "one; it gets no look: bake and dress what the instance refers to"
+        )
+        return []
+    return [Wearer(path=str(root.GetPath()), maps=maps, lay=0, worn=False, forced=True)]
+
+
+def _uv_name(prim: Usd.Prim) -> str:
+    """The UV set that the fabric lies in."""
+    return str(value(prim, "fabric:binding:uvSet") or "st")
+
+
+def _moved(prim: Usd.Prim, name: str, maps: MapSet, now: Garment) -> NewUV:
+    """UVs where `bake --fit` put them, old = span * new + low, as primvar `st`."""
+    old, new = now.lays[0], maps.lays[0]
+    span = float(np.linalg.norm(new.matrix) / np.linalg.norm(old.matrix))
+    low = np.linalg.solve(old.matrix, new.offset - old.offset)
+    if not np.allclose(new.matrix, old.matrix * span, rtol=1e-6, atol=1e-9):
+        raise FabricError(
+            str(prim.GetPath()),
+            "was baked with --unwrap, so its UVs are only in the baked mesh; leave --scene out",
+        )
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+    if not primvar:
+        raise FabricError(
+            str(prim.GetPath()), f"has no primvar '{name}'; the textures are in it, bake again"
+        )
+    values = (np.asarray(primvar.Get(), np.float64) - low) / span
+    indices = np.asarray(primvar.GetIndices(), np.int32) if primvar.IsIndexed() else None
+    return NewUV(
+        path=str(prim.GetPath()), values=values.astype(np.float32), indices=indices,
+        interpolation=str(primvar.GetInterpolation()),
+    )  # fmt: skip

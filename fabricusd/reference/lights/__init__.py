@@ -1,0 +1,1 @@
+"""Lights: their table, how they are sampled, how rays meet them."""

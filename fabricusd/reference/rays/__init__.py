@@ -1,0 +1,1 @@
+"""Rays: cameras, packets, random numbers, Embree, the triangles they meet."""

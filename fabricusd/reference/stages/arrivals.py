@@ -1,0 +1,247 @@
+"""Where traced rays arrived: at lights, and at surfaces, put in the order they are shaded in.
+
+Rays that met a light add it, weighted against light sampling by the power heuristic [Veach1997].
+Rays that met a surface get the key of the queue in which that is shaded: one for each material,
+level and side.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fabricusd.appearance.weave.footprint import level_weights, pick_level
+from fabricusd.kernels.real import INLINE, KERNEL, LEAN, PART, whole
+from fabricusd.reference.lights.hits import (
+    BEFORE,
+    BLOCK,
+    D_X,
+    D_Y,
+    D_Z,
+    ENDLESS,
+    FIRST,
+    LIGHT_ROWS,
+    O_X,
+    REACH,
+    SEEN_B,
+    SEEN_G,
+    SEEN_R,
+    meet_lights,
+)
+from fabricusd.reference.rays.embree import (
+    DX,
+    GEOMETRY,
+    LANES,
+    MISS,
+    NGX,
+    OX,
+    PRIMITIVE,
+    TFAR,
+)
+from fabricusd.reference.rays.sobol import four_numbers
+from fabricusd.reference.rays.triangles import RATE
+from fabricusd.reference.rays.triangles import T as TANGENTS
+from fabricusd.reference.rays.wave import (
+    DIRECT,
+    FAR_LEVEL,
+    INDIRECT,
+    LANE_BETA,
+    LANE_PDF,
+    LANE_SPREAD,
+    LANE_WIDTH,
+)
+
+R = np.float32
+FAR = R(1e30)
+
+MIS, LIGHT_ONLY, SURFACE_ONLY, UNIFORM = range(4)
+"""Estimators of the same integral: both samplings, either, or uniform over all directions."""
+
+AUTO_LEVEL = 3
+NUMBERS_PER_STEP = 4
+"""Places that a step of a path may use, see `sobol.four_numbers`."""
+
+QUEUES = 6
+"""Queues of a material: three levels, two sides."""
+
+# Rows of a block after those of `light_hits`: the geometric normal, its cosine with the ray; for
+# level `auto` the steepness of both coordinates, the direction of growing u, the limits, the cone's
+# width and a uniform number, and the level they lead to.
+_NORMAL, _COSINE, _STEEP, _GRAIN, _LIMITS, _WIDTH, _NUMBER, _LEVEL = (
+    (LIGHT_ROWS + row) * BLOCK for row in (0, 3, 4, 6, 9, 13, 14, 15)
+)
+_ROWS = LIGHT_ROWS + 16
+
+
+@njit(**KERNEL)
+def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, dome, film, keys,
+           triangle_material, limits, records, level, path_pixel, path_sample,
+           numbers, counts):  # fmt: skip
+    """Add the light that rays met, and give each lane that goes on the key of its queue, else -1.
+
+    limits : (materials, 4) float32 - `footprint.Limits.row` of a fabric, 0 where the surface has
+    no levels. counts : (QUEUES materials,) int64, filled with the length of each queue, which is
+    keyed by `(3 material + level) 2 + back`.
+    """
+    counts[:] = 0
+    count = whole(count)
+    block = np.empty(_ROWS * BLOCK, np.float32)
+    counters = np.empty(2 * BLOCK, np.uint32)
+    for start in range(0, count, BLOCK):
+        size = min(BLOCK, count - start)
+        _load(start, size, rays, lanes, lane_tags, block)
+        meet_lights(lights, dome, step == 0, size, block)
+        _add_seen(start, size, estimator, lane_tags, lanes, film, block)
+        _turn(size, block)
+        if level == AUTO_LEVEL:
+            _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
+                         path_pixel, path_sample, counters, block)  # fmt: skip
+            place = np.uint32(2 + NUMBERS_PER_STEP * step + 2)
+            _choose_levels(numbers, place, size, counters, block)
+        _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, limits,
+                   keys, counts, block)  # fmt: skip
+
+
+@njit(**PART)
+def _load(start, size, rays, lanes, lane_tags, block):
+    bits = rays.view(np.uint32)
+    for x in range(0, size, LANES):
+        packet, names = rays[(start + x) >> 4], bits[(start + x) >> 4]
+        for row in range(3):
+            for lane in range(LANES):
+                block[O_X + row * BLOCK + x + lane] = packet[OX + row, lane]
+            for lane in range(LANES):
+                block[D_X + row * BLOCK + x + lane] = packet[DX + row, lane]
+            for lane in range(LANES):
+                block[_NORMAL + row * BLOCK + x + lane] = packet[NGX + row, lane]
+        for lane in range(LANES):
+            missed = names[GEOMETRY, lane] == MISS
+            block[REACH + x + lane] = FAR if missed else packet[TFAR, lane]
+    before, depth = lanes[LANE_PDF][start:], lane_tags[1][start:]
+    for x in range(size):
+        block[BEFORE + x] = before[x]
+    for x in range(size):
+        block[FIRST + x] = R(1) if depth[x] == 0 else R(0)
+
+
+@njit(**PART)
+def _add_seen(start, size, estimator, lane_tags, lanes, film, block):
+    """Add what the rays saw of lights to their paths."""
+    for x in range(size):
+        red, green, blue = block[SEEN_R + x], block[SEEN_G + x], block[SEEN_B + x]
+        k = start + x
+        depth = lane_tags[1, k]
+        if red + green + blue <= R(0) or (depth > 0 and estimator == LIGHT_ONLY):
+            continue
+        path = whole(lane_tags[0, k])
+        row = DIRECT if depth <= 1 else INDIRECT
+        film[row, path] += red * lanes[LANE_BETA, k]
+        film[row + 1, path] += green * lanes[LANE_BETA + 1, k]
+        film[row + 2, path] += blue * lanes[LANE_BETA + 2, k]
+
+
+@njit(**PART)
+def _turn(size, block):
+    """Cosine of each ray with the normal of what it met, which is not a unit vector."""
+    for x in range(size):
+        block[_COSINE + x] = (
+            block[D_X + x] * block[_NORMAL + x]
+            + block[D_Y + x] * block[_NORMAL + BLOCK + x]
+            + block[D_Z + x] * block[_NORMAL + 2 * BLOCK + x]
+        )
+
+
+@njit(**PART)
+def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
+                 path_pixel, path_sample, counters, block):  # fmt: skip
+    """What `auto` needs of each ray that met a fabric; zeros for the others."""
+    bits = rays.view(np.uint32)
+    for x in range(size):
+        k = start + x
+        path = whole(lane_tags[0, k])
+        counters[x], counters[BLOCK + x] = path_pixel[path], path_sample[path]
+        for row in range(4):
+            block[_LIMITS + row * BLOCK + x] = R(0)
+        for row in range(2):
+            block[_STEEP + row * BLOCK + x] = R(0)
+        for row in range(3):
+            block[_GRAIN + row * BLOCK + x] = R(0)
+        block[_WIDTH + x] = R(0)
+        if block[REACH + x] >= ENDLESS:
+            continue
+        triangle = bits[k >> 4, PRIMITIVE, k & 15]
+        record, material = records[triangle], whole(triangle_material[triangle])
+        for row in range(4):
+            block[_LIMITS + row * BLOCK + x] = limits[material, row]
+        for row in range(2):
+            block[_STEEP + row * BLOCK + x] = record[RATE + row]
+        for row in range(3):
+            block[_GRAIN + row * BLOCK + x] = record[TANGENTS + row]
+        block[_WIDTH + x] = lanes[LANE_WIDTH, k] + block[REACH + x] * lanes[LANE_SPREAD, k]
+
+
+@njit(**PART)
+def _choose_levels(numbers, place, size, counters, block):
+    """A level for each ray's cone, by a uniform number."""
+    for x in range(size):
+        block[_NUMBER + x], _, _, _ = four_numbers(numbers, counters[x], counters[BLOCK + x], place)
+    for x in range(size):
+        nx, ny, nz = (
+            block[_NORMAL + x], block[_NORMAL + BLOCK + x], block[_NORMAL + 2 * BLOCK + x],
+        )  # fmt: skip
+        square = block[_COSINE + x] * block[_COSINE + x]
+        inverse = (nx * nx + ny * ny + nz * nz) / max(square, R(1e-30))
+        # A cone's cut with the surface is longer along the ray than across it.
+        a = (
+            block[D_X + x] * block[_GRAIN + x]
+            + block[D_Y + x] * block[_GRAIN + BLOCK + x]
+            + block[D_Z + x] * block[_GRAIN + 2 * BLOCK + x]
+        )
+        along, flat = a * a * inverse, inverse - R(1)
+        width = block[_WIDTH + x]
+        extent_u = width * block[_STEEP + x] * np.sqrt(R(1) + along)
+        extent_v = width * block[_STEEP + BLOCK + x] * np.sqrt(R(1) + max(flat - along, R(0)))
+        far, weave, _ = level_weights(
+            R, max(block[_LIMITS + x], R(1e-6)), max(block[_LIMITS + BLOCK + x], R(1e-6)),
+            block[_LIMITS + 2 * BLOCK + x], block[_LIMITS + 3 * BLOCK + x], extent_u, extent_v,
+        )  # fmt: skip
+        level, _ = pick_level(R, far, weave, block[_NUMBER + x])
+        block[_LEVEL + x] = R(level)
+
+
+@njit(**PART)
+def _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, limits, keys,
+               counts, block):  # fmt: skip
+    bits = rays.view(np.uint32)
+    for x in range(size):
+        k = start + x
+        # A path at its last depth still sees lights; emission of surfaces is left to `prepare`.
+        if block[REACH + x] >= ENDLESS or lane_tags[1, k] > max_depth:
+            keys[k] = -1
+            continue
+        material = whole(triangle_material[bits[k >> 4, PRIMITIVE, k & 15]])
+        queue = FAR_LEVEL
+        if limits[material, 0] > R(0):
+            queue = int(block[_LEVEL + x]) if level == AUTO_LEVEL else level
+        key = (3 * material + queue) * 2 + (1 if block[_COSINE + x] > R(0) else 0)
+        keys[k] = key
+        counts[key] += 1
+
+
+@njit(**INLINE)
+def _advance(offsets, key):
+    place = whole(offsets[key])
+    offsets[key] = place + 1
+    return place
+
+
+@njit(**LEAN)
+def sort_lanes(count, keys, offsets, order):
+    """The lanes that go on, in the order of their queues.
+
+    offsets : (queues,) int64 - where each queue starts; advanced to where it ends.
+    order : (count,) int32
+    """
+    for k in range(whole(count)):
+        if keys[k] >= 0:
+            order[_advance(offsets, whole(keys[k]))] = k

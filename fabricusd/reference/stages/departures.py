@@ -1,0 +1,312 @@
+"""From shaded hits to new rays: shadow rays towards lights, and the paths' next rays.
+
+Hits go through in blocks: rows are copied side by side, what they send out is computed by loops
+that LLVM vectorises, and only what carries light is then written out, packed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from fabricusd.kernels.real import INLINE, KERNEL, LEAN, PART, whole
+from fabricusd.reference.rays.embree import DX, GEOMETRY, MISS, OX, TFAR, TNEAR
+from fabricusd.reference.rays.wave import (
+    ALBEDO,
+    ALPHA,
+    AT_LEVEL,
+    BACK,
+    BEAUTY_ROWS,
+    BEFORE,
+    BETA,
+    CHANCE,
+    CORNERS,
+    DEPTH,
+    DEPTH_Z,
+    DISTANCE,
+    F_PDF,
+    FRONT,
+    GO,
+    GO_PDF,
+    HIT_ROWS,
+    KEEP,
+    LANE_BETA,
+    LANE_PDF,
+    LANE_SPREAD,
+    LANE_WIDTH,
+    LEVEL,
+    LIGHT,
+    LIGHT_PDF,
+    NORMAL,
+    PATH,
+    SPREAD,
+    TANGENT,
+    THREAD,
+    THREAD_ID,
+    TO_LIGHT,
+    UNLIT,
+    UV,
+    WEIGHT,
+    WI,
+    WIDTH,
+    WO,
+    F,
+    N,
+    U,
+    V,
+)
+from fabricusd.reference.rays.wave import PRIMITIVE as TRIANGLE
+from fabricusd.reference.stages.arrivals import LIGHT_ONLY, MIS, UNIFORM
+
+R = np.float32
+FAR = R(1e30)
+UNSEEN = R(-1)
+"""A ray's pdf where no light sampling competes with it."""
+CARRIES_ON = R(8)
+"""A path that carries the inverse of this or more is not ended by chance: rays times relative MSE
+is least from 6 to 12 on the samples, a sixth below what it is at 2."""
+MOST = R(3e38)
+"""What is not below it is not finite."""
+
+BLOCK = 128
+
+# Rows of a block after those of `Wave.hits`: a shadow ray's origin, length and what it brings; the
+# next ray's origin, direction, throughput, pdf and spread. A negative sum of what it brings, or
+# throughput, means no ray; below -1, one that was not finite.
+_SHADOW, _REACH, _BRINGS, _SUM, _START, _ALONG, _BETA, _PDF, _SPREAD, _ALIVE = (
+    HIT_ROWS + row for row in (0, 3, 4, 7, 8, 11, 14, 17, 18, 19)
+)
+_ROWS = HIT_ROWS + 20
+_NONE, _BROKEN = R(-1), R(-2)
+
+
+@njit(**KERNEL)
+def depart(step, estimator, count, max_depth, hits, tags, film, shadow_rays, shadow, shadow_path,
+           next_rays, next_lanes, next_tags, result):  # fmt: skip
+    """Write the shadow rays and next rays of all hits, each packed.
+
+    shadow : (4, n) - what a shadow ray adds where nothing is in its way, and its length.
+    result : (3,) int64 - shadow rays, next rays, values that were not finite.
+    """
+    block = np.empty(_ROWS * BLOCK, np.float32)
+    result[:] = 0
+    count = whole(count)
+    for start in range(0, count, BLOCK):
+        size = min(BLOCK, count - start)
+        _load(start, size, hits, block)
+        _towards_lights(estimator == MIS, size, block)
+        if estimator == UNIFORM:
+            _go_uniformly(size, block)
+        _onwards(step, estimator == MIS, size, block)
+        _write_shadows(start, size, tags, film, shadow_rays, shadow, shadow_path, result, block)
+        # One ray beyond the last surface: what it sees of lights belongs to that surface.
+        deepest = max_depth if estimator == LIGHT_ONLY else max_depth + 1
+        _write_next(start, size, deepest, tags, next_rays, next_lanes, next_tags, result, block)
+    _fill_up(result[0], shadow_rays)
+    _fill_up(result[1], next_rays)
+
+
+@njit(**PART)
+def _load(start, size, hits, block):
+    for row in range(CORNERS):
+        source = hits[row][start:]
+        for x in range(size):
+            block[row * BLOCK + x] = source[x]
+
+
+# A place and not a row and a column: numba compiles a function anew for each constant it is given.
+@njit(**INLINE)
+def _three(block, at):
+    return block[at], block[at + BLOCK], block[at + 2 * BLOCK]
+
+
+@njit(**INLINE)
+def _put(block, at, a, b, c):
+    block[at], block[at + BLOCK], block[at + 2 * BLOCK] = a, b, c
+
+
+@njit(**PART)
+def _towards_lights(mis, size, block):
+    """Shadow rays, and what they bring where nothing is in their way."""
+    for x in range(size):
+        pdf = block[LIGHT_PDF * BLOCK + x]
+        ratio = block[F_PDF * BLOCK + x] / max(pdf, R(1e-30))
+        weight = R(1) / (R(1) + ratio * ratio) if mis and pdf > R(0) else R(1)
+        br, bg, bb = _three(block, BETA * BLOCK + x)
+        fr, fg, fb = _three(block, F * BLOCK + x)
+        lr, lg, lb = _three(block, LIGHT * BLOCK + x)
+        red, green, blue = weight * br * fr * lr, weight * bg * fg * lg, weight * bb * fb * lb
+        total = red + green + blue
+        total = total if abs(total) < MOST else _BROKEN
+        block[_SUM * BLOCK + x] = R(0) if pdf == R(0) else total
+        _put(block, _BRINGS * BLOCK + x, red, green, blue)
+        front = block[(WI + 2) * BLOCK + x] >= R(0)
+        ax, ay, az = _three(block, FRONT * BLOCK + x)
+        bx, by, bz = _three(block, BACK * BLOCK + x)
+        _put(
+            block,
+            _SHADOW * BLOCK + x,
+            ax if front else bx,
+            ay if front else by,
+            az if front else bz,
+        )
+        # Lights may lie on a surface: what is in the last ten-thousandth is the lamp, not an
+        # obstacle.
+        reach = block[DISTANCE * BLOCK + x]
+        block[_REACH * BLOCK + x] = reach if reach >= FAR else reach * R(0.9999)
+
+
+@njit(**PART)
+def _go_uniformly(size, block):
+    """The estimator that knows no sampler goes where its light was drawn, over the sphere."""
+    for x in range(size):
+        pdf = block[KEEP * BLOCK + x] * R(0.25 / math.pi)
+        straight = block[GO_PDF * BLOCK + x] < R(0)
+        if straight:
+            continue
+        inverse = R(1) / pdf if pdf > R(0) else R(0)
+        for row in range(3):
+            block[(GO + row) * BLOCK + x] = block[(WI + row) * BLOCK + x]
+            block[(WEIGHT + row) * BLOCK + x] = block[(F + row) * BLOCK + x] * inverse
+        block[GO_PDF * BLOCK + x] = pdf
+
+
+@njit(**PART)
+def _onwards(step, mis, size, block):
+    """The paths' next rays: as the surface drew them, or straight on behind it."""
+    # The first ray from a surface is half of its direct light: to end it costs more noise than it
+    # saves time, fourfold on a grey floor under a sky.
+    least = R(1) if step == 0 else R(0)
+    for x in range(size):
+        pdf = block[GO_PDF * BLOCK + x]
+        straight = pdf < R(0)
+        gx, gy, gz = _three(block, GO * BLOCK + x)
+        ox, oy, oz = _three(block, WO * BLOCK + x)
+        gx, gy, gz = (-ox if straight else gx), (-oy if straight else gy), (-oz if straight else gz)
+        ux, uy, uz = _three(block, U * BLOCK + x)
+        vx, vy, vz = _three(block, V * BLOCK + x)
+        nx, ny, nz = _three(block, N * BLOCK + x)
+        _put(
+            block, _ALONG * BLOCK + x, gx * ux + gy * vx + gz * nx, gx * uy + gy * vy + gz * ny,
+            gx * uz + gy * vz + gz * nz,
+        )  # fmt: skip
+        front = gz >= R(0) and not straight
+        ax, ay, az = _three(block, FRONT * BLOCK + x)
+        bx, by, bz = _three(block, BACK * BLOCK + x)
+        _put(
+            block, _START * BLOCK + x, ax if front else bx, ay if front else by, az if front else bz
+        )
+        br, bg, bb = _three(block, BETA * BLOCK + x)
+        wr, wg, wb = _three(block, WEIGHT * BLOCK + x)
+        red, green, blue = wr * br, wg * bg, wb * bb
+        most = max(red, max(green, blue))
+        # Russian roulette on what the path can still carry.
+        chance = max(min(R(1), CARRIES_ON * most), least if most > R(0) else R(0))
+        inverse = R(1) / max(chance, R(1e-30))
+        red, green, blue = red * inverse, green * inverse, blue * inverse
+        _put(
+            block, _BETA * BLOCK + x,
+            br if straight else red, bg if straight else green, bb if straight else blue,
+        )  # fmt: skip
+        alive = R(1) if block[(CHANCE + 3) * BLOCK + x] < chance else _NONE
+        alive = alive if most < MOST and pdf < MOST else _BROKEN
+        alive = _NONE if pdf == R(0) else alive
+        block[_ALIVE * BLOCK + x] = R(1) if straight else alive
+        spread = block[SPREAD * BLOCK + x]
+        # A scattered ray stands for the share of directions that its pdf leaves to it.
+        wide = R(0.25) * math.sqrt(min(R(1) / max(pdf, R(1e-30)), R(4)))
+        block[_SPREAD * BLOCK + x] = spread if straight else max(spread, wide)
+        seen = pdf if mis else UNSEEN
+        block[_PDF * BLOCK + x] = block[BEFORE * BLOCK + x] if straight else seen
+
+
+@njit(**INLINE)
+def _write_ray(k, start, along, reach, rays, block):
+    """Ray `k` of the packets: origin and direction from where they lie in the block."""
+    p, lane = k >> 4, k & 15
+    for row in range(3):
+        rays[p, OX + row, lane] = block[start + row * BLOCK]
+        rays[p, DX + row, lane] = block[along + row * BLOCK]
+    rays[p, TNEAR, lane], rays[p, TFAR, lane] = R(0), reach
+    rays.view(np.uint32)[p, GEOMETRY, lane] = MISS
+
+
+@njit(**PART)
+def _write_shadows(start, size, tags, film, rays, shadow, shadow_path, result, block):
+    k = whole(result[0])
+    for x in range(size):
+        h = start + x
+        path, depth = whole(tags[PATH, h]), tags[DEPTH, h]
+        if depth == 0 and block[GO_PDF * BLOCK + x] >= R(0):
+            film[ALPHA, path] = R(1)
+        total = block[_SUM * BLOCK + x]
+        if total > R(0):
+            reach = block[_REACH * BLOCK + x]
+            _write_ray(k, _SHADOW * BLOCK + x, TO_LIGHT * BLOCK + x, reach, rays, block)
+            for row in range(3):
+                shadow[row, k] = block[(_BRINGS + row) * BLOCK + x]
+            shadow[3, k] = reach
+            shadow_path[k] = path if depth == 0 else -path - 1
+            if depth == 0 and film.shape[0] > BEAUTY_ROWS:
+                film[UNLIT, path] += total
+            k += 1
+        elif total == _BROKEN:
+            result[2] += 1
+    result[0] = k
+
+
+@njit(**PART)
+def _write_next(start, size, deepest, tags, rays, lanes, lane_tags, result, block):
+    k = whole(result[1])
+    for x in range(size):
+        h = start + x
+        alive, depth = block[_ALIVE * BLOCK + x], tags[DEPTH, h]
+        straight = block[GO_PDF * BLOCK + x] < R(0)
+        if alive == _BROKEN:
+            result[2] += 1
+        if alive < R(0) or (depth >= deepest and not straight):
+            continue
+        _write_ray(k, _START * BLOCK + x, _ALONG * BLOCK + x, FAR, rays, block)
+        for row in range(3):
+            lanes[LANE_BETA + row, k] = block[(_BETA + row) * BLOCK + x]
+        lanes[LANE_PDF, k] = block[_PDF * BLOCK + x]
+        lanes[LANE_WIDTH, k] = block[WIDTH * BLOCK + x]
+        lanes[LANE_SPREAD, k] = block[_SPREAD * BLOCK + x]
+        lane_tags[0, k], lane_tags[1, k] = tags[PATH, h], depth if straight else depth + 1
+        k += 1
+    result[1] = k
+
+
+@njit(**INLINE)
+def _fill_up(count, rays):
+    """Lanes after the last ray of its packet are not traced."""
+    count = whole(count)
+    for k in range(count, ((count + 15) >> 4) << 4):
+        rays[k >> 4, TNEAR, k & 15] = R(0)
+        rays[k >> 4, TFAR, k & 15] = R(-1)
+
+
+@njit(**LEAN)
+def record_first(count, eye, view, hits, tags, uv, film):
+    """Write the properties of first surfaces, for the AOVs."""
+    for h in range(count):
+        if tags[DEPTH, h] != 0 or hits[GO_PDF, h] < R(0):
+            continue
+        path = whole(tags[PATH, h])
+        distance = R(0)
+        for row in range(3):
+            film[ALBEDO + row, path] = hits[WEIGHT + row, h] if hits[GO_PDF, h] > R(0) else R(0)
+            film[NORMAL + row, path] = hits[N + row, h]
+            film[TANGENT + row, path] = hits[U + row, h]
+            distance += (hits[FRONT + row, h] - eye[row]) * view[row]
+        film[DEPTH_Z, path] = distance
+        film[THREAD_ID, path] = hits[THREAD, h]
+        film[AT_LEVEL, path] = R(tags[LEVEL, h])
+        corner = uv[tags[TRIANGLE, h]]
+        b, c = hits[CORNERS, h], hits[CORNERS + 1, h]
+        for row in range(2):
+            film[UV + row, path] = (
+                (R(1) - b - c) * corner[row] + b * corner[row + 2] + c * corner[row + 4]
+            )

@@ -1,0 +1,188 @@
+"""From rays that met a surface to hits ready for shading: frames, numbers, a light for each."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fabricusd.kernels.real import INLINE, KERNEL, LEAN, PART, whole
+from fabricusd.reference.lights.sampling import (
+    choose_lights,
+    no_lights,
+    sample_evenly,
+    sample_lights,
+)
+from fabricusd.reference.rays.embree import DX, HIT_U, HIT_V, PRIMITIVE, TFAR
+from fabricusd.reference.rays.hit_frames import (
+    BLOCK,
+    BLOCK_ROWS,
+    CHOSEN,
+    MADE,
+    NUMBERS,
+    RAY,
+    TAKEN,
+    make_frames,
+    make_numbers,
+)
+from fabricusd.reference.rays.sobol import third_number
+from fabricusd.reference.rays.triangles import RECORD
+from fabricusd.reference.rays.wave import (
+    BEFORE,
+    BETA,
+    CHANCE,
+    CORNERS,
+    DEPTH,
+    DIRECT,
+    FOOTPRINT,
+    INDIRECT,
+    LANE_BETA,
+    LANE_PDF,
+    LANE_SPREAD,
+    LANE_WIDTH,
+    LEVEL,
+    LIGHT_PDF,
+    MATERIAL,
+    PATH,
+    PLACE,
+    SIDE,
+    SPREAD,
+    WI,
+    WIDTH,
+)
+from fabricusd.reference.rays.wave import PRIMITIVE as TRIANGLE
+from fabricusd.reference.stages.arrivals import NUMBERS_PER_STEP, SURFACE_ONLY, UNIFORM
+from fabricusd.reference.surfaces.preview import emission_at
+
+R = np.float32
+
+
+@njit(**KERNEL)
+def prepare(step, estimator, queue_ends, rays, lanes, lane_tags, keys, order, records, lights, dome,
+            epsilon, path_pixel, path_sample, numbers, hits, tags):  # fmt: skip
+    """Turn the lanes of `order` into hits; within a block those of one light lie together.
+
+    queue_ends : (queues,) int64 - no block holds hits of two queues
+    """
+    block = np.empty(BLOCK_ROWS * BLOCK, np.float32)
+    lane_of, choice = np.empty(2 * BLOCK, np.int32), np.empty(BLOCK, np.int32)
+    counters, uniform = np.empty(4 * BLOCK, np.uint32), np.empty(BLOCK, np.float32)
+    light_ends = np.empty(max(lights.shape[0], 1), np.int32)
+    sampled = estimator != UNIFORM and estimator != SURFACE_ONLY and lights.shape[0] > 0
+    place = np.uint32(2 + NUMBERS_PER_STEP * step)
+    start = np.int64(0)
+    for queue in range(queue_ends.shape[0]):
+        queue_end = whole(queue_ends[queue])
+        while start < queue_end:
+            size = min(BLOCK, queue_end - start)
+            _begin(start, size, order, lane_tags, path_pixel, path_sample, lane_of, counters)
+            _choose(lights, numbers, place, size, counters, uniform, choice)
+            _group(size, choice, light_ends, lane_of, counters)
+            for x in range(size):
+                _take(whole(lane_of[x]), start + x, x, rays, lanes, lane_tags, keys, records,
+                      block, hits, tags)  # fmt: skip
+            make_frames(size, epsilon, block)
+            make_numbers(numbers, size, place, counters, block)
+            if sampled:
+                sample_lights(lights, dome, light_ends, size, block)
+            elif estimator == UNIFORM:
+                sample_evenly(size, block)
+            else:
+                no_lights(size, block)
+            _bring(start, size, block, hits)
+            start += size
+
+
+@njit(**PART)
+def _begin(start, size, order, lane_tags, path_pixel, path_sample, lane_of, counters):
+    """A block's lanes and their paths' counters, in the upper halves of both."""
+    for x in range(size):
+        lane = whole(order[start + x])
+        path = whole(lane_tags[0, lane])
+        lane_of[BLOCK + x] = lane
+        counters[2 * BLOCK + x], counters[3 * BLOCK + x] = path_pixel[path], path_sample[path]
+
+
+@njit(**PART)
+def _choose(lights, numbers, place, size, counters, uniform, choice):
+    """A light for each lane, by the number that `make_numbers` makes once more for the hit."""
+    if lights.shape[0] > 1:
+        following = np.uint32(place + np.uint32(1))
+        for x in range(size):
+            uniform[x] = third_number(
+                numbers, counters[2 * BLOCK + x], counters[3 * BLOCK + x], following
+            )
+    choose_lights(lights, size, uniform, choice)
+
+
+@njit(**PART)
+def _group(size, choice, ends, lane_of, counters):
+    """Bring the lanes of each light together, in the lower halves; `ends` is where they end."""
+    for j in range(ends.shape[0]):
+        ends[j] = 0
+    for x in range(size):
+        ends[whole(choice[x])] += 1
+    total = np.int32(0)
+    for j in range(ends.shape[0]):
+        found = ends[j]
+        ends[j] = total
+        total += found
+    for x in range(size):
+        j = whole(choice[x])
+        y = whole(ends[j])
+        ends[j] = y + 1
+        lane_of[y] = lane_of[BLOCK + x]
+        counters[y], counters[BLOCK + y] = counters[2 * BLOCK + x], counters[3 * BLOCK + x]
+
+
+@njit(**INLINE)
+def _take(k, h, x, rays, lanes, lane_tags, keys, records, block, hits, tags):
+    """Lane `k` as hit `h`: what goes on unchanged, and place `x` of the block for what does not."""
+    bits = rays.view(np.uint32)
+    p, lane = k >> 4, k & 15
+    triangle, key = bits[p, PRIMITIVE, lane], whole(keys[k])
+    tags[PATH, h], tags[DEPTH, h] = lane_tags[0, k], lane_tags[1, k]
+    tags[TRIANGLE, h], tags[MATERIAL, h], tags[LEVEL, h] = triangle, key // 6, (key // 2) % 3
+    for row in range(3):
+        hits[BETA + row, h] = lanes[LANE_BETA + row, k]
+    hits[BEFORE, h] = lanes[LANE_PDF, k]
+    width = lanes[LANE_WIDTH, k] + rays[p, TFAR, lane] * lanes[LANE_SPREAD, k]
+    hits[WIDTH, h], hits[SPREAD, h] = width, lanes[LANE_SPREAD, k]
+    hits[CORNERS, h], hits[CORNERS + 1, h] = rays[p, HIT_U, lane], rays[p, HIT_V, lane]
+    for row in range(3):
+        block[RAY + row * BLOCK + x] = rays[p, DX + row, lane]
+    block[RAY + 3 * BLOCK + x] = rays[p, HIT_U, lane]
+    block[RAY + 4 * BLOCK + x] = rays[p, HIT_V, lane]
+    for column in range(RECORD):
+        block[TAKEN + column * BLOCK + x] = records[triangle, column]
+    block[MADE + FOOTPRINT * BLOCK + x] = width
+
+
+@njit(**PART)
+def _bring(start, size, block, hits):
+    """Bring the block's frames, numbers and lights to the hits."""
+    _bring_rows(MADE, 0, SIDE + 1, start, size, block, hits)
+    _bring_rows(NUMBERS, CHANCE, CHANCE + 4, start, size, block, hits)
+    _bring_rows(CHOSEN, WI, LIGHT_PDF + 1, start, size, block, hits)
+
+
+@njit(**INLINE)
+def _bring_rows(source, first, end, start, size, block, hits):
+    for row in range(first, end):
+        into, at = hits[row][start:], whole(source + (row - first) * BLOCK)
+        for x in range(size):
+            into[x] = block[at + x]
+
+
+@njit(**LEAN)
+def add_emission(count, surfaces, hits, tags, film):
+    """Add what surfaces that shine by themselves send back along the ray, on their front."""
+    for h in range(count):
+        red, green, blue = emission_at(
+            surfaces, tags[MATERIAL, h], hits[PLACE, h], hits[PLACE + 1, h]
+        )
+        if red + green + blue > R(0) and hits[SIDE, h] > R(0):
+            row = DIRECT if tags[DEPTH, h] <= 1 else INDIRECT
+            path = tags[PATH, h]
+            film[row, path] += red * hits[BETA, h]
+            film[row + 1, path] += green * hits[BETA + 1, h]
+            film[row + 2, path] += blue * hits[BETA + 2, h]

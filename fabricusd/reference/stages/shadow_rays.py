@@ -1,0 +1,105 @@
+"""What becomes of shadow rays: blocked, let through, or weakened by see-through surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fabricusd.kernels.real import LEAN, whole
+from fabricusd.reference.rays.embree import (
+    DX,
+    DY,
+    DZ,
+    GEOMETRY,
+    HIT_U,
+    HIT_V,
+    MISS,
+    OX,
+    OY,
+    OZ,
+    PRIMITIVE,
+    TFAR,
+    TNEAR,
+)
+from fabricusd.reference.rays.triangles import D1, D2, E1, E2, P0, ST
+from fabricusd.reference.rays.wave import DIRECT, INDIRECT, LIT
+from fabricusd.reference.surfaces.preview import opacity_at
+
+R = np.float32
+FAR = R(1e30)
+
+
+@njit(**LEAN)
+def settle(count, shadow_rays, shadow, shadow_path, film, aovs):
+    """Add what unblocked shadow rays bring."""
+    for k in range(whole(count)):
+        signed = shadow_path[k]
+        path, row = whole(signed if signed >= 0 else -1 - signed), DIRECT
+        if signed < 0:
+            row = INDIRECT
+        if shadow_rays[k >> 4, TFAR, k & 15] < R(0):
+            continue
+        if aovs and row == DIRECT:
+            film[LIT, path] += shadow[0, k] + shadow[1, k] + shadow[2, k]
+        film[row, path] += shadow[0, k]
+        film[row + 1, path] += shadow[1, k]
+        film[row + 2, path] += shadow[2, k]
+
+
+@njit(**LEAN)
+def thin_out(count, rays, shadow, shadow_path, opacity, surfaces, triangle_material, records,
+             epsilon, aovs, film):  # fmt: skip
+    """Let shadow rays through what is not opaque, after `intersect`.
+
+    Rays that met nothing are settled; those that met something opaque end; the others are
+    weakened and go on behind it. opacity : (materials,) float32 - constant of each material, below
+    0 where it varies over the surface. Returns how many go on, packed to the front.
+    """
+    whole = rays.view(np.uint32)
+    left = 0
+    for k in range(count):
+        p, lane = k >> 4, k & 15
+        path = shadow_path[k]
+        row = DIRECT if path >= 0 else INDIRECT
+        column = path if path >= 0 else -path - 1
+        if whole[p, GEOMETRY, lane] == MISS:
+            for j in range(3):
+                film[row + j, column] += shadow[j, k]
+            if aovs and row == DIRECT:
+                film[LIT, column] += shadow[0, k] + shadow[1, k] + shadow[2, k]
+            continue
+        triangle = whole[p, PRIMITIVE, lane]
+        material = triangle_material[triangle]
+        record = records[triangle]
+        u, v = rays[p, HIT_U, lane], rays[p, HIT_V, lane]
+        blocked = opacity[material]
+        if blocked < R(0):
+            blocked = opacity_at(
+                surfaces, material,
+                record[ST] + u * record[D1] + v * record[D2],
+                record[ST + 1] + u * record[D1 + 1] + v * record[D2 + 1],
+            )  # fmt: skip
+        through = R(1) - blocked
+        if through <= R(1e-4):
+            continue
+        rest = rays[p, TFAR, lane]
+        q, place = left >> 4, left & 15
+        end = shadow[3, k]
+        for j in range(3):
+            shadow[j, left] = through * shadow[j, k]
+        shadow_path[left] = path
+        dx, dy, dz = rays[p, DX, lane], rays[p, DY, lane], rays[p, DZ, lane]
+        x = record[P0] + u * record[E1] + v * record[E2]
+        y = record[P0 + 1] + u * record[E1 + 1] + v * record[E2 + 1]
+        z = record[P0 + 2] + u * record[E1 + 2] + v * record[E2 + 2]
+        rays[q, OX, place], rays[q, OY, place], rays[q, OZ, place] = x, y, z
+        rays[q, DX, place], rays[q, DY, place], rays[q, DZ, place] = dx, dy, dz
+        rays[q, TNEAR, place] = R(8) * epsilon + R(4e-6) * max(abs(x), max(abs(y), abs(z)))
+        rays[q, TFAR, place] = end if end >= FAR else end - rest
+        shadow[3, left] = rays[q, TFAR, place]
+        whole[q, GEOMETRY, place] = MISS
+        left += 1
+    for k in range(left, ((left + 15) >> 4) << 4):
+        rays[k >> 4, TNEAR, k & 15] = R(0)
+        rays[k >> 4, TFAR, k & 15] = R(-1)
+    return left

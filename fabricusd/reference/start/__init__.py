@@ -1,0 +1,1 @@
+"""Compiling and loading kernels before the first picture."""

@@ -1,0 +1,1 @@
+"""What a path meets: cloth and preview surfaces."""

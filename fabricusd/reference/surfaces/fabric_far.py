@@ -1,0 +1,79 @@
+"""Published cloth at level `far`: directions, densities and values of hits, a block at a time.
+
+A block goes through all of it while it is in the first-level cache.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fabricusd.appearance.published.far import far_values
+from fabricusd.kernels.real import KERNEL, LEAN, as_part
+from fabricusd.reference.rays.wave import CHANCE, F_PDF, GO, GO_PDF, KEEP, THREAD, WEIGHT, WI, WO, F
+from fabricusd.reference.surfaces.fabric_sampling import BLOCK, sample_far
+
+STRAIGHT = np.float32(-1)
+"""In GO_PDF: the path goes straight on."""
+
+
+@njit(**LEAN)
+def gather(hits, first, size, wo, wi):
+    """Directions to the viewer and to the light of `size` hits, side by side."""
+    for row in range(3):
+        to_viewer, to_light = hits[WO + row][first:], hits[WI + row][first:]
+        for x in range(size):
+            wo[row, x] = to_viewer[x]
+        for x in range(size):
+            wi[row, x] = to_light[x]
+
+
+@njit(**LEAN)
+def finish_far(R, hits, first, count, gap, go, towards, onwards):
+    """Values and weights; the gap lets its share of the paths go straight on.
+
+    Row by row: LLVM vectorises a loop over few rows, whose overlap it can check beforehand.
+    """
+    keep = R(1) - gap
+    go_pdf, chances = hits[GO_PDF][first:], hits[CHANCE + 3][first:]
+    for row in range(3):
+        value, direction = hits[F + row][first:], hits[GO + row][first:]
+        weight = hits[WEIGHT + row][first:]
+        for k in range(count):
+            value[k] = towards[row, k]
+        for k in range(count):
+            direction[k] = go[row, k]
+        for k in range(count):
+            pdf = go_pdf[k] * keep
+            weight[k] = onwards[row, k] / pdf if pdf > R(0) else R(0)
+    kept, thread, f_pdf = hits[KEEP][first:], hits[THREAD][first:], hits[F_PDF][first:]
+    for k in range(count):
+        kept[k], thread[k] = keep, R(-1)
+        f_pdf[k] *= keep
+    for k in range(count):
+        straight = chances[k] >= keep
+        chances[k] = chances[k] if straight else chances[k] / keep
+        go_pdf[k] = STRAIGHT if straight else go_pdf[k] * keep
+
+
+_gather, _sample_far, _far_values, _finish_far = (
+    as_part(kernel) for kernel in (gather, sample_far, far_values, finish_far)
+)
+
+
+@njit(**KERNEL)
+def shade_far(R, tables, sampling, gap, hits, first, last):
+    """Rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP and THREAD of hits `first` to before `last`."""
+    wo, wi = np.empty((3, BLOCK), np.float32), np.empty((3, BLOCK), np.float32)
+    go, towards = np.empty((3, BLOCK), np.float32), np.empty((3, BLOCK), np.float32)
+    onwards = np.empty((3, BLOCK), np.float32)
+    for start in range(first, last, BLOCK):
+        size = min(BLOCK, last - start)
+        _gather(hits, start, size, wo, wi)
+        _sample_far(
+            R, sampling, wo, wi, hits[CHANCE], hits[CHANCE + 1], hits[CHANCE + 2], go,
+            hits[F_PDF], hits[GO_PDF], start, size,
+        )  # fmt: skip
+        _far_values(R, tables, wi, wo, towards, 0, size)
+        _far_values(R, tables, go, wo, onwards, 0, size)
+        _finish_far(R, hits, start, size, gap, go, towards, onwards)

@@ -1,0 +1,355 @@
+"""The samplers of published cloth, many hits at a time.
+
+The same lobes, shares and densities as `appearance.surface_sampling`, whose scalar functions are
+what these loops are tested against; here each hit's shares are read once for one drawing and two
+densities, and loops run over hits so that LLVM vectorises them. All rows of a block lie in one
+array, their distances known to the compiler, which therefore need not check them for overlap.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from fabricusd.appearance.published.sampling import (
+    UNIFORM,
+    share_at,
+    view_corner,
+)
+from fabricusd.appearance.published.segment import across_deviation
+from fabricusd.appearance.sampling.lobes import (
+    ISOTROPIC,
+    STEEPEST,
+    SURFACE,
+    VOLUME,
+    azimuth_seen,
+    density_across,
+    lobe_densities,
+    sample_across,
+    sample_lobe,
+)
+from fabricusd.appearance.sampling.share_fit import AZIMUTHS
+from fabricusd.appearance.sampling.stretches import (
+    COS,
+    PSI0,
+    SET,
+    SIN,
+    SURFACE_WIDTH,
+    TAN,
+    VOLUME_WIDTH,
+    nearest_stretch,
+)
+from fabricusd.appearance.scattering.terms import GAMMA_SURFACE, GAMMA_VOLUME
+from fabricusd.appearance.weave.coverage import WARP
+from fabricusd.kernels.real import INLINE, KERNEL, PART, atan2, cos, sin
+
+BLOCK = 256
+_EVEN = 3
+"""In place of a lobe: uniform over the hemisphere."""
+
+# Rows of a block: the viewer, the light, the drawn direction; the stretch of thread it is drawn
+# from; two uniform numbers; both densities; three shares; where the view lies on their grid; the
+# place across the thread and what that makes of both surface densities; after that the shares of
+# all lobes.
+(_OX, _OY, _OZ, _IX, _IY, _IZ, _GX, _GY, _GZ, _WARP, _PSI0, _COS, _SIN, _TAN, _ON_SURFACE,
+ _ON_VOLUME, _LOBE, _U1, _U2, _P_LIGHT, _P_GO, _A, _B, _D, _ELEVATION, _AZIMUTH, _UP, _ROUND,
+ _W, _NARROW_LIGHT, _NARROW_GO, _SHARES) = (
+    row * BLOCK for row in range(32)
+)  # fmt: skip
+
+
+@njit(**INLINE)
+def _into(R, warp, c, s, x, y, z):
+    """`frame.to_thread` without a branch: (w.t, w.b, w.n_t); warp is 1 or 0."""
+    along = warp * y + (R(1) - warp) * x
+    across = (R(1) - warp) * y - warp * x
+    return c * along - s * z, across, s * along + c * z
+
+
+@njit(**INLINE)
+def _lobes_at(R, warp, psi0, c, s, tangent, surface, volume, theta_o, x, y, z, a, b, d):
+    """The lobes' densities at a direction, times their shares a, b, d; 0 behind the thread."""
+    t, across, n = _into(R, warp, c, s, x, y, z)
+    on_surface, on_volume, isotropic = lobe_densities(
+        R, psi0, tangent, surface, volume, theta_o, t, across, max(n, R(1e-12))
+    )
+    p = a * on_surface + b * on_volume + d * isotropic
+    return p if n > R(0) else R(0)
+
+
+@njit(**INLINE)
+def _load(wo, wi, start, size, block):
+    for row in range(3):
+        to_viewer, to_light = wo[row][start:], wi[row][start:]
+        for x in range(size):
+            block[_OX + row * BLOCK + x] = to_viewer[x]
+        for x in range(size):
+            block[_IX + row * BLOCK + x] = to_light[x]
+
+
+@njit(**INLINE)
+def _find_views(R, size, block):
+    """`view_corner` of all viewers."""
+    for x in range(size):
+        row, column, _, up, round_ = view_corner(R, block[_OX + x], block[_OY + x], block[_OZ + x])
+        block[_ELEVATION + x], block[_AZIMUTH + x] = R(row), R(column)
+        block[_UP + x], block[_ROUND + x] = up, round_
+
+
+@njit(**INLINE)
+def _corner(block, x):
+    """What `view_corner` found."""
+    column = int(block[_AZIMUTH + x])
+    following = column + 1 if column + 1 < AZIMUTHS else 0
+    return int(block[_ELEVATION + x]), column, following, block[_UP + x], block[_ROUND + x]
+
+
+@njit(**PART)
+def _read_shares(R, shares, size, block, mixed):
+    """The shares of all lobes, `share_at`: read lobe by lobe where they lie side by side, and then
+    laid out hit by hit."""
+    lobes = shares.shape[2]
+    for x in range(size):
+        row, column, following, up, round_ = _corner(block, x)
+        a, b = shares[row][column], shares[row][following]
+        c, d = shares[row + 1][column], shares[row + 1][following]
+        into = mixed[x * lobes :]
+        for k in range(lobes):
+            low, high = a[k] + round_ * (b[k] - a[k]), c[k] + round_ * (d[k] - c[k])
+            into[k] = low + up * (high - low)
+    for k in range(lobes):
+        into = block[_SHARES + k * BLOCK :]
+        for x in range(size):
+            into[x] = mixed[x * lobes + k]
+
+
+@njit(**INLINE)
+def _choose(R, shares, count, u0, block, x):
+    """Lobe of `count` that u0 falls on, -1 for none of them: uniform."""
+    left = u0 - R(UNIFORM)
+    if left < R(0) or count == 0:
+        return -1
+    k = 0
+    while k < count - 1:
+        left -= block[shares + k * BLOCK + x]
+        if left < R(0):
+            break
+        k += 1
+    return k
+
+
+@njit(**PART)
+def _draw(R, size, block):
+    """Directions from the lobes chosen, in the surface frame."""
+    for x in range(size):
+        warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
+        lobe = block[_LOBE + x]
+        u1, u2 = block[_U1 + x], block[_U2 + x]
+        t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
+        theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
+        on_surface, on_volume = block[_ON_SURFACE + x], block[_ON_VOLUME + x]
+        width = on_surface if lobe == R(SURFACE) else on_volume
+        psi0, tangent = block[_PSI0 + x], block[_TAN + x]
+        t, b, n = sample_lobe(R, VOLUME, psi0, tangent, width, theta_o, u1, u2)
+        ti, bi, ni = sample_lobe(R, ISOTROPIC, psi0, tangent, width, theta_o, u1, u2)
+        isotropic = lobe == R(ISOTROPIC)
+        t, b, n = (ti if isotropic else t), (bi if isotropic else b), (ni if isotropic else n)
+        along, z = c * t + s * n, c * n - s * t
+        gx, gy = warp * -b + (R(1) - warp) * along, warp * along + (R(1) - warp) * b
+        flat = math.sqrt(max(R(0), (R(1) - u1) * (R(1) + u1)))
+        phi = R(2 * math.pi) * u2
+        even = lobe == R(_EVEN)
+        block[_GX + x] = flat * cos(R, phi) if even else gx
+        block[_GY + x] = flat * sin(R, phi) if even else gy
+        block[_GZ + x] = u1 if even else z
+
+
+@njit(**INLINE)
+def _store(R, start, size, block, go, p_light, p_go, first):
+    """Directions and densities of a block; 0 at or below the cloth."""
+    for row in range(3):
+        drawn = go[row][start:]
+        for x in range(size):
+            drawn[x] = block[_GX + row * BLOCK + x]
+    to_light, onwards = p_light[first + start :], p_go[first + start :]
+    for x in range(size):
+        lit = block[_IZ + x] > R(0) and block[_OZ + x] > R(0)
+        to_light[x] = block[_P_LIGHT + x] if lit else R(0)
+        seen = block[_GZ + x] > R(0) and block[_OZ + x] > R(0)
+        onwards[x] = block[_P_GO + x] if seen else R(0)
+
+
+@njit(**KERNEL)
+def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first, n):
+    """`far_direction` for `n` viewers, and `far_density` of it and of the direction to the light.
+
+    wo, wi, go : (3, n) real; u0, u1, u2, p_light, p_go : rows of which hits `first`... are used
+    """
+    stretches = sampling.stretches
+    lobes = 3 * stretches.shape[0]
+    block = np.empty(_SHARES + lobes * BLOCK, wo.dtype)
+    mixed = np.empty(lobes * BLOCK, wo.dtype)
+    for start in range(0, n, BLOCK):
+        size = min(BLOCK, n - start)
+        _load(wo, wi, start, size, block)
+        _find_views(R, size, block)
+        _read_shares(R, sampling.shares, size, block, mixed)
+        for x in range(size):
+            h = first + start + x
+            k = _choose(R, _SHARES, lobes, u0[h], block, x)
+            block[_U1 + x], block[_U2 + x] = u1[h], u2[h]
+            block[_LOBE + x] = R(_EVEN) if k < 0 else R(k % 3)
+            if lobes == 0:
+                block[_WARP + x] = block[_PSI0 + x] = block[_SIN + x] = block[_TAN + x] = R(0)
+                block[_COS + x] = block[_ON_SURFACE + x] = block[_ON_VOLUME + x] = R(1)
+                continue
+            row = stretches[max(k, 0) // 3]
+            block[_WARP + x] = R(1) if int(row[SET]) == WARP else R(0)
+            block[_PSI0 + x], block[_COS + x] = row[PSI0], row[COS]
+            block[_SIN + x], block[_TAN + x] = row[SIN], row[TAN]
+            block[_ON_SURFACE + x], block[_ON_VOLUME + x] = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
+        _draw(R, size, block)
+        for x in range(size):
+            block[_P_LIGHT + x] = block[_P_GO + x] = R(UNIFORM / (2 * math.pi))
+        for y in range(stretches.shape[0]):
+            _add_stretch(R, stretches[y], _SHARES + 3 * y * BLOCK, size, block)
+        _store(R, start, size, block, go, p_light, p_go, first)
+
+
+@njit(**PART)
+def _add_stretch(R, row, shares, size, block):
+    """A stretch's part of both densities."""
+    warp = R(1) if int(row[SET]) == WARP else R(0)
+    psi0, c, s, tangent = row[PSI0], row[COS], row[SIN], row[TAN]
+    surface, volume = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
+    # To a known place: a distance that the compiler does not know would keep the loop scalar.
+    for x in range(3 * BLOCK):
+        block[_A + x] = block[shares + x]
+    for x in range(size):
+        t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
+        theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
+        a, b, d = block[_A + x], block[_B + x], block[_D + x]
+        block[_P_LIGHT + x] += _lobes_at(
+            R, warp, psi0, c, s, tangent, surface, volume, theta_o,
+            block[_IX + x], block[_IY + x], block[_IZ + x], a, b, d,
+        )  # fmt: skip
+        block[_P_GO + x] += _lobes_at(
+            R, warp, psi0, c, s, tangent, surface, volume, theta_o,
+            block[_GX + x], block[_GY + x], block[_GZ + x], a, b, d,
+        )  # fmt: skip
+
+
+@njit(**KERNEL)
+def sample_points(R, tables, sampling, across_too, sets, threads, psi0, w, wo, wi, u0, u1, u2, go,
+                  p_light, p_go, first, n):  # fmt: skip
+    """As `sample_far` with `point_direction` and `point_density`, at the threads found.
+
+    sets, threads, psi0, w : (n,) what lies under each hit; a gap is sampled uniformly
+    """
+    count = sampling.stretches.shape[0]
+    block = np.empty(_SHARES, wo.dtype)
+    for start in range(0, n, BLOCK):
+        size = min(BLOCK, n - start)
+        _load(wo, wi, start, size, block)
+        _find_views(R, size, block)
+        for x in range(size):
+            h = first + start + x
+            block[_U1 + x], block[_U2 + x] = u1[h], u2[h]
+            on_thread = sets[start + x] <= WARP and count > 0
+            thread_set, thread, angle = 0, 0, R(0)
+            if on_thread:
+                thread_set, thread = sets[start + x], threads[start + x]
+                angle = min(max(psi0[start + x], R(-STEEPEST)), R(STEEPEST))
+            row = tables.threads[thread]
+            block[_WARP + x] = R(1) if thread_set == WARP else R(0)
+            block[_PSI0 + x], block[_W + x] = angle, w[start + x]
+            block[_ON_SURFACE + x] = R(2) * row[GAMMA_SURFACE]
+            block[_ON_VOLUME + x] = R(2) * row[GAMMA_VOLUME]
+            a = b = d = R(0)
+            if on_thread:
+                k = 3 * nearest_stretch(R, sampling.stretches, thread_set, thread, psi0[start + x])
+                corner = _corner(block, x)
+                a = share_at(R, sampling.point_shares, corner, k + SURFACE)
+                b = share_at(R, sampling.point_shares, corner, k + VOLUME)
+                d = share_at(R, sampling.point_shares, corner, k + ISOTROPIC)
+            block[_A + x], block[_B + x], block[_D + x] = a, b, d
+            k = _choose(R, _A, 3 if on_thread else 0, u0[h], block, x)
+            block[_LOBE + x] = R(_EVEN) if k < 0 else R(k)
+        _turn(R, size, block)
+        _draw(R, size, block)
+        if across_too:
+            _draw_across(R, size, block)
+        for x in range(size):
+            block[_NARROW_LIGHT + x] = block[_NARROW_GO + x] = R(1)
+        if across_too:
+            _narrow(R, size, block)
+        _add_points(R, size, block)
+        _store(R, start, size, block, go, p_light, p_go, first)
+
+
+@njit(**PART)
+def _turn(R, size, block):
+    """Cosine, sine and tangent of each hit's tangent angle."""
+    for x in range(size):
+        c, s = cos(R, block[_PSI0 + x]), sin(R, block[_PSI0 + x])
+        block[_COS + x], block[_SIN + x], block[_TAN + x] = c, s, s / c
+
+
+@njit(**PART)
+def _draw_across(R, size, block):
+    """Directions from the surface lobe at level `thread`, in place of those that `_draw` made."""
+    for x in range(size):
+        warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
+        t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
+        theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
+        width = block[_ON_SURFACE + x]
+        t, b, n = sample_across(
+            R, block[_PSI0 + x], block[_TAN + x], width, theta_o, azimuth_seen(R, b_o, n_o),
+            block[_W + x], across_deviation(R, R(0.5) * width), block[_U1 + x], block[_U2 + x],
+        )  # fmt: skip
+        along, z = c * t + s * n, c * n - s * t
+        ours = block[_LOBE + x] == R(SURFACE)
+        gx, gy = warp * -b + (R(1) - warp) * along, warp * along + (R(1) - warp) * b
+        block[_GX + x] = gx if ours else block[_GX + x]
+        block[_GY + x] = gy if ours else block[_GY + x]
+        block[_GZ + x] = z if ours else block[_GZ + x]
+
+
+@njit(**PART)
+def _narrow(R, size, block):
+    """What the place across the thread makes of both surface densities."""
+    for x in range(size):
+        warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
+        _, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
+        phi_o, w = azimuth_seen(R, b_o, n_o), block[_W + x]
+        beta, tangent = across_deviation(R, R(0.5) * block[_ON_SURFACE + x]), block[_TAN + x]
+        t, b, n = _into(R, warp, c, s, block[_IX + x], block[_IY + x], block[_IZ + x])
+        block[_NARROW_LIGHT + x] = density_across(
+            R, tangent, phi_o, w, beta, t, b, max(n, R(1e-12))
+        )
+        t, b, n = _into(R, warp, c, s, block[_GX + x], block[_GY + x], block[_GZ + x])
+        block[_NARROW_GO + x] = density_across(R, tangent, phi_o, w, beta, t, b, max(n, R(1e-12)))
+
+
+@njit(**PART)
+def _add_points(R, size, block):
+    """Both densities at each hit's own stretch."""
+    for x in range(size):
+        warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
+        t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
+        theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
+        a, b, d = block[_A + x], block[_B + x], block[_D + x]
+        angle, tangent = block[_PSI0 + x], block[_TAN + x]
+        surface, volume = block[_ON_SURFACE + x], block[_ON_VOLUME + x]
+        # Without a thread all shares are 0 and the whole is uniform.
+        even = R(UNIFORM / (2 * math.pi)) if a + b + d > R(0) else R(1 / (2 * math.pi))
+        block[_P_LIGHT + x] = even + _lobes_at(
+            R, warp, angle, c, s, tangent, surface, volume, theta_o,
+            block[_IX + x], block[_IY + x], block[_IZ + x], a * block[_NARROW_LIGHT + x], b, d,
+        )  # fmt: skip
+        block[_P_GO + x] = even + _lobes_at(
+            R, warp, angle, c, s, tangent, surface, volume, theta_o,
+            block[_GX + x], block[_GY + x], block[_GZ + x], a * block[_NARROW_GO + x], b, d,
+        )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Running work: workers, and stopping them."""

@@ -1,0 +1,1 @@
+"""Scenes from USD and mesh files: triangles, materials, lights, cameras."""

@@ -1,0 +1,1 @@
+"""Mesh files: OBJ, glTF and PLY."""

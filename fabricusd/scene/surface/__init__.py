@@ -1,0 +1,1 @@
+"""Meshes as triangles: polygons, subdivision surfaces, normals."""

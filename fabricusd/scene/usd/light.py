@@ -1,0 +1,297 @@
+"""UsdLux prims as lights. Radiance follows the schema: intensity times 2^exposure times colour,
+times the colour of a black body where asked for, over the light's area where it is normalised."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Usd, UsdLux
+
+from fabricusd.errors import FabricError
+from fabricusd.images.files import read_image
+from fabricusd.scene.scene import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE, Light, Scene
+from fabricusd.scene.usd.asset import asset_file
+from fabricusd.scene.usd.value import value_of
+
+_KINDS = {
+    "DistantLight": DISTANT,
+    "DomeLight": DOME,
+    "DomeLight_1": DOME,
+    "RectLight": RECT,
+    "DiskLight": DISK,
+    "SphereLight": SPHERE,
+    "CylinderLight": CYLINDER,
+}
+_LENGTHS = {
+    RECT: {"width": 1.0, "height": 1.0},
+    DISK: {"radius": 0.5},
+    SPHERE: {"radius": 0.5},
+    CYLINDER: {"radius": 0.5, "length": 1.0},
+}
+"""The lengths that each kind has, and what they are where nothing is said [scene unit]."""
+
+_SMALLEST = 1e-3
+"""Scene units that a normalised light without extent gets: it has power, and needs a surface."""
+
+_BRIGHTEST = 1e16
+"""Radiance whose square, in a picture's variance, is a 32-bit number."""
+
+_FARTHEST = 1e15
+"""Metres beyond which a light's area is no 32-bit number."""
+
+_NOTHING = 1e-30
+"""Square scene units below which a light has no surface."""
+
+_UNEVEN = 1e-3
+"""Relative difference of scales from which a sphere is no sphere any more."""
+
+
+def is_light(prim: Usd.Prim) -> bool:
+    """Whether a prim, mesh or not, claims to shine."""
+    return bool(prim.HasAPI(UsdLux.LightAPI)) or prim.GetTypeName().endswith("Light")
+
+
+class _Inputs:
+    """A light's inputs, by the names of today or those before USD 21.02, which had no prefix."""
+
+    def __init__(self, prim: Usd.Prim, time: Usd.TimeCode, scene: Scene) -> None:
+        self.prim, self.time, self.scene = prim, time, scene
+
+    def get(self, name: str, otherwise: Any) -> Any:
+        """The value of `inputs:name`, or of `name` where only that is authored."""
+        attribute = self.prim.GetAttribute(f"inputs:{name}")
+        if not (attribute and attribute.HasAuthoredValue()):
+            older = self.prim.GetAttribute(name)
+            attribute = older if older and older.HasAuthoredValue() else attribute
+        given = value_of(attribute, self.time, self.scene)
+        return otherwise if given is None else given
+
+    def numbers(self, name: str, otherwise: tuple[float, ...]) -> NDArray[np.float64]:
+        """As many numbers as `otherwise`, which is taken, with a note, for what are none."""
+        given = self.get(name, otherwise if len(otherwise) > 1 else otherwise[0])
+        try:
+            values = np.array(given, np.float64).reshape(-1)
+        except (TypeError, ValueError):
+            values = np.zeros(0)
+        if len(values) == len(otherwise):
+            return values
+        self.note(f"has {name} '{given}', which is of another type; {otherwise} is taken")
+        return np.array(otherwise)
+
+    def number(self, name: str, otherwise: float) -> float:
+        return float(self.numbers(name, (otherwise,))[0])
+
+    def file(self, name: str) -> Sdf.AssetPath | None:
+        """The file that is named there, or None where none is."""
+        asset = self.get(name, None)
+        return asset if isinstance(asset, Sdf.AssetPath) and asset.path else None
+
+    def note(self, problem: str) -> None:
+        self.scene.note(str(self.prim.GetPath()), problem)
+
+
+def read_light(
+    prim: Usd.Prim,
+    time: Usd.TimeCode,
+    matrix: NDArray[np.float64],
+    metres: float,
+    scene: Scene,
+) -> Light | None:
+    """The light of a prim, or None with a note where it cannot be rendered.
+
+    matrix : (4, 4) local to world, in scene units of `metres`
+    """
+    inputs = _Inputs(prim, time, scene)
+    kind = _KINDS.get(str(prim.GetTypeName()))
+    if kind is None:
+        inputs.note(f"is a light of the unknown type '{prim.GetTypeName()}', left out")
+        return None
+    angle = math.radians(inputs.number("angle", 0.53)) if kind == DISTANT else 0.0
+    normalize = bool(inputs.get("normalize", False))
+    radiance = _radiance(inputs)
+    lengths = _lengths(inputs, kind, normalize)
+    if radiance is None or lengths is None:
+        return None
+    if not (np.isfinite(matrix).all() and 0 <= angle <= 2 * math.pi):
+        inputs.note("has an angle or a transform that makes no sense, left out")
+        return None
+    size = _size(kind, matrix, lengths, angle)
+    if size < _NOTHING:
+        inputs.note("is scaled to nothing, left out")
+        return None
+    if normalize:
+        radiance = radiance / size
+    if radiance.max() > _BRIGHTEST:
+        inputs.note(f"has a radiance of {radiance.max():.3g}, beyond {_BRIGHTEST:g}; left out")
+        return None
+    if kind == DISTANT and angle <= 0 and not normalize:
+        inputs.note("has no angle; its intensity is taken as irradiance")
+    frame = matrix.copy()
+    frame[:3, 3] *= metres
+    if kind in _LENGTHS and _reach(frame, lengths, metres) > _FARTHEST:
+        inputs.note(f"reaches beyond {_FARTHEST:g} m, left out")
+        return None
+    _note_left_out(inputs, kind, matrix)
+    return Light(
+        path=str(prim.GetPath()),
+        kind=kind,
+        radiance=(float(radiance[0]), float(radiance[1]), float(radiance[2])),
+        frame=_pole(inputs, frame) if kind == DOME else frame,
+        width=lengths.get("width", 1.0) * metres,
+        height=lengths.get("length", lengths.get("height", 1.0)) * metres,
+        radius=lengths.get("radius", 0.5) * metres,
+        angle=angle,
+        image=_picture(inputs) if kind == DOME else None,
+        camera_visible=kind == DOME,
+    )
+
+
+def _radiance(inputs: _Inputs) -> NDArray[np.float64] | None:
+    """(3,) emission before it is normalised, or None with a note where it is no light."""
+    color = inputs.numbers("color", (1.0, 1.0, 1.0))
+    if inputs.get("enableColorTemperature", False):
+        color = color * _of_black_body(inputs)
+    with np.errstate(over="ignore", invalid="ignore"):
+        stops = np.exp2(inputs.number("exposure", 0.0))
+        radiance = color * inputs.number("intensity", 1.0) * stops
+    if not np.isfinite(radiance.astype(np.float32)).all():
+        inputs.note("has an intensity, exposure or colour that is not finite, left out")
+        return None
+    if (radiance < 0).any():
+        inputs.note("has a negative intensity or colour, which is taken as 0")
+    return np.asarray(np.maximum(radiance, 0.0))
+
+
+def _of_black_body(inputs: _Inputs) -> NDArray[np.float64]:
+    """(3,) colour of the light's temperature, which UsdLux knows from 1000 to 10000 K."""
+    given = inputs.number("colorTemperature", 6500.0)
+    if math.isnan(given):
+        # USD's own function would end the process.
+        return np.full(3, math.nan)
+    kelvin = min(max(given, 1000.0), 10000.0)
+    if kelvin != given:
+        inputs.note(f"has colorTemperature {given:g}; {kelvin:g} is taken")
+    return np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin))
+
+
+def _lengths(inputs: _Inputs, kind: int, normalize: bool) -> dict[str, float] | None:
+    """The light's lengths by their names, or None with a note where they make no light."""
+    found = {}
+    for name, otherwise in _LENGTHS.get(kind, {}).items():
+        length = inputs.number(name, otherwise)
+        if not (math.isfinite(length) and length >= 0) or (length == 0 and not normalize):
+            inputs.note(f"has {name} {length:g}; it must be above 0, left out")
+            return None
+        found[name] = max(length, _SMALLEST) if normalize else length
+    return found
+
+
+def _note_left_out(inputs: _Inputs, kind: int, matrix: NDArray[np.float64]) -> None:
+    """What a light asks for that is not rendered, one line each."""
+    for name in ("diffuse", "specular"):
+        share = inputs.number(name, 1.0)
+        if share != 1:
+            inputs.note(f"has a {name} multiplier of {share:g}, left out: it counts as 1")
+    if kind != DOME and inputs.file("texture:file") is not None:
+        inputs.note("has a texture, left out: it shines evenly")
+    if inputs.prim.HasAPI(UsdLux.ShapingAPI) and _is_shaped(inputs):
+        inputs.note("is shaped by a cone, focus or profile, which is left out")
+    if inputs.prim.HasAPI(UsdLux.ShadowAPI) and not inputs.get("shadow:enable", True):
+        inputs.note("asks for no shadows; it casts them")
+    if inputs.prim.GetRelationship("light:filters").GetTargets():
+        inputs.note("has light filters, left out")
+    for name in ("lightLink", "shadowLink"):
+        if _is_linked(inputs.prim, name):
+            inputs.note(f"has a {name} collection, left out: it lights and shadows everything")
+    scales = np.linalg.norm(matrix[:3, :3], axis=0)
+    round_ = {SPHERE: scales, CYLINDER: scales[1:]}.get(kind, scales[:1])
+    if np.ptp(round_) > _UNEVEN * round_.max():
+        inputs.note("is scaled unevenly; it is rendered round, with its mean radius")
+
+
+def _is_shaped(inputs: _Inputs) -> bool:
+    return (
+        inputs.number("shaping:cone:angle", 90.0) < 90
+        or inputs.number("shaping:focus", 0.0) != 0
+        or inputs.file("shaping:ies:file") is not None
+    )
+
+
+def _is_linked(prim: Usd.Prim, name: str) -> bool:
+    """Whether a light's collection is anything else than the whole stage."""
+    if not prim.HasAPI(Usd.CollectionAPI, name):
+        return False
+    collection = Usd.CollectionAPI(prim, name)
+    return (
+        collection.GetIncludeRootAttr().Get() is False
+        or bool(collection.GetExcludesRel().GetTargets())
+        or collection.GetMembershipExpressionAttr().HasAuthoredValue()
+    )
+
+
+def _reach(frame: NDArray[np.float64], lengths: dict[str, float], metres: float) -> float:
+    """The farthest that anything of a light may be from the origin [m], or more."""
+    extent = float(np.abs(frame[:3, :3]).max()) * max(lengths.values()) * metres
+    return float(np.abs(frame[:3, 3]).max()) + extent
+
+
+def _size(kind: int, matrix: NDArray[np.float64], lengths: dict[str, float], angle: float) -> float:
+    """What `normalize` divides by: area in square scene units, for a distant light its projected
+    solid angle, beyond half a sphere as UsdLux continues it."""
+    x, y, z = (float(np.linalg.norm(matrix[:3, k])) for k in range(3))
+    flat = float(np.linalg.norm(np.cross(matrix[:3, 0], matrix[:3, 1])))
+    radius = lengths.get("radius", 0.0)
+    sine2 = math.sin(0.5 * angle) ** 2
+    return {
+        DISTANT: math.pi * (sine2 if angle <= math.pi else 2 - sine2) if angle > 0 else 1.0,
+        RECT: lengths.get("width", 1.0) * lengths.get("height", 1.0) * flat,
+        DISK: math.pi * radius**2 * flat,
+        SPHERE: 4 * math.pi * (radius * (x + y + z) / 3) ** 2,
+        CYLINDER: 2 * math.pi * radius * 0.5 * (y + z) * lengths.get("length", 1.0) * x,
+    }.get(kind, 1.0)
+
+
+def _pole(inputs: _Inputs, frame: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A dome's frame with its pole along +y: DomeLight_1 may have it along the stage's axis."""
+    axis = inputs.prim.GetAttribute("poleAxis")
+    pole = axis.Get() if axis else None
+    if pole == "scene":
+        pole = inputs.scene.up_axis
+    if pole != "Z":
+        return frame
+    turn = np.eye(4)
+    turn[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    return frame @ turn
+
+
+def _picture(inputs: _Inputs) -> NDArray[np.float32] | None:
+    """A dome's picture (h, w, 3), or None and a constant dome."""
+    asset = inputs.file("texture:file")
+    if asset is None:
+        return None
+    layout = inputs.get("texture:format", "automatic")
+    if layout not in ("automatic", "latlong"):
+        inputs.note(f"has a picture laid out as '{layout}'; it is rendered as constant")
+        return None
+    try:
+        with asset_file(asset) as file:
+            picture = read_image(file, most=4096)
+    except FabricError as error:
+        inputs.note(f"is rendered as constant: {error}")
+        return None
+    finite = np.isfinite(picture)
+    if not finite.all():
+        # A sun beyond the largest half float is infinite in the file: it stays the brightest.
+        brightest = float(picture[finite].max(initial=0.0))
+        inputs.note(
+            f"has {int((~finite).sum())} values that are not finite; infinity is taken as "
+            f"{brightest:g}, the rest as 0"
+        )
+        picture = np.nan_to_num(picture, nan=0.0, posinf=brightest, neginf=0.0)
+    if (picture < 0).any():
+        inputs.note(f"has {int((picture < 0).sum())} negative values; they are taken as 0")
+        picture = np.maximum(picture, 0.0)
+    return np.ascontiguousarray(np.broadcast_to(picture, (*picture.shape[:2], 3)), np.float32)

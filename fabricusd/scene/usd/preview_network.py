@@ -1,0 +1,328 @@
+"""UsdPreviewSurface networks: constants, textures, and where those lie."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Usd, UsdShade
+
+from fabricusd.errors import FabricError
+from fabricusd.images.files import read_alpha, read_image
+from fabricusd.scene.scene import PreviewSurface, Scene, Texture
+from fabricusd.scene.usd.asset import asset_file
+
+_LARGEST = 4096
+"""Pixels a side that a texture is shrunk to, all its tiles together."""
+
+_MOST_TRANSFORMS = 8
+"""UsdTransform2d one behind another before they are taken for a cycle."""
+
+
+COLOR, NUMBER, VECTOR = "a colour", "a number", "a vector of three numbers"
+"""Kinds of input."""
+
+
+class _Input(NamedTuple):
+    field: str
+    kind: str
+    low: float
+    high: float
+    textured: bool
+
+    @property
+    def size(self) -> int:
+        """How many numbers it has."""
+        return 1 if self.kind == NUMBER else 3
+
+
+_INPUTS = {
+    "diffuseColor": _Input("diffuse", COLOR, 0.0, 100.0, True),
+    "emissiveColor": _Input("emissive", COLOR, 0.0, 1e12, True),
+    "metallic": _Input("metallic", NUMBER, 0.0, 1.0, True),
+    "roughness": _Input("roughness", NUMBER, 0.0, 1.0, True),
+    "ior": _Input("ior", NUMBER, 0.01, 100.0, False),
+    "opacity": _Input("opacity", NUMBER, 0.0, 1.0, True),
+    "opacityThreshold": _Input("opacity_threshold", NUMBER, 0.0, 1.0, False),
+    "normal": _Input("normal", VECTOR, -1e3, 1e3, True),
+}
+"""Between which bounds each is rendered; those of colours keep paths inside 32-bit numbers, those
+of normals their squares."""
+
+_LEFT_OUT = {"clearcoat": 0.0, "displacement": 0.0}
+"""Inputs that are not rendered, and the value that says nothing."""
+
+_FLAT = (0.0, 0.0, 1.0)
+"""The normal that turns nothing."""
+
+_MODES = ("repeat", "clamp", "mirror", "black")
+
+_CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
+
+
+class PreviewNetwork:
+    """One material's network. What cannot be read is noted and its default is rendered."""
+
+    def __init__(self, material: UsdShade.Material, time: Usd.TimeCode, scene: Scene) -> None:
+        self.material, self.time, self.scene = material, time, scene
+        self.where = str(material.GetPath())
+        self.uv_set = ""
+
+    def read(self) -> tuple[PreviewSurface, str]:
+        """The surface, and the UV set that its textures read ("" for any)."""
+        shader, _, _ = self.material.ComputeSurfaceSource()
+        if not shader or shader.GetIdAttr().Get() != "UsdPreviewSurface":
+            self._note("has no UsdPreviewSurface; it is rendered grey")
+            return PreviewSurface(name=self.where), ""
+        values: dict[str, Any] = {}
+        textures: dict[str, Texture] = {}
+        for name, row in _INPUTS.items():
+            source, output = self._source(shader, name)
+            if isinstance(source, UsdShade.Shader):
+                texture = self._texture(name, row, source, output)
+                if texture is not None:
+                    textures[row.field] = texture
+            elif source is not None:
+                values[row.field] = self._constant(name, row, source)
+        self._keep_normal(values, textures)
+        self._note_left_out(shader)
+        known = {field: value for field, value in values.items() if value is not None}
+        return PreviewSurface(name=self.where, textures=textures, **known), self.uv_set
+
+    def _note(self, problem: str) -> None:
+        self.scene.note(self.where, problem)
+
+    def _keep_normal(self, values: dict[str, Any], textures: dict[str, Texture]) -> None:
+        """A constant normal becomes a texture of one texel: it needs the mesh's UVs as one does."""
+        constant = values.pop("normal", None) or _FLAT
+        if not any(constant):
+            self._note("has a normal of length 0; the surface's own is rendered")
+        elif constant != _FLAT:
+            textures["normal"] = Texture(pixels=np.array([[constant]], np.float32))
+
+    def _note_left_out(self, shader: UsdShade.Shader) -> None:
+        left_out = []
+        for name, nothing in _LEFT_OUT.items():
+            source, _ = self._source(shader, name)
+            if source is not None and source != nothing:
+                left_out.append(name)
+        if left_out:
+            self._note(f"has {', '.join(left_out)}, left out")
+        if self._source(shader, "useSpecularWorkflow")[0] == 1:
+            self._note("asks for the specular workflow; the metallic one is rendered")
+
+    def _source(self, shader: UsdShade.Shader, name: str) -> tuple[Any, str]:
+        """(an input's value, "") or (the shader that it is connected to, its output's name)."""
+        given = shader.GetInput(name)
+        if not given:
+            return None, ""
+        for attribute in UsdShade.Utils.GetValueProducingAttributes(given):
+            producer = UsdShade.Shader(attribute.GetPrim())
+            if UsdShade.Output.IsOutput(attribute) and producer:
+                return producer, str(UsdShade.Output(attribute).GetBaseName())
+            return attribute.Get(self.time), ""
+        return None, ""
+
+    def _constant(self, name: str, row: _Input, given: Any) -> Any:
+        """A number or three, inside what the input allows; None where it is neither."""
+        values = _numbers(given, row.size)
+        if values is None:
+            self._note(f"has {name} {given}; it must be {row.kind}, and its default is rendered")
+            return None
+        inside = np.clip(values, row.low, row.high)
+        if (inside != values).any():
+            low, high = f"{row.low:g}", f"{row.high:g}"
+            self._note(f"has {name} {given}; it must be from {low} to {high}, and is cut off there")
+        return tuple(float(x) for x in inside) if row.size == 3 else float(inside[0])
+
+    def _texture(
+        self, name: str, row: _Input, node: UsdShade.Shader, output: str
+    ) -> Texture | None:
+        """The picture behind a UsdUVTexture, of one channel or three."""
+        kind = node.GetIdAttr().Get()
+        if kind != "UsdUVTexture" or not row.textured:
+            self._note(f"reads {name} from a node of the kind '{kind}'; its default is rendered")
+            return None
+        channel = _CHANNELS.get(output, None if row.size == 3 else 0)
+        place, wrap = self._coordinates(node), self._wrap(node)
+        try:
+            pixels, tiles = self._pixels(node, row.kind == COLOR, channel)
+        except FabricError as error:
+            self._note(f"is rendered without a texture: {error}")
+            fallback = self._four(node, "fallback", math.nan)
+            picked = fallback[:3] if channel is None else fallback[channel : channel + 1]
+            if not np.isfinite(picked).all():
+                return None
+            pixels, tiles = picked.reshape(1, 1, -1), None
+        else:
+            codes, pixels = pixels, self._scaled(node, pixels, channel)
+            if row.kind == VECTOR:
+                if codes.shape[2] != 3:
+                    self._note(f"reads {name} from one channel; it must have three (connect 'rgb' "
+                               "of a colour picture), and its default is rendered")  # fmt: skip
+                    return None
+                pixels = self._normals(node, codes, pixels)
+        if tiles is not None:
+            place, wrap = tiles @ place, ("black", "black")
+        return Texture(
+            pixels=self._sound(name, row, pixels), wrap=wrap, place=tuple(place[:2].ravel())
+        )
+
+    def _pixels(
+        self, node: UsdShade.Shader, color: bool, channel: int | None
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64] | None]:
+        """((h, w, c) pixels, (3, 3) from UVs to a picture of all UDIM tiles or None)."""
+        given = node.GetInput("file")
+        attributes = UsdShade.Utils.GetValueProducingAttributes(given) if given else []
+        asset = attributes[0].Get(self.time) if attributes else None
+        if not isinstance(asset, Sdf.AssetPath) or not asset.path:
+            raise FabricError(f"{node.GetPath()} inputs:file", "names no asset; it must name one")
+        space = str(self._source(node, "sourceColorSpace")[0] or "auto")
+
+        def read(file: str, most: int) -> NDArray[np.float32]:
+            if channel == _CHANNELS["a"]:
+                return read_alpha(file, most=most)
+            # Data is not encoded unless somebody says so.
+            kind = "raw" if space == "auto" and not color else space
+            pixels = read_image(file, color_space=kind, most=most)
+            return (
+                pixels if channel is None else pixels[..., min(channel, pixels.shape[2] - 1), None]
+            )
+
+        if UsdShade.UdimUtils.IsUdimIdentifier(asset.path):
+            layer = attributes[0].GetPropertyStack(self.time)[0].layer
+            found = UsdShade.UdimUtils.ResolveUdimTilePaths(asset.path, layer)
+            if not found:
+                raise FabricError(asset.path, "has no tiles; 1001 or another must be there")
+            return _tile_picture([(int(tile) - 1001, path) for path, tile in found], read)
+        with asset_file(asset) as file:
+            return read(file, _LARGEST), None
+
+    def _four(self, node: UsdShade.Shader, name: str, otherwise: float) -> NDArray[np.float32]:
+        """A four-channel input of a texture; all `otherwise` where it is missing or mistyped."""
+        given, _ = self._source(node, name)
+        values = None if given is None else _numbers(given, 4)
+        if given is not None and values is None:
+            self._note(
+                f"has a texture with {name} {given}; it must be four numbers, and is ignored"
+            )
+        return np.full(4, otherwise, np.float32) if values is None else values.astype(np.float32)
+
+    def _scaled(
+        self, node: UsdShade.Shader, pixels: NDArray[np.float32], channel: int | None
+    ) -> NDArray[np.float32]:
+        scale, bias = self._four(node, "scale", 1.0), self._four(node, "bias", 0.0)
+        if (scale == 1).all() and (bias == 0).all():
+            return pixels
+        which = slice(0, 3) if channel is None else slice(channel, channel + 1)
+        return pixels * scale[which] + bias[which]
+
+    def _normals(
+        self, node: UsdShade.Shader, codes: NDArray[np.float32], normals: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """`normals` with 0, no normal, where the picture is black: nothing was painted there, or a
+        UDIM tile is missing. What does not look like a normal map is noted.
+
+        codes : (h, w, 3) - the picture's values before scale and bias
+        """
+        if str(self._source(node, "sourceColorSpace")[0]) == "sRGB":
+            self._note("decodes its normal map as sRGB; normals are data, and should be 'raw'")
+        if (self._four(node, "bias", 0.0)[:3] == 0).all() and (normals >= 0).all() and (
+            normals[..., :2] > 0
+        ).any():  # fmt: skip
+            self._note("has a normal map without a bias that holds no negative number; codes need "
+                       "scale (2, 2, 2, 1) and bias (-1, -1, -1, 0)")  # fmt: skip
+        return np.where(codes.any(axis=2, keepdims=True), normals, np.float32(0))
+
+    def _sound(self, name: str, row: _Input, pixels: NDArray[np.float32]) -> NDArray[np.float32]:
+        finite = np.isfinite(pixels)
+        if not finite.all():
+            self._note(f"has {int((~finite).sum())} values in the texture of {name} that are not "
+                       "finite; they are taken as 0")  # fmt: skip
+            pixels = np.where(finite, pixels, 0.0)
+        return np.ascontiguousarray(np.clip(pixels, row.low, row.high), np.float32)
+
+    def _wrap(self, node: UsdShade.Shader) -> tuple[str, str]:
+        return self._mode(node, "wrapS"), self._mode(node, "wrapT")
+
+    def _mode(self, node: UsdShade.Shader, name: str) -> str:
+        mode = str(self._source(node, name)[0] or "repeat")
+        if mode in _MODES:
+            return mode
+        if mode != "useMetadata":
+            self._note(f"has {name} '{mode}'; it must be one of {', '.join(_MODES)}; it repeats")
+        return "repeat"
+
+    def _coordinates(self, node: UsdShade.Shader) -> NDArray[np.float64]:
+        """(3, 3) from the mesh's UVs to the texture's; the UV set is kept in `uv_set`."""
+        place = np.eye(3)
+        reader, _ = self._source(node, "st")
+        for _ in range(_MOST_TRANSFORMS):
+            if not isinstance(reader, UsdShade.Shader):
+                return place
+            kind = reader.GetIdAttr().Get()
+            if kind != "UsdTransform2d":
+                break
+            place = place @ self._transform(reader)
+            reader, _ = self._source(reader, "in")
+        if kind != "UsdPrimvarReader_float2":
+            self._note(f"reads UVs from a node of the kind '{kind}'; the mesh's own are taken")
+            return place
+        name = str(self._source(reader, "varname")[0] or "")
+        if self.uv_set and name and name != self.uv_set:
+            self._note(f"reads the UV sets '{self.uv_set}' and '{name}'; the second is taken")
+        self.uv_set = name or self.uv_set
+        return place
+
+    def _transform(self, node: UsdShade.Shader) -> NDArray[np.float64]:
+        """A UsdTransform2d: scaled, then turned counter-clockwise, then moved."""
+        found = []
+        for name, count, otherwise in (("scale", 2, 1.0), ("rotation", 1, 0.0),
+                                       ("translation", 2, 0.0)):  # fmt: skip
+            given, _ = self._source(node, name)
+            values = None if given is None else _numbers(given, count)
+            found.append(np.full(count, otherwise) if values is None else values)
+        scale, turn, move = found[0], math.radians(found[1][0]), found[2]
+        c, s = math.cos(turn), math.sin(turn)
+        return np.array(
+            [[c * scale[0], -s * scale[1], move[0]], [s * scale[0], c * scale[1], move[1]],
+             [0.0, 0.0, 1.0]]
+        )  # fmt: skip
+
+
+def _numbers(given: Any, count: int) -> NDArray[np.float64] | None:
+    """`count` finite numbers, or None where `given` is anything else."""
+    try:
+        values = np.array(given, np.float64)
+    except (TypeError, ValueError):
+        return None
+    if values.shape != ((count,) if count > 1 else ()) or not np.isfinite(values).all():
+        return None
+    return values.reshape(count)
+
+
+def _tile_picture(
+    tiles: list[tuple[int, str]], read: Any
+) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """(one picture of all tiles, black where there is none; (3, 3) from UVs to it).
+
+    tiles : (tile's number from 0, its file); ten tiles to a row, rows upwards
+    """
+    columns, rows = np.array([n % 10 for n, _ in tiles]), np.array([n // 10 for n, _ in tiles])
+    left, bottom = int(columns.min()), int(rows.min())
+    across, up = int(columns.max()) - left + 1, int(rows.max()) - bottom + 1
+    pictures = []
+    for _, path in tiles:
+        with asset_file(Sdf.AssetPath(path, path)) as file:
+            pictures.append(read(file, _LARGEST // max(across, up)))
+    h, w, c = np.max([picture.shape for picture in pictures], axis=0)
+    total = np.zeros((up * h, across * w, c), np.float32)
+    for picture, column, row in zip(pictures, columns - left, rows - bottom, strict=True):
+        y, x = np.arange(h) * picture.shape[0] // h, np.arange(w) * picture.shape[1] // w
+        top = (up - 1 - row) * h
+        total[top : top + h, column * w : (column + 1) * w] = picture[y[:, None], x]
+    return total, np.array(
+        [[1 / across, 0.0, -left / across], [0.0, 1 / up, -bottom / up], [0.0, 0.0, 1.0]]
+    )

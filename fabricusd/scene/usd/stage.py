@@ -1,0 +1,324 @@
+"""A USD stage as a `Scene`: what is visible, where it lies, in metres.
+
+Whatever cannot be read is left out and noted in one line; the rest is rendered.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
+
+import fabricusd.schema  # registers the schema
+from fabricusd.errors import FabricError, one_line
+from fabricusd.fabric import Binding
+from fabricusd.scene.scene import Camera, Scene
+from fabricusd.scene.surface.fineness import Fineness
+from fabricusd.scene.usd.camera import read_camera
+from fabricusd.scene.usd.instances import (
+    OF_PROTOTYPES,
+    Copies,
+    Count,
+    as_matrix,
+    is_invisible,
+    placed,
+)
+from fabricusd.scene.usd.light import is_light, read_light
+from fabricusd.scene.usd.material import Materials
+from fabricusd.scene.usd.mesh import Placed, is_mirrored, read_mesh
+from fabricusd.scene.usd.skeleton import Skeletons
+from fabricusd.scene.usd.units import note_units, stage_units
+from fabricusd.scene.usd.value import note_types, usd_words, value_of
+from fabricusd.schema.access import applies_binding
+from fabricusd.schema.source import compose_stage, usd_errors
+
+_PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
+_DEEPEST = 8
+"""Point instancers inside one another before they are taken for a cycle."""
+
+_READ_BY_USD = "xformOp.*|visibility|purpose|invisibleIds|exposure(:.*)?"
+"""Attributes that no reader here asks for: transforms and the like come from USD's functions."""
+
+_DETAIL = 1e-5
+"""Size of a mesh over that of the scene below which 32-bit coordinates show."""
+
+_SMALLEST = 1e-6
+"""Width of a scene [m] below which its unit must be wrong; 32-bit numbers end at a thousandth."""
+
+assert fabricusd.schema.PLUGIN_PATH
+
+
+def read_usd_scene(
+    path: Path,
+    *,
+    binding: Binding | None = None,
+    camera: str | None = None,
+    time_code: float | None = None,
+    fineness: Fineness = Fineness(),  # noqa: B008
+) -> Scene:
+    """Everything visible on the stage at `time_code`; its earliest time where that is None.
+
+    binding : on meshes without a material of their own
+    camera : prim path; the first camera on the stage where that is None
+    fineness : of subdivision surfaces; its camera is the one that is found
+    """
+    stage, notes = _open(path)
+    # What USD has to say of a prim would be several lines on standard error.
+    warnings = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        # What is not finite is noted; NumPy would write of it to standard error as well.
+        with np.errstate(all="ignore"):
+            scene = _Reader(stage, notes, binding, time_code, fineness).read(path, camera)
+        for warning in warnings.TakeUncoalescedDiagnostics():
+            scene.note(str(path), f"USD: {one_line(warning.commentary, 300)}")
+    finally:
+        del warnings
+    return scene
+
+
+def _open(path: Path) -> tuple[Usd.Stage, list[str]]:
+    with usd_errors(str(path), "read as USD"):
+        stage = compose_stage(str(path))
+    return stage, [f"{path} {one_line(str(e), 200)}" for e in stage.GetCompositionErrors()]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Waiting:
+    """A mesh that is made when the camera is known.
+
+    matrix : (4, 4) - from the mesh to the world
+    base, before : the prim that `before`, (4, 4), takes to the world, with all below it
+    """
+
+    prim: Usd.Prim
+    matrix: NDArray[np.float64]
+    base: Usd.Prim
+    before: NDArray[np.float64]
+
+
+class _Reader:
+    def __init__(
+        self,
+        stage: Usd.Stage,
+        notes: list[str],
+        binding: Binding | None,
+        time_code: float | None,
+        fineness: Fineness,
+    ) -> None:
+        self.stage = stage
+        self.fineness = fineness
+        self.waiting: list[_Waiting] = []
+        self.time = Usd.TimeCode.EarliestTime() if time_code is None else Usd.TimeCode(time_code)
+        self.scene = Scene(notes=notes)
+        self.metres, self.scene.up_axis = stage_units(stage, self.scene)
+        self.materials = Materials(self.scene, binding, self.time)
+        self.skeletons = Skeletons(self.time, self.scene)
+        self.copies = Copies(stage, self.time, self.scene)
+        self.placed, self.refused = Count(), 0
+        self.cameras: list[Usd.Prim] = []
+        self.one_sided: list[str] = []
+
+    def read(self, path: Path, camera: str | None) -> Scene:
+        root = self.stage.GetPseudoRoot()
+        self._visit(root, UsdGeom.XformCache(self.time), np.eye(4), ())
+        self.scene.camera = self._camera(path, camera)
+        # How finely a mesh is refined may depend on the camera.
+        self.fineness = replace(self.fineness, camera=self.scene.camera)
+        for one in self.waiting:
+            try:
+                self._mesh(one)
+            except Tf.ErrorException as error:
+                self._left_out(one.prim, error)
+        if not self.scene.meshes:
+            self.scene.note(str(path), "holds no visible mesh with faces")
+        self._note_the_whole()
+        return self.scene
+
+    def _note_the_whole(self) -> None:
+        """What is said once for all prims together."""
+        note_units(self.stage, self.metres, self.time, self.scene)
+        if self.one_sided:
+            first, count = self.one_sided[0], len(self.one_sided)
+            others = f" and {count - 1} more have" if count > 1 else " has"
+            self.scene.note(f"{first}{others}", "doubleSided = false; both sides are rendered")
+        if self.refused > 1:
+            self.scene.note("the scene", f"has {self.refused - 1} more prims left out for that")
+        _note_small_meshes(self.scene)
+
+    def _left_out(self, prim: Usd.Prim, error: Tf.ErrorException) -> None:
+        self.scene.note(str(prim.GetPath()), f"is left out: {usd_words(error)}")
+
+    def _visit(
+        self,
+        root: Usd.Prim,
+        cache: UsdGeom.XformCache,
+        before: NDArray[np.float64],
+        inside: tuple[Sdf.Path, ...],
+    ) -> None:
+        """Add what is visible under `root`; `before` comes after each prim's own transform, from
+        `root`'s parent on."""
+        base = root if root.IsPseudoRoot() else root.GetParent()
+        for prim in self._visible(root, bool(inside)):
+            note_types(prim, _READ_BY_USD, self.time, self.scene)
+            try:
+                matrix = before @ as_matrix(cache.ComputeRelativeTransform(prim, base)[0])
+                self._add(_Waiting(prim=prim, matrix=matrix, base=base, before=before), inside)
+            except Tf.ErrorException as error:
+                self._left_out(prim, error)
+
+    def _add(self, one: _Waiting, inside: tuple[Sdf.Path, ...]) -> None:
+        """Add one visible prim, whatever it is."""
+        prim, where = one.prim, str(one.prim.GetPath())
+        if prim.IsA(UsdGeom.Camera):
+            self.cameras.append(prim)
+        elif not np.isfinite(one.matrix).all():
+            self.scene.note(where, "has a transform that is not finite, left out")
+        elif prim.IsA(UsdGeom.PointInstancer):
+            self._instances(prim, one.matrix, inside)
+        elif prim.IsA(UsdGeom.Mesh):
+            self.waiting.append(one)
+        elif is_light(prim):
+            light = read_light(prim, self.time, one.matrix, self.metres, self.scene)
+            if light is not None:
+                self.scene.lights.append(light)
+        elif prim.IsA(UsdGeom.Gprim) or prim.GetTypeName() == "Volume":
+            self.scene.note(where, f"is a {prim.GetTypeName()}, left out; only meshes are seen")
+        elif prim.IsA(UsdGeom.Subset) and prim.GetParent().IsA(UsdGeom.Mesh):
+            # Its mesh reads it.
+            pass
+        elif applies_binding(prim):
+            self.scene.note(where, "binds a fabric, left out: only meshes and subsets wear one")
+
+    def _mesh(self, one: _Waiting) -> None:
+        prim, where = one.prim, str(one.prim.GetPath())
+        if is_light(prim):
+            self.scene.note(where, "shines as a light, left out: it is a mesh alone")
+        pose = self.skeletons.pose(prim)
+        matrix = one.matrix
+        if pose is not None and pose.skeleton is not None:
+            matrix = one.before @ self._relative(pose.skeleton, one.base)
+            if not np.isfinite(matrix).all():
+                self.scene.note(where, "has a skeleton whose place is not finite, left out")
+                return
+        mesh = read_mesh(
+            Placed(prim=prim, matrix=matrix, mirrored=is_mirrored(one.matrix), pose=pose),
+            self.time, self.metres, self.materials, self.scene, self.fineness,
+        )  # fmt: skip
+        if mesh is None:
+            return
+        self.scene.meshes.append(mesh)
+        sides = UsdGeom.Mesh(prim).GetDoubleSidedAttr()
+        if sides.HasAuthoredValue() and value_of(sides, self.time, self.scene) is False:
+            self.one_sided.append(where)
+
+    def _relative(self, prim: Usd.Prim, base: Usd.Prim) -> NDArray[np.float64]:
+        """(4, 4) from a skeleton to `base`, or to the world where it does not lie below that."""
+        cache = UsdGeom.XformCache(self.time)
+        if not prim.GetPath().HasPrefix(base.GetPath()):
+            return as_matrix(cache.GetLocalToWorldTransform(prim))
+        return as_matrix(cache.ComputeRelativeTransform(prim, base)[0])
+
+    def _visible(self, root: Usd.Prim, inside: bool) -> Iterator[Usd.Prim]:
+        """Prims under `root` in order, without invisible ones and what only serves others.
+
+        inside : whether they are an instance's, which has been counted with all that it holds
+        """
+        which = Usd.PrimDefaultPredicate if root.IsPseudoRoot() else OF_PROTOTYPES
+        walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(which)))
+        for prim in walk:
+            hidden = is_invisible(prim, self.time)
+            if hidden or prim.IsA(UsdGeom.PointInstancer):
+                walk.PruneChildren()
+            elif not (inside or self._has_room_for(prim)):
+                walk.PruneChildren()
+                continue
+            imageable = UsdGeom.Imageable(prim)
+            # A purpose is handed down only to those that have none of their own.
+            if not hidden and not (imageable and imageable.ComputePurpose() not in _PURPOSES):
+                yield prim
+
+    def _has_room_for(self, prim: Usd.Prim) -> bool:
+        """False for a native instance that there is no room for; inner ones are counted in it."""
+        if not prim.IsInstance() or prim.IsInstanceProxy():
+            return True
+        return self._can_place(prim, self.copies.below(prim).times(1))
+
+    def _can_place(self, prim: Usd.Prim, count: Count) -> bool:
+        """Whether there is room for so many instances more; what there is no room for is noted."""
+        if math.isinf(count.copies):
+            self.scene.note(str(prim.GetPath()), "instances itself, left out")
+            return False
+        total = self.placed + count
+        if total.too_many:
+            if not self.refused:
+                self.scene.note(str(prim.GetPath()), f"is left out: it leads to {total.too_many}")
+            self.refused += 1
+            return False
+        self.placed = total
+        return True
+
+    def _instances(
+        self, prim: Usd.Prim, world: NDArray[np.float64], inside: tuple[Sdf.Path, ...]
+    ) -> None:
+        """Each instance of a point instancer that lies at `world`: its prototype's prims, moved."""
+        if len(inside) >= _DEEPEST or prim.GetPath() in inside:
+            self.scene.note(str(prim.GetPath()), "instances itself, left out")
+            return
+        if not inside and not prim.IsInstanceProxy():
+            count = self.copies.of_instancer(UsdGeom.PointInstancer(prim))
+            if not self._can_place(prim, count):
+                return
+        cache = UsdGeom.XformCache(self.time)
+        for root, place in placed(prim, self.time, self.scene):
+            self._visit(root, cache, world @ place, (*inside, prim.GetPath()))
+
+    def _camera(self, path: Path, name: str | None) -> Camera | None:
+        """The camera `name`, or the first that sees anything; None where there is none."""
+        if name is not None:
+            prim = self.stage.GetPrimAtPath(name) if Sdf.Path.IsValidPathString(name) else None
+            if not prim or not prim.IsA(UsdGeom.Camera):
+                known = ", ".join(str(p.GetPath()) for p in self.cameras) or "none"
+                raise FabricError(f"{path}:{name}", f"is no camera; the scene's are: {known}")
+            found = self._read_camera(prim)
+            if found is None:
+                own = [n for n in self.scene.notes if n.startswith(f"{prim.GetPath()} ")]
+                raise FabricError(str(path), own[-1] if own else f"{name} sees nothing")
+            return found
+        for prim in self.cameras:
+            found = self._read_camera(prim)
+            if found is not None:
+                if len(self.cameras) > 1:
+                    self.scene.note(found.path, f"is taken, one of {len(self.cameras)} cameras")
+                return found
+        return None
+
+    def _read_camera(self, prim: Usd.Prim) -> Camera | None:
+        try:
+            return read_camera(prim, self.time, self.metres, self.scene)
+        except Tf.ErrorException as error:
+            self._left_out(prim, error)
+            return None
+
+
+def _note_small_meshes(scene: Scene) -> None:
+    """One line for each mesh that is lost in the size of its scene."""
+    found = [(m, m.points[np.isfinite(m.points).all(axis=1)]) for m in scene.meshes]
+    boxes = [(mesh, p.min(axis=0), p.max(axis=0)) for mesh, p in found if len(p)]
+    if not boxes:
+        return
+    low, high = np.min([b[1] for b in boxes], axis=0), np.max([b[2] for b in boxes], axis=0)
+    whole = float(np.linalg.norm(high - low))
+    if 0 < whole < _SMALLEST:
+        scene.note("the scene", f"is {whole:.3g} m wide; is metersPerUnit right?")
+    for mesh, low, high in boxes:
+        size = float(np.linalg.norm(high - low))
+        if 0 < size < _DETAIL * whole:
+            scene.note(
+                mesh.path,
+                f"is {size:.3g} m wide in a scene of {whole:.3g} m; 32-bit coordinates show there",
+            )

@@ -1,0 +1,155 @@
+"""Assets whose unit or up axis is another than their stage's: USD does not convert them.
+
+A scale or a turn of the prim that references them may make up for it, as a person or a program
+that knows of it writes; then nothing is said.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pxr import Pcp, Sdf, Tf, Usd, UsdGeom
+
+from fabricusd.scene.scene import Scene
+from fabricusd.scene.usd.instances import as_matrix
+
+_ALIKE = 1e-3
+"""Relative difference below which two units are one."""
+
+_UNITS = (1e-12, 1e16)
+"""Metres that a unit may have: from a thousandth of a nanometre to a light-year."""
+
+_AXES = {"Y": np.array([0.0, 1.0, 0.0]), "Z": np.array([0.0, 0.0, 1.0])}
+"""Axes that may point up."""
+
+_PLACED = ("Mesh", "Camera", "Points", "BasisCurves", "PointInstancer", "Skeleton")
+"""Types of prims whose lengths are in a layer's unit; lights and others mostly come with them."""
+
+
+def stage_units(stage: Usd.Stage, scene: Scene) -> tuple[float, str]:
+    """(metres in one unit of a stage, its axis up), with a note where they make no sense."""
+    where = stage.GetRootLayer().GetDisplayName()
+    metres, up = 0.01, "Y"
+    try:
+        metres = float(UsdGeom.GetStageMetersPerUnit(stage))
+    except Tf.ErrorException:
+        scene.note(where, f"has a metersPerUnit that is no number; {metres:g} is taken")
+    if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
+        scene.note(where, f"has no metersPerUnit; USD's {metres:g} is taken")
+    elif not _UNITS[0] <= metres <= _UNITS[1]:
+        accepted = f"from {_UNITS[0]:g} to {_UNITS[1]:g}"
+        scene.note(where, f"has metersPerUnit {metres:g}; 0.01 is taken; it must be {accepted}")
+        metres = 0.01
+    try:
+        given = str(UsdGeom.GetStageUpAxis(stage))
+    except Tf.ErrorException:
+        given = "of another type"
+    if given not in _AXES:
+        scene.note(where, f"has an upAxis that is {given}; it must be Y or Z; {up} is taken")
+        return metres, up
+    return metres, given
+
+
+def note_units(stage: Usd.Stage, metres: float, time: Usd.TimeCode, scene: Scene) -> None:
+    """One line for each layer with geometry whose unit or up axis is another than the stage's.
+
+    metres : in one unit of the stage
+    """
+    root = stage.GetRootLayer()
+    up = scene.up_axis
+    other = {
+        layer: words
+        for layer in stage.GetUsedLayers()
+        if layer != root and layer != stage.GetSessionLayer()
+        for words in [_difference(layer, metres, up)]
+        if words and _holds_geometry(layer)
+    }
+    for layer in stage.GetLayerStack(includeSessionLayers=False):
+        if layer in other:
+            scene.note(layer.GetDisplayName(), f"{other.pop(layer)}; a sublayer is not converted")
+    if not other:
+        return
+    cache = UsdGeom.XformCache(time)
+    asked: set[Sdf.Path] = set()
+    for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
+        own = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+        if own.GetPath() in asked or not (own.HasAuthoredReferences() or own.HasPayload()):
+            continue
+        asked.add(own.GetPath())
+        for layer in _referenced(own):
+            if layer in other and not _made_up_for(prim, layer, metres, up, cache):
+                words = other.pop(layer)
+                scene.note(
+                    str(prim.GetPath()),
+                    f"references {layer.GetDisplayName()}, which {words}; USD does not convert it",
+                )
+        if not other:
+            return
+
+
+def _difference(layer: Sdf.Layer, metres: float, up: str) -> str:
+    """How a layer's unit and up axis differ from the stage's; an empty string where they do not."""
+    found = []
+    own = _metres(layer)
+    if own is not None and abs(own - metres) > _ALIKE * metres:
+        found.append(f"is in units of {own:g} m in a stage of {metres:g} m")
+    axis = _up(layer)
+    if axis is not None and axis != up:
+        found.append(f"has {axis} up in a stage with {up} up")
+    return " and ".join(found)
+
+
+def _metres(layer: Sdf.Layer) -> float | None:
+    """Metres in a unit of the layer, where it says so sensibly."""
+    given = layer.pseudoRoot.GetInfo("metersPerUnit") if _says(layer, "metersPerUnit") else None
+    return given if isinstance(given, float) and math.isfinite(given) and given > 0 else None
+
+
+def _up(layer: Sdf.Layer) -> str | None:
+    given = layer.pseudoRoot.GetInfo("upAxis") if _says(layer, "upAxis") else None
+    return str(given) if given in ("Y", "Z") else None
+
+
+def _says(layer: Sdf.Layer, name: str) -> bool:
+    return bool(layer.pseudoRoot.HasInfo(name))
+
+
+def _holds_geometry(layer: Sdf.Layer) -> bool:
+    """Whether a layer defines anything that has a size: one of fabrics alone has none."""
+    found: list[Sdf.Path] = []
+
+    def look(path: Sdf.Path) -> None:
+        if not found and path.IsPrimPath() and layer.GetPrimAtPath(path).typeName in _PLACED:
+            found.append(path)
+
+    layer.Traverse(Sdf.Path.absoluteRootPath, look)
+    return bool(found)
+
+
+def _referenced(prim: Usd.Prim) -> list[Sdf.Layer]:
+    """Root layers of all that is referenced at `prim` itself, payloads too."""
+    query = Usd.PrimCompositionQuery(prim)
+    return [
+        arc.GetTargetLayer()
+        for arc in query.GetCompositionArcs()
+        if arc.GetArcType() in (Pcp.ArcTypeReference, Pcp.ArcTypePayload) and not arc.IsAncestral()
+    ]
+
+
+def _made_up_for(
+    prim: Usd.Prim, layer: Sdf.Layer, metres: float, up: str, cache: UsdGeom.XformCache
+) -> bool:
+    """Whether the prim's transform scales and turns the layer's content into the stage's unit."""
+    if any("unitsResolve" in str(name) for name in prim.GetPropertyNames()):
+        return True
+    matrix = as_matrix(cache.GetLocalToWorldTransform(prim))[:3, :3]
+    size = abs(float(np.linalg.det(matrix))) ** (1 / 3)
+    if not (math.isfinite(size) and size > 0):
+        return False
+    wanted = math.log((_metres(layer) or metres) / metres)
+    # A scale that is nearer to the units' ratio than to 1 was chosen with the ratio in mind.
+    if abs(math.log(size) - wanted) > 0.5 * abs(wanted) + _ALIKE and abs(wanted) > _ALIKE:
+        return False
+    turned = matrix @ _AXES[_up(layer) or up]
+    return float(turned @ _AXES[up]) > 0.5 * float(np.linalg.norm(turned))

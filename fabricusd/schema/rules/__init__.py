@@ -1,0 +1,1 @@
+"""Rules that a stage is checked by."""

@@ -1,0 +1,1 @@
+"""Weaves from pictures: drawdowns and artwork."""

@@ -1,0 +1,30 @@
+"""One entry for weaves written on a command line."""
+
+from __future__ import annotations
+
+import difflib
+import re
+
+from fabricusd.errors import FabricError
+from fabricusd.weaves.draft import Draft, quoted
+from fabricusd.weaves.expression import parse_expression
+from fabricusd.weaves.named import WEAVES, forms, parse_named
+
+
+def parse_weave(text: str) -> Draft:
+    """The draft of a named weave (`twill 2/1 S`) or of an expression (`mod(2*i + j, 5) != 0`).
+
+    Raises FabricError, one line, for anything else.
+    """
+    words = text.lower().split()
+    if words and words[0] in WEAVES:
+        return parse_named(text)
+    if re.search(r"[()<>=%]", text):
+        return parse_expression(text)
+    near = difflib.get_close_matches(words[0], WEAVES, n=1) if words else []
+    hint = f" (did you mean {near[0]}?)" if near else ""
+    raise FabricError(
+        f"weave {quoted(text)}",
+        f"is not known{hint}; it must be one of {forms()}, or an expression such as "
+        "mod(2*i + j, 5) != 0",
+    )

@@ -1,0 +1,1 @@
+"""WIF drafts: their syntax, reading and writing."""

@@ -1,0 +1,284 @@
+"""Cloth of `conserving` threads: reciprocity, passivity, both sides, the independent version."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numba import njit, prange
+
+from fabricusd.appearance import plain
+from fabricusd.appearance.conserving import multiple
+from fabricusd.appearance.conserving import single as conserving
+from fabricusd.appearance.conserving.sampling import (
+    conserving_density,
+    conserving_direction,
+)
+from fabricusd.appearance.conserving.shares import conserving_sampling_tables
+from fabricusd.appearance.weave.quadrature import POINTS, Rule
+from fabricusd.errors import FabricError
+from fabricusd.fabric import TangentCurve
+from fabricusd.kernels.real import KERNEL
+from tests.appearance.presets import PRESETS, with_model
+
+CLOTHS = {name: with_model(fabric, "conserving") for name, fabric in PRESETS.items()}
+WHITE = {name: plain.white(fabric) for name, fabric in CLOTHS.items()}
+WOVEN = [name for name in CLOTHS if name != "velvet"]
+TABLES = {}
+
+
+def _tables(name, multiple_too=True):
+    """Of the white cloth, made once a session: the scattering table takes a second."""
+    key = name, multiple_too
+    if key not in TABLES:
+        TABLES[key] = multiple.conserving_tables(WHITE[name], multiple=multiple_too)
+    return TABLES[key]
+
+
+def _directions(seed, n, precision=np.float64):
+    w = np.random.default_rng(seed).standard_normal((n, 3)).astype(precision)
+    return w / np.sqrt((w * w).sum(axis=1))[:, None]
+
+
+@njit(**KERNEL, parallel=True)
+def _values(R, tables, wi, wo, out):
+    for k in prange(len(wi)):
+        a, b, c = multiple.conserving_value(
+            R, tables, wi[k, 0], wi[k, 1], wi[k, 2], wo[k, 0], wo[k, 1], wo[k, 2]
+        )
+        out[k, 0], out[k, 1], out[k, 2] = a, b, c
+
+
+def _value(tables, wi, wo):
+    out = np.empty_like(wi)
+    _values(wi.dtype.type, tables, wi, np.ascontiguousarray(np.broadcast_to(wo, wi.shape)), out)
+    return out
+
+
+@njit(**KERNEL, parallel=True)
+def _draw(R, tables, sampling, wo, n, wi, pdf):
+    """The R2 sequence, the first number in order: lobes are strata of it."""
+    for k in prange(n):
+        x, y, z = conserving_direction(
+            R, sampling, wo[0], wo[1], wo[2], R((k + 0.5) / n),
+            R((0.5 + k * 0.7548776662466927) % 1.0), R((0.5 + k * 0.5698402909980532) % 1.0),
+        )  # fmt: skip
+        wi[k, 0], wi[k, 1], wi[k, 2] = x, y, z
+        pdf[k] = conserving_density(R, sampling, x, y, z, wo[0], wo[1], wo[2])
+
+
+def _given_back(tables, sampling, wo, n):
+    """(reflected, transmitted): what the first channel gives back of the light from wo."""
+    wi, pdf = np.empty((n, 3)), np.empty(n)
+    _draw(np.float64, tables, sampling, wo, n, wi, pdf)
+    drawn = pdf > 0
+    share = _value(tables, wi, wo)[:, 0] / np.where(drawn, pdf, 1.0) * drawn
+    same = (wi[:, 2] > 0) == (wo[2] > 0)
+    return share[same].sum() / n, share[~same].sum() / n
+
+
+def _view(degrees, azimuth):
+    theta, phi = math.radians(degrees), math.radians(azimuth)
+    s = math.sin(theta)
+    return np.array([s * math.cos(phi), s * math.sin(phi), math.cos(theta)])
+
+
+@pytest.mark.parametrize("name", CLOTHS)
+def test_single_scattering_agrees_with_the_plain_version(name):
+    wi, wo = _directions(1, 400), _directions(2, 400)
+    rule = Rule(POINTS, 0.1)
+    tables = conserving.single_tables(replace(CLOTHS[name], opaque=False), rule=rule)
+    got = _value(tables, wi, wo)
+    want = plain.conserving_far(CLOTHS[name], wi, wo)
+    # The two integrate the curves differently; q = 1/cos makes pile converge slowly.
+    bound = 1e-2 if name == "velvet" else 1e-3
+    assert np.abs(got - want).mean() < bound * want.mean()
+
+
+@pytest.mark.parametrize("multiple_too", [False, True], ids=["single", "multiple"])
+@pytest.mark.parametrize("name", CLOTHS)
+def test_cloth_is_reciprocal(name, multiple_too):
+    tables = _tables(name, multiple_too)
+    wi, wo = _directions(3, 3000), _directions(4, 3000)
+    forward = _value(tables, wi, wo) / np.abs(wi[:, 2:])
+    back = _value(tables, wo, wi) / np.abs(wo[:, 2:])
+    np.testing.assert_allclose(forward, back, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", CLOTHS)
+def test_single_scattering_is_passive_to_the_horizon(name):
+    tables = _tables(name, False)
+    sampling = conserving_sampling_tables(WHITE[name], tables)
+    for degrees in (0, 45, 75, 89, 89.9):
+        given_back = sum(_given_back(tables, sampling, _view(degrees, 30), 4096))
+        assert 0 < given_back <= tables.covered + 1e-4, degrees
+
+
+@pytest.mark.parametrize("name", CLOTHS)
+def test_white_cloth_gives_everything_back(name):
+    # MODEL section 7: reflected + transmitted + gap = 1.
+    tables = _tables(name)
+    sampling = conserving_sampling_tables(WHITE[name], tables)
+    gap = 1.0 - tables.covered
+    views = [(d, a) for d in (0, 30, 60, 75, 85) for a in (5, 130)]
+    found = [sum(_given_back(tables, sampling, _view(*v), 1 << 14)) + gap - 1 for v in views]
+    if name in WOVEN:
+        assert np.max(np.abs(found)) < 0.005
+    else:
+        assert np.max(np.abs(found)) < 0.01
+        assert np.sqrt(np.mean(np.square(found))) < 0.002
+
+
+@pytest.mark.parametrize("name", ["linen_plain", "polyester_satin_charmeuse"])
+def test_cloth_that_loses_its_multiple_scattering_does_not(name):
+    # The twin of the test above, with a strength that is 5 % wrong.
+    tables = _tables(name)
+    wrong = tables._replace(strength=0.95 * tables.strength)
+    sampling = conserving_sampling_tables(WHITE[name], wrong)
+    given_back = sum(_given_back(wrong, sampling, _view(30, 50), 1 << 14))
+    assert given_back + 1.0 - tables.covered < 1 - 0.005
+
+
+def test_a_grazing_view_of_white_cloth_gains_nothing_either():
+    for name in WOVEN:
+        tables = _tables(name)
+        sampling = conserving_sampling_tables(WHITE[name], tables)
+        for degrees in (88, 89.9):
+            total = sum(_given_back(tables, sampling, _view(degrees, 50), 1 << 14))
+            assert abs(total - tables.covered) < 0.005, (name, degrees)
+
+
+@pytest.mark.parametrize("name", WOVEN)
+def test_single_scattering_alone_is_dark(name):
+    # MODEL section 4: 0.18 to 0.29 reflected, 0.07 to 0.31 transmitted, by direction.
+    reflected, transmitted = multiple.scattered_shares(_tables(name), WHITE[name], draws=1024)
+    assert 0.17 < reflected.min() < reflected.max() < 0.32
+    assert 0.06 < transmitted.min() < transmitted.max() < 0.32
+
+
+def test_velvet_reflects_hardly_anything_once():
+    reflected, _ = multiple.scattered_shares(_tables("velvet"), WHITE["velvet"], draws=512)
+    assert multiple.mean_share(reflected) < 0.04
+
+
+def test_opaque_cloth_lets_nothing_through():
+    tables = _tables("velvet")
+    above, below = np.array([[0.0, 0.6, 0.8]]), np.array([[0.6, 0.0, -0.8]])
+    assert np.all(_value(tables, above, below) == 0)
+    assert np.all(_value(tables, below, above) == 0)
+    assert np.all(_value(tables, below, below) > 0)
+
+
+@pytest.mark.parametrize("name", WOVEN)
+def test_thin_cloth_passes_light_both_ways_alike(name):
+    tables = _tables(name)
+    up, down = _view(30, 40)[None], -_view(50, 80)[None]
+    through = _value(tables, up, down)
+    assert np.all(through > 0)
+    # Half a turn about an axis in the cloth: -w for w, which the law does not change under.
+    np.testing.assert_allclose(_value(tables, -up, -down), through, rtol=1e-12)
+
+
+@pytest.mark.parametrize("precision", [np.float32, np.float64])
+@pytest.mark.parametrize("name", CLOTHS)
+def test_no_pair_of_directions_holds_a_bad_value(name, precision):
+    tables = multiple.conserving_tables(CLOTHS[name], precision=precision, multiple=False)
+    lost = _tables(name).lost.astype(precision)
+    tables = tables._replace(lost=lost, strength=np.ones(3, precision), forward=precision(0.5))
+    wi, wo = _directions(5, 100_000, precision), _directions(6, 100_000, precision)
+    wi[:1000], wo[500:1500] = wo[:1000], -wi[500:1500]
+    special = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1e-30], [0, -1, -1e-30],
+                        [0, 0, -1], [0.6, 0, 0.8], [0, 0.6, 0.8]], precision)  # fmt: skip
+    a, b = (special[k.ravel()] for k in np.meshgrid(np.arange(8), np.arange(8)))
+    wi, wo = np.concatenate((wi, a)), np.concatenate((wo, b))
+    value = _value(tables, wi, wo)
+    assert np.all(np.isfinite(value))
+    assert np.all(value >= 0)
+
+
+@pytest.mark.parametrize("name", CLOTHS)
+def test_float32_agrees_with_float64(name):
+    single = multiple.conserving_tables(CLOTHS[name], precision=np.float32, multiple=False)
+    double = multiple.conserving_tables(CLOTHS[name], multiple=False)
+    wi, wo = _directions(7, 20_000, np.float32), _directions(8, 20_000, np.float32)
+    a, b = _value(single, wi, wo), _value(double, wi.astype(float), wo.astype(float))
+    assert np.quantile(np.abs(a - b)[b > 0] / b[b > 0], 0.999) < 1e-4
+
+
+@pytest.mark.parametrize("name", ["linen_plain", "polyester_satin_charmeuse", "velvet"])
+def test_the_mean_over_the_bits_of_thread_is_the_repeat(name):
+    tables = _tables(name)
+    wi, wo = _view(40, 20), _view(65, 110)
+    total = np.zeros(3)
+    for k, (c, s, weight) in enumerate(tables.nodes):
+        area = weight * max(c, math.cos(math.radians(85)))
+        total += area * np.array(multiple.conserving_point_value(
+            np.float64, tables, int(k >= tables.warp_start), tables.node_thread[k],
+            math.atan2(s, c), *wi, *wo,
+        ))  # fmt: skip
+    np.testing.assert_allclose(total, _value(tables, wi[None], wo[None])[0], rtol=1e-10)
+
+
+def test_the_term_is_off_unless_asked_for():
+    assert multiple.conserving_tables(CLOTHS["linen_plain"], multiple=False).lost.size == 0
+    published = multiple.conserving_tables(PRESETS["linen_plain"])
+    assert published.lost.size == 0
+    assert np.all(_value(published, _directions(9, 10), _directions(10, 10)) == 0)
+
+
+def test_black_threads_send_back_only_their_surface():
+    black = multiple.conserving_tables(plain.white(CLOTHS["linen_plain"], 0.0))
+    white = _tables("linen_plain")
+    assert np.all(black.strength < 0.02 * white.strength)
+
+
+def test_a_thread_upright_everywhere_stays_finite():
+    # n_t.N = 0: without the clamp at 85 degrees q diverges.
+    upright = TangentCurve(angles=(math.pi / 2, math.pi / 2))
+    fabric = replace(CLOTHS["velvet"], threads={
+        k: replace(t, curve=upright) for k, t in CLOTHS["velvet"].threads.items()
+    })  # fmt: skip
+    tables = multiple.conserving_tables(fabric, multiple=False)
+    value = _value(tables, _directions(11, 2000), _directions(12, 2000))
+    assert np.all(np.isfinite(value))
+    assert value.max() > 0
+
+
+def test_very_narrow_lobes_do_not_ask_for_endless_nodes():
+    fabric = replace(CLOTHS["linen_plain"], threads={
+        k: replace(t, gamma_surface=1e-5) for k, t in CLOTHS["linen_plain"].threads.items()
+    })  # fmt: skip
+    assert len(conserving.single_tables(fabric).nodes) <= conserving.MOST_NODES
+
+
+def test_alpha_is_one_for_white_threads_and_the_surface_alone_for_black_ones():
+    fabric = replace(WHITE["linen_plain"])
+    np.testing.assert_allclose(multiple.mean_albedo(fabric), 1.0, rtol=1e-12)
+    black = multiple.mean_albedo(plain.white(fabric, 0.0))
+    assert np.all((black > 0.05) & (black < 0.3))
+
+
+def test_cloth_without_threads_scatters_nothing():
+    fabric = CLOTHS["linen_plain"]
+    bare = replace(fabric, warp=replace(fabric.warp, coverage=0.0),
+                   weft=replace(fabric.weft, coverage=0.0))  # fmt: skip
+    tables = multiple.conserving_tables(bare)
+    assert np.all(_value(tables, _directions(15, 100), _directions(16, 100)) == 0)
+    assert np.all(multiple.mean_albedo(bare) == 0)
+
+
+def test_another_precision_is_refused():
+    with pytest.raises(FabricError, match="precision"):
+        conserving.single_tables(CLOTHS["linen_plain"], precision=np.float16)
+
+
+def test_a_mixed_cloth_scatters_by_its_conserving_threads_only():
+    fabric = PRESETS["linen_plain"]
+    threads = {"Warp": replace(fabric.threads["Warp"], model="conserving"),
+               "Weft": replace(fabric.threads["Weft"], model="thesis")}  # fmt: skip
+    mixed = conserving.single_tables(replace(fabric, threads=threads))
+    whole = conserving.single_tables(CLOTHS["linen_plain"])
+    wi, wo = _directions(13, 500), _directions(14, 500)
+    part, full = _value(mixed, wi, wo), _value(whole, wi, wo)
+    assert np.all(part <= full * (1 + 1e-12))
+    assert 0.2 < part.sum() / full.sum() < 0.8

@@ -1,0 +1,115 @@
+"""Coverage wins over the grid: what each set and thread type shows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.weave.coverage import GAP, coverage
+from fabricusd.fabric import Fabric, Thread, ThreadSet, Weave
+from tests.appearance.presets import PLAIN, PRESETS, SATIN_5
+from tests.strategies import fabrics
+
+ALL_WARP = Weave(np.ones((2, 3), bool), "all warp")
+NO_WIDTH = Thread(thickness=0.0)
+
+
+def cloth(weave: Weave, warp: float | None, weft: float | None, **more: object) -> Fabric:
+    return Fabric(weave=weave, warp=ThreadSet(coverage=warp), weft=ThreadSet(coverage=weft), **more)  # type: ignore[arg-type]
+
+
+RULES = {
+    # weave, warp, weft -> (weft, warp) width, set underneath, its width, gap
+    "linen: both less than their cells": (PLAIN, 0.33, 0.33, (0.66, 0.66), GAP, 0.0, 0.34),
+    "satin: the warp takes what the weft leaves": (SATIN_5, 0.9, 0.1, (0.5, 1), WARP, 1.0, 0.0),
+    "the rest is gap": (SATIN_5, 0.85, 0.1, (0.5, 1), WARP, 0.5, 0.05),
+    "exactly the cells": (SATIN_5, 0.8, 0.2, (1, 1), GAP, 0.0, 0.0),
+    "nowhere on top, and yet seen": (ALL_WARP, 0.7, 0.2, (0, 0.7), WEFT, 2 / 3, 0.1),
+    "nowhere on top, filling the rest": (ALL_WARP, 0.75, 0.25, (0, 0.75), WEFT, 1.0, 0.0),
+    "a set that covers nothing": (PLAIN, 0.0, 0.4, (0.8, 0.0), GAP, 0.0, 0.6),
+    "nothing at all": (PLAIN, 0.0, 0.0, (0.0, 0.0), GAP, 0.0, 1.0),
+    "one set everywhere": (PLAIN, 1.0, 0.0, (0.0, 1.0), WARP, 1.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("row", RULES.values(), ids=RULES.keys())
+def test_the_remainder_goes_first_to_the_set_with_too_few_cells(row) -> None:  # type: ignore[no-untyped-def]
+    weave, warp, weft, width, under, under_width, gap = row
+    share = coverage(cloth(weave, warp, weft))
+    np.testing.assert_allclose(share.width, width, atol=1e-12)
+    assert share.under == under
+    assert share.under_width == pytest.approx(under_width)
+    assert share.gap == pytest.approx(gap, abs=1e-12)
+    np.testing.assert_allclose(share.type_area.sum(axis=1), [weft, warp], atol=1e-12)
+
+
+@given(fabrics())
+def test_areas_and_gap_are_shares_of_one(fabric: Fabric) -> None:
+    share = coverage(fabric)
+    assert (share.area >= 0).all()
+    assert (share.type_area >= 0).all()
+    np.testing.assert_allclose(share.type_area.sum(axis=1), share.area, atol=1e-9)
+    assert share.area.sum() + share.gap == pytest.approx(1.0, abs=1e-9)
+    for j, thread_set in ((WEFT, fabric.weft), (WARP, fabric.warp)):
+        if thread_set.coverage is not None:
+            assert share.area[j] == thread_set.coverage
+        else:
+            assert share.area[j] <= share.cells[j] + 1e-12
+
+
+def test_an_unauthored_coverage_is_cells_times_thickness_over_pitch() -> None:
+    thin = Thread(thickness=0.3e-3)
+    fabric = cloth(SATIN_5, None, None, threads={"T": thin})
+    fabric = replace(fabric, warp=ThreadSet(density=1000.0), weft=ThreadSet(density=5000.0))
+    share = coverage(fabric)
+    assert share.area[WARP] == pytest.approx(0.8 * 0.3)
+    assert share.area[WEFT] == pytest.approx(0.2)  # thicker than its pitch: all of its cells
+
+
+def test_a_thread_of_unknown_thickness_fills_its_pitch() -> None:
+    share = coverage(cloth(PLAIN, None, None, threads={"T": NO_WIDTH}))
+    np.testing.assert_allclose(share.area, [0.5, 0.5])
+    assert share.gap == 0
+
+
+def test_an_unauthored_coverage_leaves_room_for_the_authored_one() -> None:
+    share = coverage(cloth(SATIN_5, 0.95, None, threads={"T": NO_WIDTH}))
+    np.testing.assert_allclose(share.area, [0.05, 0.95])
+
+
+def test_types_share_their_set_by_the_cells_where_they_are_on_top() -> None:
+    # Ends 0, 2, 4 are on top in every cell, 1, 3, 5 in none; type 0 has every third end.
+    cells = np.zeros((6, 1), bool)
+    cells[::2] = True
+    fabric = Fabric(
+        threads={"A": Thread(), "B": Thread()},
+        weave=Weave(cells),
+        warp=ThreadSet(sequence=(0, 1, 1), coverage=0.25),
+        weft=ThreadSet(sequence=(1,), coverage=0.5),
+    )
+    share = coverage(fabric)
+    np.testing.assert_allclose(share.type_area, [[0.0, 0.5], [0.25 / 3, 0.25 * 2 / 3]])
+
+
+def test_a_type_that_is_always_on_top_gains_nothing_underneath() -> None:
+    # The remainder lies on the *other* cells, and only B's ends have any: the shares of the types
+    # cannot be those of the cells on top, which MODEL section 3 has for every coverage.
+    cells = np.array([[True, True], [False, False]])
+    fabric = Fabric(
+        threads={"A": Thread(), "B": Thread()},
+        weave=Weave(cells),
+        warp=ThreadSet(sequence=(0, 1), coverage=0.7),
+        weft=ThreadSet(sequence=(0,), coverage=0.3),
+    )
+    np.testing.assert_allclose(coverage(fabric).type_area[WARP], [0.5, 0.2])
+
+
+@pytest.mark.parametrize("fabric", PRESETS.values(), ids=PRESETS.keys())
+def test_published_fabrics_cover_what_is_published(fabric: Fabric) -> None:
+    share = coverage(fabric)
+    assert share.area[WARP] == fabric.warp.coverage
+    assert share.area[WEFT] == fabric.weft.coverage
