@@ -45,7 +45,7 @@ schema: $(STAMP)  ## Make the plugin folder from schema.usda and the rules.
 	$(BIN)/python -m fabricusd.schema.generate
 
 bench: $(STAMP)  ## Run the benchmarks; figures go to stdout.
-	for script in bench/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+	for script in bench/bench_*.py bench/*/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
 docs: $(STAMP)  ## Remake every figure and table in docs/.
 	for script in docs/make_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from fabricusd.errors import FabricError
 from fabricusd.partial_files import (
@@ -131,3 +133,11 @@ def readable_file(path: str | os.PathLike[str], missing: str = "") -> Path:
             raise
         raise FabricError(repr(str(source)), f"is no file name: {error}") from None
     return source
+
+
+def write_json(path: Path, value: Any) -> None:
+    """A JSON file, whole, whose bytes depend on the value alone."""
+    with whole_file(path) as temporary:
+        temporary.write_text(
+            json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False) + "\n", "utf-8"
+        )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -22,3 +24,13 @@ def srgb_from_linear(linear: ArrayLike) -> NDArray[np.float64]:
     return np.where(
         v <= 0.0031308, v * 12.92, 1.055 * np.maximum(v, 0.0031308) ** (1 / 2.4) - 0.055
     )
+
+
+def srgb_encode(linear: NDArray[Any]) -> NDArray[np.float64]:
+    """Linear display light to sRGB code values, [0, 1]."""
+    return srgb_from_linear(np.clip(np.asarray(linear, np.float64), 0.0, 1.0))
+
+
+def srgb_decode(code: NDArray[Any]) -> NDArray[np.float64]:
+    """sRGB code values to linear light, the inverse of `srgb_encode`."""
+    return linear_from_srgb(code)

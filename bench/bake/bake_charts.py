@@ -1,6 +1,6 @@
 """The figures of docs/baking.md: time by texels, BTF error by megabytes, horizons against tracing.
 
-    python bench/bake/bake_charts.py [--texels 512 1024 2048 4096 8192] [--btf] [--horizon] [--to DIR]
+    python bench/bake/bake_charts.py [--texels 512 1024 2048 4096] [--btf] [--horizon] [--to DIR]
 
 Each is printed as a table, and drawn into DIR (docs/images).
 """

@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from fabricusd.appearance.weave.coverage import WARP
-from fabricusd.bake.bake import Settings, bake
+from fabricusd.bake.bake import bake
+from fabricusd.bake.job import Settings
 from fabricusd.bake.layout.garment import garments
 from fabricusd.bake.texels import planes
 from fabricusd.bake.texels.angle_rows import steepness

@@ -27,15 +27,15 @@ sys.path.insert(0, str(HERE.parent))
 
 from make_samples import Grid, camera, define_grid, dress, look_at, make_drape  # noqa: E402
 
-from fabricusd.bake.bake import Settings as BakeSettings  # noqa: E402
 from fabricusd.bake.bake import bake  # noqa: E402
+from fabricusd.bake.job import Settings as BakeSettings  # noqa: E402
 from fabricusd.images.files import read_exr_layers, write_png  # noqa: E402
 from fabricusd.materials.materials import write_materials  # noqa: E402
 from fabricusd.materials.targets.osl import write_osl  # noqa: E402
 from fabricusd.quality.pictures import difference  # noqa: E402
 from fabricusd.reference.render import render  # noqa: E402
-from fabricusd.reference.view_transform import srgb_encode  # noqa: E402
 from fabricusd.schema import load  # noqa: E402
+from fabricusd.srgb import srgb_encode  # noqa: E402
 
 PRESETS = (
     "linen_plain",

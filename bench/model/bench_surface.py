@@ -1,4 +1,6 @@
-"""How fast the surface law is, and how exact in single precision: `python bench/model/bench_surface.py`.
+"""How fast the surface law is, and how exact in single precision.
+
+    python bench/model/bench_surface.py
 
 Everything runs in one process on the same directions, and time is that of the processor, all
 workers together: figures are per worker, and hold on a busy machine. NumPy's side is the law as it

@@ -1,4 +1,6 @@
-"""How fast the vectorised thread models are against plain NumPy: `python bench/model/bench_thread.py`.
+"""How fast the vectorised thread models are against plain NumPy.
+
+    python bench/model/bench_thread.py
 
 Everything runs in one process on the same directions, so that the ratios hold on a busy machine.
 Each figure is the best of several runs.

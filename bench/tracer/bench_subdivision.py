@@ -1,6 +1,6 @@
 """Time and memory that refining a subdivision surface of 100 000 faces takes.
 
-    python bench/tracer/bench_subdivision.py [quads | triangles] [auto | low | medium | high] [render]
+    python bench/tracer/bench_subdivision.py [quads|triangles] [auto|low|medium|high] [render]
 
 Printed: seconds on the clock and of the processor to read the stage, and the most memory held; with
 `render` also the most that a picture of 2048 x 2048 takes.
@@ -18,7 +18,7 @@ from bench_memory import most
 from pxr import Sdf, Usd, UsdGeom, Vt
 
 from fabricusd.reference import read_scene, render
-from fabricusd.reference.rays import embree
+from fabricusd.scene.surface import embree_library
 
 SIDES = {"quads": 317, "triangles": 225}
 """Points along each side of a wavy square of 99 856 quads or 100 352 triangles."""
@@ -53,7 +53,7 @@ def write_stage(path: Path, shape: str) -> None:
 def main() -> None:
     shape = sys.argv[1] if len(sys.argv) > 1 else "quads"
     complexity = sys.argv[2] if len(sys.argv) > 2 else "high"
-    assert embree.library() is not None
+    assert embree_library.library() is not None
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cloth.usdc"
         write_stage(path, shape)

@@ -12,11 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from fabricusd.appearance.conserving.levels import conserving_level_value
 from fabricusd.appearance.conserving.multiple import (
-    conserving_point_value,
     conserving_tables,
     conserving_value,
-    multiple_share,
 )
 from fabricusd.appearance.conserving.sampling import (
     ConservingSamplingTables,
@@ -28,13 +27,10 @@ from fabricusd.appearance.conserving.sampling import (
 from fabricusd.appearance.conserving.shares import conserving_sampling_tables
 from fabricusd.appearance.conserving.single import (
     ConservingTables,
-    facet_terms,
     single_tables,
-    visible,
 )
-from fabricusd.appearance.frame import to_thread
 from fabricusd.appearance.published.far import far_value
-from fabricusd.appearance.published.levels import across_at, point_value
+from fabricusd.appearance.published.levels import point_value
 from fabricusd.appearance.published.sampling import (
     SamplingTables,
     far_density,
@@ -46,10 +42,9 @@ from fabricusd.appearance.published.shares import sampling_tables
 from fabricusd.appearance.published.tables import SurfaceTables, surface_tables
 from fabricusd.appearance.sampling.share_fit import AZIMUTHS, ELEVATIONS
 from fabricusd.appearance.sampling.stretches import STRETCH_COLUMNS
-from fabricusd.appearance.scattering.terms import ALBEDO_B, ALBEDO_G, ALBEDO_R, CONSERVING, MODEL
 from fabricusd.appearance.weave.quadrature import Rule
-from fabricusd.fabric import PILE_ANGLE, Fabric
-from fabricusd.kernels.real import PART, cos, sin
+from fabricusd.fabric import Fabric
+from fabricusd.kernels.real import PART
 
 FAR, WEAVE, THREAD = 0, 1, 2
 """Levels, in the order of `surface.LEVELS`."""
@@ -129,33 +124,6 @@ def law_value(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz
             )  # fmt: skip
         red, green, blue = red + r, green + g, blue + b
     return red, green, blue
-
-
-@njit(**PART)
-def conserving_level_value(
-    R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz
-):  # type: ignore[no-untyped-def]
-    """`multiple.conserving_point_value`, with the factors across the width if `across_too`."""
-    row = tables.threads[thread]
-    if not across_too or row[MODEL] != R(CONSERVING):
-        return conserving_point_value(R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz)
-    scale = visible(R, tables, ix, iy, iz) * visible(R, tables, ox, oy, oz) * abs(iz)
-    if tables.opaque != 0 and (iz > R(0)) != (oz > R(0)):
-        scale = R(0)
-    angle = min(max(psi0, R(-PILE_ANGLE)), R(PILE_ANGLE))
-    c, s = cos(R, angle), sin(R, angle)
-    surface, volume = facet_terms(R, tables, thread_set, thread, c, s, ix, iy, iz, ox, oy, oz)
-    _, b_i, n_i = to_thread(R, thread_set, c, s, ix, iy, iz)
-    _, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
-    on_surface, on_volume = across_at(R, row, w, b_i, n_i, b_o, n_o)
-    scale /= c
-    surface, volume = surface * on_surface * scale, volume * on_volume * scale
-    share = multiple_share(R, tables, ix, iy, iz, ox, oy, oz) / tables.covered
-    return (
-        surface + volume * row[ALBEDO_R] + share * tables.strength[0],
-        surface + volume * row[ALBEDO_G] + share * tables.strength[1],
-        surface + volume * row[ALBEDO_B] + share * tables.strength[2],
-    )
 
 
 @njit(**PART)

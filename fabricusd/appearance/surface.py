@@ -23,6 +23,7 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.accuracy import choose_rule
+from fabricusd.appearance.conserving.levels import conserving_level_value
 from fabricusd.appearance.conserving.multiple import conserving_value
 from fabricusd.appearance.law import (
     CONSERVING_ONLY,
@@ -30,7 +31,6 @@ from fabricusd.appearance.law import (
     PUBLISHED_ONLY,
     THREAD,
     SurfaceLaw,
-    conserving_level_value,
     law_density,
     law_direction,
     surface_law,

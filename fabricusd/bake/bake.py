@@ -7,17 +7,17 @@ import os
 import shutil
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from fabricusd import __version__
 from fabricusd.bake.btf.write import MAX_ERROR, write_btf
-from fabricusd.bake.error.accuracy import SwatchError, swatch_errors
+from fabricusd.bake.error.accuracy import swatch_errors
 from fabricusd.bake.error.choose import Tried, cheapest, maps_with
-from fabricusd.bake.error.map_error import MapError, map_errors
+from fabricusd.bake.error.map_error import map_errors
 from fabricusd.bake.error.relight import best_choice
+from fabricusd.bake.job import MARGIN, Baked, Settings
 from fabricusd.bake.layout.garment import (
     Garment,
     fitted,
@@ -29,11 +29,11 @@ from fabricusd.bake.layout.garment import (
 from fabricusd.bake.layout.mesh_layer import write_mesh_layer
 from fabricusd.bake.layout.overlaps import refuse_overlaps
 from fabricusd.bake.layout.unwrap import unwrapped
-from fabricusd.bake.manifest import manifest_of, write_json
+from fabricusd.bake.manifest import manifest_of
 from fabricusd.bake.ranges import check_settings
 from fabricusd.bake.reasons import explained
 from fabricusd.bake.report import write_report
-from fabricusd.bake.texels.encoding import Encoding, stored_by
+from fabricusd.bake.texels.encoding import stored_by
 from fabricusd.bake.texels.maps import TextureMap, chosen_maps
 from fabricusd.bake.texels.recipe import Recipe, recipe
 from fabricusd.bake.texels.sheet import LARGEST, SMALLEST, Sheet, sheets_of
@@ -43,87 +43,15 @@ from fabricusd.bake.work.lock import locked
 from fabricusd.bake.work.scratch import Scratch
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
-from fabricusd.files import remove_partial_files
+from fabricusd.files import remove_partial_files, write_json
 from fabricusd.run.workers import worker_count
 from fabricusd.scene.read import as_binding, read_scene
 from fabricusd.scene.scene import Scene
 from fabricusd.scene.size import size_words, threads_words
 from fabricusd.schema import save_all
 
-MARGIN = 16
-"""Texels that a shell is continued beyond its border: enough for four mip levels without a seam."""
-
 FEWEST = 2.0
 """Texels per thread below which threads do not resolve and texels hold means of several."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """What is made of a scene.
-
-    resolution : texels along a side, a power of two from 64; 0 to take `texels_per_thread`
-    maps : names from the registry, None for all
-    light : direction to a light in the surface frame, for the map `shadow`
-    level : "weave" or "thread", whether threads are flat or round across their width
-    udim : bake each UDIM tile that the UVs reach into
-    fit : move and scale each garment's UVs into the unit square first
-    unwrap : "x", "y" or "z": new UVs by xatlas, with the warp along that axis of the world
-    max_error : mean delta E 2000 of re-lit texels against level `weave` to reach; 0 to ask nothing
-    btf : forms of the BTF to write, see `btf.write.FORMS`
-    file_format : "exr", or "png" or "tiff" for 16-bit integers and the finest level alone
-    margin : texels that a shell is continued beyond its border
-
-    `ranges.check_settings` says what each may be; `bake` and `plan` ask it before any work.
-    """
-
-    resolution: int = 1024
-    texels_per_thread: float = 0.0
-    maps: tuple[str, ...] | None = None
-    light: tuple[float, float, float] | None = None
-    shadow: str = "peak"
-    level: str = "weave"
-    udim: bool = False
-    fit: bool = False
-    unwrap: str = ""
-    max_error: float = 0.0
-    btf: tuple[str, ...] = ()
-    file_format: str = "exr"
-    margin: int = MARGIN
-
-
-@dataclass(kw_only=True)
-class Baked:
-    """What a bake has made.
-
-    files : names of the textures, by garment, map and UDIM number
-    encodings : of each file whose numbers are not the values themselves
-    errors : of each garment, measured as `accuracy.swatch_error` does with the maps that were made
-    map_errors : of each garment and map
-    tried : where a bound was asked for, what was tried to meet it
-    btf : records of the BTFs that were written, by fabric
-    notes : what had to be assumed or left out
-    """
-
-    folder: Path
-    resolution: int
-    garments: list[Garment]
-    maps: list[TextureMap]
-    files: dict[str, dict[str, dict[int, str]]]
-    notes: list[str] = field(default_factory=list)
-    encodings: dict[str, Encoding] = field(default_factory=dict)
-    errors: dict[str, SwatchError] = field(default_factory=dict)
-    map_errors: dict[str, dict[str, MapError]] = field(default_factory=dict)
-    tried: list[Tried] = field(default_factory=list)
-    btf: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
-    seconds: float = 0.0
-    finished: bool = True
-
-    def reached(self, max_error: float) -> bool:
-        """Whether every garment, and every BTF, is within `max_error`."""
-        records = [r["delta_e"] for rows in self.btf.values() for r in rows]
-        return all(e.point <= max_error for e in self.errors.values()) and all(
-            e <= max_error for e in records
-        )
 
 
 def bake(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -14,19 +13,10 @@ import numpy as np
 from fabricusd import __version__
 from fabricusd.bake.texels.maps import TextureMap
 from fabricusd.bake.work.scratch import sha256
-from fabricusd.files import whole_file
 from fabricusd.images.files import OPENIMAGEIO
 
 if TYPE_CHECKING:
-    from fabricusd.bake.bake import Baked, Settings
-
-
-def write_json(path: Path, value: Any) -> None:
-    """A JSON file, whole, whose bytes depend on the value alone."""
-    with whole_file(path) as temporary:
-        temporary.write_text(
-            json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False) + "\n", "utf-8"
-        )
+    from fabricusd.bake.job import Baked, Settings
 
 
 def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any]:

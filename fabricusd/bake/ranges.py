@@ -16,7 +16,7 @@ from fabricusd.bake.texels.sheet import LARGEST, SMALLEST
 from fabricusd.errors import FabricError
 
 if TYPE_CHECKING:
-    from fabricusd.bake.bake import Settings
+    from fabricusd.bake.job import Settings
 
 WIDEST = 1024
 """Texels of a margin: more than any mip level that is looked at needs."""

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.bake.manifest import write_json
-from fabricusd.files import whole_file
+from fabricusd.files import whole_file, write_json
 from fabricusd.images.files import read_middle, write_png
 
 if TYPE_CHECKING:
-    from fabricusd.bake.bake import Baked, Settings
+    from fabricusd.bake.job import Baked, Settings
 
 PICTURE = 256
 """Texels of a map that the page shows, the middle of its finest level."""

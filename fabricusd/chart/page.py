@@ -11,10 +11,10 @@ from pathlib import Path
 
 import fabricusd
 from fabricusd.appearance.weave.footprint import DEFAULT
-from fabricusd.chart.choice import BOUNDS as LEVEL_BOUNDS
-from fabricusd.chart.choice import cheapest, choose_limits, read_limits, read_table
 from fabricusd.chart.panel import Panel, Row, relative_costs
 from fabricusd.files import whole_file
+from fabricusd.reference.choice import BOUNDS as LEVEL_BOUNDS
+from fabricusd.reference.choice import cheapest, choose_limits, read_limits, read_table
 
 Charts = Mapping[str, tuple[Panel, Sequence[Row]]]
 

@@ -71,7 +71,8 @@ def run(options: argparse.Namespace) -> int:
     """Bake; print the names of the files."""
     from pathlib import Path
 
-    from fabricusd.bake.bake import Settings, bake, plan
+    from fabricusd.bake.bake import bake, plan
+    from fabricusd.bake.job import Settings
     from fabricusd.bake.ranges import positive
     from fabricusd.bake.texels.maps import REGISTRY
 

@@ -160,8 +160,8 @@ def _choose(options: argparse.Namespace, fabric: Fabric | None) -> None:
     if options.max_error is None:
         options.shadow = options.shadow or "horizon"
         return
-    from fabricusd.chart.choice import choose_limits, choose_shadow, presets_in
     from fabricusd.reference import read_scene
+    from fabricusd.reference.choice import choose_limits, choose_shadow, presets_in
 
     scene = read_scene(options.scene, fabric=fabric, camera=options.camera, units=options.units)
     if options.shadow is None:

@@ -10,7 +10,7 @@ import hashlib
 import os
 from pathlib import Path
 
-PACKAGE = Path(__file__).resolve().parent
+PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = ("appearance", "reference", "bake")
 STAMP = "kernels.stamp"
 

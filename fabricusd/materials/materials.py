@@ -10,12 +10,11 @@ from typing import Any
 from pxr import Sdf, Tf, Usd, UsdGeom
 
 from fabricusd import __version__
-from fabricusd.bake.manifest import write_json
 from fabricusd.bake.manifest_file import file_in
 from fabricusd.bake.work.lock import locked, refuse_locked
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
-from fabricusd.files import remove_partial_files
+from fabricusd.files import remove_partial_files, write_json
 from fabricusd.materials.bake_folder import BakeFolder, read_bake_folder
 from fabricusd.materials.networks.surfaces import GRAPHS, MAPS
 from fabricusd.materials.recipes import Progress, Settings, Written, recipes

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.srgb import linear_from_srgb, srgb_from_linear
+from fabricusd.srgb import srgb_encode
 
 _A, _B, _C, _D, _E = 2.51, 0.03, 2.43, 0.59, 0.14
 GREY = 0.18
@@ -35,16 +35,6 @@ def tone_curve(radiance: NDArray[Any]) -> NDArray[np.float64]:
     x = _SCALE * np.maximum(np.nan_to_num(radiance, nan=0.0, posinf=1e6), 0.0)
     x = np.minimum(x, 1e6)
     return np.clip(x * (_A * x + _B) / (x * (_C * x + _D) + _E), 0.0, 1.0)
-
-
-def srgb_encode(linear: NDArray[Any]) -> NDArray[np.float64]:
-    """Linear display light to sRGB code values, [0, 1]."""
-    return srgb_from_linear(np.clip(np.asarray(linear, np.float64), 0.0, 1.0))
-
-
-def srgb_decode(code: NDArray[Any]) -> NDArray[np.float64]:
-    """sRGB code values to linear light, the inverse of `srgb_encode`."""
-    return linear_from_srgb(code)
 
 
 def view(radiance: NDArray[Any], exposure: float = 0.0) -> NDArray[np.uint8]:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
-from fabricusd.reference.rays.triangles import measured_scale
 from fabricusd.scene.scene import FabricSurface, Mesh, Scene
+from fabricusd.scene.surface.normals import measured_scale
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres in a unit of length that a file may be in."""

@@ -18,8 +18,9 @@ from bake.killed import leave_half_written
 from bake.meshes import write_quad
 
 from fabricusd.bake import bake as module
-from fabricusd.bake.bake import Settings, bake, plan
+from fabricusd.bake.bake import bake, plan
 from fabricusd.bake.error.relight import RELIT, BakedSet, best_choice
+from fabricusd.bake.job import Settings
 from fabricusd.bake.texels import cell_table
 from fabricusd.bake.work import assemble, kept
 from fabricusd.bake.work.scratch import Scratch

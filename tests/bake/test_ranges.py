@@ -9,7 +9,8 @@ import pytest
 from bake.meshes import write_quad
 
 from fabricusd.bake import bake as module
-from fabricusd.bake.bake import Settings, bake, plan
+from fabricusd.bake.bake import bake, plan
+from fabricusd.bake.job import Settings
 from fabricusd.bake.ranges import check_settings
 from fabricusd.bake.texels.light import unit_light
 from fabricusd.cli.main import main

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from pxr import Gf, Sdf, UsdGeom
 
-from fabricusd.bake.bake import Settings, bake, plan
+from fabricusd.bake.bake import bake, plan
+from fabricusd.bake.job import Settings
 from fabricusd.errors import FabricError
 from tests.conftest import CHECKOUT
 from tests.reference.stages import bind_fabric, new_stage, square

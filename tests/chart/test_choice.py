@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from fabricusd.chart.choice import cheapest, choose_shadow, front_of, presets_in, read_table
 from fabricusd.chart.panels.shadows import WOVEN
 from fabricusd.chart.scenes import one_cylinder
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
+from fabricusd.reference.choice import cheapest, choose_shadow, front_of, presets_in, read_table
 from fabricusd.schema import load
 
 FRONT = {"none": (10.0, 0.5), "horizon": (12.0, 0.1), "traced": (50.0, 0.01)}

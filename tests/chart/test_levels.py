@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from fabricusd.appearance.weave.footprint import weights
-from fabricusd.chart.choice import choose_limits, read_limits
 from fabricusd.chart.level_errors import LIGHTS, TO_EYE, WIDTHS, Zoom, coarsest, zoom
+from fabricusd.reference.choice import choose_limits, read_limits
 from fabricusd.schema import load, preset_names
 
 PIXELS_PER_THREAD = 1.0 / WIDTHS

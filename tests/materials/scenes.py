@@ -6,7 +6,8 @@ from pathlib import Path
 
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
-from fabricusd.bake.bake import Settings, bake
+from fabricusd.bake.bake import bake
+from fabricusd.bake.job import Settings
 from fabricusd.fabric import Binding
 from fabricusd.schema import load, write_binding, write_fabric
 

@@ -10,8 +10,8 @@ import pytest
 from preview.scenes import MAPS
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
-from fabricusd.bake.bake import Settings as BakeSettings
 from fabricusd.bake.bake import bake
+from fabricusd.bake.job import Settings as BakeSettings
 from fabricusd.fabric import Binding
 from fabricusd.materials.materials import write_materials
 from fabricusd.materials.recipes import Settings

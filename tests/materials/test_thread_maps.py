@@ -10,8 +10,8 @@ from preview.scenes import write_shirt
 from pxr import Sdf, Usd, UsdShade
 
 from fabricusd.appearance.weave.lookup import NO_THREAD
-from fabricusd.bake.bake import Settings as BakeSettings
 from fabricusd.bake.bake import bake
+from fabricusd.bake.job import Settings as BakeSettings
 from fabricusd.bake.texels.maps import NO_LAY
 from fabricusd.images.files import read_mip_level
 from fabricusd.materials.bake_folder import read_bake_folder

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.lookup import NO_THREAD
-from fabricusd.bake.bake import Settings, bake
+from fabricusd.bake.bake import bake
 from fabricusd.bake.error.relight import BakedSet
+from fabricusd.bake.job import Settings
 from fabricusd.bake.texels.encoding import FORMATS
 from fabricusd.fabric import Binding, Fabric, Thread, ThreadSet
 from fabricusd.reference import render

@@ -14,11 +14,12 @@ from fabricusd.errors import FabricError
 from fabricusd.images.files import read_exr_layers, read_image
 from fabricusd.reference.film import AOVS
 from fabricusd.reference.render import render
-from fabricusd.reference.view_transform import srgb_decode, srgb_encode, tone_curve, view
+from fabricusd.reference.view_transform import tone_curve, view
 from fabricusd.run import workers
 from fabricusd.run.workers import Batches
 from fabricusd.scene.scene import Scene
 from fabricusd.schema import load
+from fabricusd.srgb import srgb_decode, srgb_encode
 from tests.reference.scenes import cloth, grid, lambert
 from tests.reference.stages import new_stage, square
 

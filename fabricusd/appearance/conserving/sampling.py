@@ -16,13 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import from_thread, to_thread
-from fabricusd.appearance.published.sampling import (
-    narrow_direction,
-    narrower,
-    share_at,
-    uniform_direction,
-    view_corner,
-)
+from fabricusd.appearance.sampling.across import narrow_direction, narrower
 from fabricusd.appearance.sampling.lobes import (
     ISOTROPIC,
     STEEPEST,
@@ -41,6 +35,7 @@ from fabricusd.appearance.sampling.stretches import (
     VOLUME_WIDTH,
     nearest_stretch,
 )
+from fabricusd.appearance.sampling.views import share_at, uniform_direction, view_corner
 from fabricusd.appearance.scattering.terms import (
     GAMMA_SURFACE,
     GAMMA_VOLUME,

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.frame import WARP, WEFT, cos_inclination, unit_azimuth
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.published.blocks import (
     ACROSS_I,
     ACROSS_O,
@@ -34,7 +34,8 @@ from fabricusd.appearance.published.blocks import (
     prepare,
 )
 from fabricusd.appearance.published.far import normalization
-from fabricusd.appearance.published.segment import across, along_set, seen_along, segment
+from fabricusd.appearance.published.segment import along_set, seen_along, segment
+from fabricusd.appearance.scattering.across import across_at
 from fabricusd.appearance.scattering.terms import (
     ALBEDO_B,
     ALBEDO_G,
@@ -98,14 +99,6 @@ def _bit_of_thread(R, thesis, across_too, row, precision, c, s, w, a_i, b_i, iz,
         on_surface, on_volume = across_at(R, row, w, b_i, n_i, b_o, n_o)
         return surface * on_surface, volume * on_volume
     return surface, volume
-
-
-@njit(**INLINE)
-def across_at(R, row, w, b_i, n_i, b_o, n_o):
-    """`across` of two directions' components b and n in the thread frame."""
-    sin_i, cos_i = unit_azimuth(R, b_i, n_i, cos_inclination(R, b_i, n_i))
-    sin_o, cos_o = unit_azimuth(R, b_o, n_o, cos_inclination(R, b_o, n_o))
-    return across(R, row, w, sin_i, cos_i, sin_o, cos_o)
 
 
 @njit(**KERNEL)

@@ -15,19 +15,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import from_thread, to_thread
-from fabricusd.appearance.published.segment import across_deviation
+from fabricusd.appearance.sampling.across import narrow_direction, narrower
 from fabricusd.appearance.sampling.lobes import (
     ISOTROPIC,
     STEEPEST,
     SURFACE,
     VOLUME,
-    azimuth_seen,
-    density_across,
     lobe_densities,
-    sample_across,
     sample_lobe,
 )
-from fabricusd.appearance.sampling.share_fit import AZIMUTHS, ELEVATIONS
 from fabricusd.appearance.sampling.stretches import (
     COS,
     PSI0,
@@ -38,6 +34,7 @@ from fabricusd.appearance.sampling.stretches import (
     VOLUME_WIDTH,
     nearest_stretch,
 )
+from fabricusd.appearance.sampling.views import share_at, uniform_direction, view_corner
 from fabricusd.appearance.scattering.terms import (
     GAMMA_SURFACE,
     GAMMA_VOLUME,
@@ -65,28 +62,6 @@ class SamplingTables(NamedTuple):
     stretches: Reals
     shares: Reals
     point_shares: Reals
-
-
-@njit(**INLINE)
-def view_corner(R, ox, oy, oz):
-    """Where a view lies on the grid of shares: (elevation, next azimuths, two fractions)."""
-    flat = math.sqrt(ox * ox + oy * oy)
-    e = atan2(R, flat, max(oz, R(0))) * R((ELEVATIONS - 1) / (0.5 * math.pi))
-    row = min(int(e), ELEVATIONS - 2)
-    a = atan2(R, oy, ox) * R(AZIMUTHS / (2 * math.pi))
-    a = a if a >= R(0) else a + R(AZIMUTHS)
-    column = min(int(a), AZIMUTHS - 1)
-    return row, column, (column + 1) % AZIMUTHS, e - R(row), a - R(column)
-
-
-@njit(**INLINE)
-def share_at(R, shares, corner, k):
-    """Share of lobe k at a view, bilinear in the grid."""
-    row, column, following, e, a = corner
-    low = shares[row, column, k] + a * (shares[row, following, k] - shares[row, column, k])
-    row += 1
-    high = shares[row, column, k] + a * (shares[row, following, k] - shares[row, column, k])
-    return low + e * (high - low)
 
 
 @njit(**INLINE)
@@ -142,14 +117,6 @@ def far_density(R, sampling, ix, iy, iz, ox, oy, oz):
     return p
 
 
-@njit(**INLINE)
-def uniform_direction(R, u1, u2):
-    """Uniform over the upper hemisphere."""
-    flat = math.sqrt(max(R(0), (R(1) - u1) * (R(1) + u1)))
-    phi = R(2 * math.pi) * u2
-    return flat * cos(R, phi), flat * sin(R, phi), u1
-
-
 @njit(**PART)
 def far_direction(R, sampling, ox, oy, oz, u0, u1, u2):
     """wi (x, y, z) for a viewer above the cloth and three numbers in [0, 1)."""
@@ -169,25 +136,6 @@ def far_direction(R, sampling, ox, oy, oz, u0, u1, u2):
         R, k % 3, row[COS], row[SIN], row[PSI0], row[TAN], row[SURFACE_WIDTH], row[VOLUME_WIDTH],
         int(row[SET]), ox, oy, oz, u1, u2,
     )  # fmt: skip
-
-
-@njit(**INLINE)
-def narrower(R, gamma, c, s, thread_set, w, ix, iy, iz, ox, oy, oz):
-    """The surface lobe's density at the place w across its thread over that of the whole width."""
-    t, b, n = to_thread(R, thread_set, c, s, ix, iy, iz)
-    _, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
-    phi_o, beta = azimuth_seen(R, b_o, n_o), across_deviation(R, gamma)
-    return density_across(R, s / c, phi_o, w, beta, t, b, max(n, R(1e-12)))
-
-
-@njit(**INLINE)
-def narrow_direction(R, gamma, c, s, psi0, thread_set, w, ox, oy, oz, u1, u2):
-    """A direction of the surface lobe at the place w across its thread."""
-    t_o, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
-    theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-    phi_o, beta = azimuth_seen(R, b_o, n_o), across_deviation(R, gamma)
-    t, b, n = sample_across(R, psi0, s / c, R(2) * gamma, theta_o, phi_o, w, beta, u1, u2)
-    return from_thread(R, thread_set, c, s, t, b, n)
 
 
 @njit(**INLINE)

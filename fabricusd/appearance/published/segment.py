@@ -28,9 +28,6 @@ from fabricusd.appearance.scattering.terms import (
 )
 from fabricusd.kernels.real import INLINE, acos, erf, exp
 
-ACROSS_MINIMUM = 0.1
-"""Least `beta` of level `thread`, in half widths: a narrower highlight would alias."""
-
 
 @njit(**INLINE)
 def masked(R, x, y, u):
@@ -126,27 +123,3 @@ def mean_gaussian(R, width, half_precision, norm, x, reach):
     scale = R(math.sqrt(0.5)) / width
     high, low = erf(R, (x + reach) * scale), erf(R, (x - reach) * scale)
     return R(0.25) * (high - low) / reach
-
-
-@njit(**INLINE)
-def across_deviation(R, gamma_surface):
-    """Deviation of the surface term across the thread, in halves of the width."""
-    return max(gamma_surface, R(ACROSS_MINIMUM))
-
-
-@njit(**INLINE)
-def across(R, row, w, sin_phi_i, cos_phi_i, sin_phi_o, cos_phi_o):
-    """Factors on the surface and the volume term at `w` in [-1, 1] across the thread.
-
-    Each averages to 1 over w, so the mean of level `thread` over the width is level `weave`.
-    """
-    # The bisector of the azimuths has the sine h; beyond 90 degrees it touches the edge.
-    y, x = sin_phi_i + sin_phi_o, cos_phi_i + cos_phi_o
-    edge = R(1) if y > R(0) else (R(-1) if y < R(0) else R(0))
-    h = edge if x < R(0) else y / max(math.sqrt(x * x + y * y), R(1e-6))
-    beta = across_deviation(R, row[GAMMA_SURFACE])
-    scale = R(math.sqrt(0.5)) / beta
-    ends = erf(R, (R(1) - h) * scale) + erf(R, (R(1) + h) * scale)
-    z = beta * R(math.sqrt(2.0 * math.pi) / 4.0) * ends
-    d = (w - h) * scale
-    return exp(R, -d * d) / z, R(1) + R(0.5) * w * (sin_phi_i + sin_phi_o)

@@ -19,8 +19,8 @@ from fabricusd.bake.layout.copies import are_copies, topology
 from fabricusd.bake.names import different_names, file_stem
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
-from fabricusd.reference.rays.triangles import smooth_normals
 from fabricusd.scene.scene import FabricSurface, Mesh, Scene
+from fabricusd.scene.surface.normals import smooth_normals
 from fabricusd.schema.names import prim_name
 
 FIRST_TILE, LAST_TILE = 1001, 1109

@@ -22,8 +22,8 @@ from fabricusd.bake.layout.garment import (
 )
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
-from fabricusd.reference.rays.triangles import measured_scale, smooth_normals
 from fabricusd.scene.scene import FabricSurface, Mesh, Scene
+from fabricusd.scene.surface.normals import measured_scale, smooth_normals
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 

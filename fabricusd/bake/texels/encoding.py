@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.bake.texels.maps import TextureMap
-from fabricusd.reference.view_transform import srgb_decode, srgb_encode
+from fabricusd.srgb import srgb_decode, srgb_encode
 
 FORMATS = {"exr": ".exr", "png": ".png", "tiff": ".tif"}
 """File formats, and how their names end. EXR keeps half floats and mip levels."""

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from fabricusd.appearance import surface
-from fabricusd.bake.bake import Settings, bake
+from fabricusd.bake.bake import bake
+from fabricusd.bake.job import Settings
 from fabricusd.chart.panel import Panel, Row
 from fabricusd.chart.timing import in_turns, typical
 from fabricusd.fabric import Binding, Fabric

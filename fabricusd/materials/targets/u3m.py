@@ -19,16 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.bake.bake import Settings, bake
-from fabricusd.bake.manifest import write_json
+from fabricusd.bake.bake import bake
+from fabricusd.bake.job import Settings
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
+from fabricusd.files import write_json
 from fabricusd.images.files import read_mip_level, write_png
 from fabricusd.materials.bake_folder import MapSet, read_bake_folder
 from fabricusd.materials.fit.fit import fit
 from fabricusd.materials.fit.texels import NEEDED, draw_texels
 from fabricusd.materials.networks.look import Look
-from fabricusd.reference.view_transform import srgb_encode
+from fabricusd.srgb import srgb_encode
 from fabricusd.weaves.recognise import recognise
 
 THREADS = 32

@@ -2,8 +2,8 @@
 
 The C library that the embreex wheel ships is called by name from compiled kernels, without the
 interpreter in between. Where that library is not found, embreex's own Python interface answers the
-same two questions, slower. The only other file of the project that knows Embree is
-`embree_subdivision`, which asks the same library for limit surfaces.
+same two questions, slower. The library is found by `scene.surface.embree_library`, which
+limit surfaces ask too.
 
 Rays travel as Embree's own `RTCRayHit16`: an array (packets, ROWS, 16) float32 whose rows are named
 below; rows 9, 10, 11, 17, 18, ... hold unsigned integers. A lane whose `TFAR` is below its `TNEAR`
@@ -13,10 +13,7 @@ is not traced, which is how a packet that is not full is padded.
 from __future__ import annotations
 
 import ctypes
-import glob
 import importlib.metadata
-import importlib.util
-import os
 from typing import Any
 
 import numpy as np
@@ -25,6 +22,7 @@ from numba import njit, types
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
+from fabricusd.scene.surface.embree_library import PATH, library
 
 LANES = 16
 ROWS = 24
@@ -62,69 +60,13 @@ _TOGETHER = _Arguments(flags=_COHERENT, feature_mask=_ALL_FEATURES)
 """Rays of a packet go through the hierarchy together, not one after the other."""
 
 
-def _find_library() -> str | None:
-    """The Embree 4 library of the embreex wheel, or None."""
-    if os.environ.get("FABRICUSD_EMBREE") == "python":
-        return None
-    spec = importlib.util.find_spec("embreex")
-    if spec is None or spec.origin is None:
-        return None
-    package = os.path.dirname(spec.origin)
-    for pattern in (
-        os.path.join(os.path.dirname(package), "embreex.libs", "libembree4*"),
-        os.path.join(os.path.dirname(package), "embreex.libs", "embree4*.dll"),
-        os.path.join(package, ".dylibs", "libembree4*"),
-    ):
-        found = sorted(glob.glob(pattern))
-        if found:
-            return found[0]
-    return None
-
-
-def declare(library: ctypes.CDLL, functions: tuple[tuple[Any, ...], ...]) -> None:
-    """Give functions of the library their types: (name, result, *arguments) each."""
-    for name, result, *arguments in functions:
-        function = getattr(library, name)
-        function.restype = result
-        function.argtypes = arguments
-
-
-def _declare_scene(library: ctypes.CDLL) -> None:
-    """Give the few functions that build a scene their types."""
-    pointer, size, unsigned = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_uint
-    declare(library, (
-        ("rtcNewDevice", pointer, ctypes.c_char_p),
-        ("rtcNewScene", pointer, pointer),
-        ("rtcNewGeometry", pointer, pointer, ctypes.c_int),
-        ("rtcSetSharedGeometryBuffer", None, pointer, ctypes.c_int, unsigned, ctypes.c_int,
-         pointer, size, size, size),
-        ("rtcCommitGeometry", None, pointer),
-        ("rtcReleaseGeometry", None, pointer),
-        ("rtcAttachGeometry", unsigned, pointer, pointer),
-        ("rtcSetSceneFlags", None, pointer, ctypes.c_int),
-        ("rtcCommitScene", None, pointer),
-        ("rtcReleaseScene", None, pointer),
-        ("rtcReleaseDevice", None, pointer),
-        ("rtcGetDeviceProperty", ctypes.c_ssize_t, pointer, ctypes.c_int),
-        ("rtcGetDeviceError", ctypes.c_int, pointer),
-    ))  # fmt: skip
-
-
-_LIBRARY: ctypes.CDLL | None = None
-_PATH = _find_library()
-if _PATH is not None:
+_LIBRARY = library()
+if _LIBRARY is not None:
     try:
-        _LIBRARY = ctypes.CDLL(_PATH)
-        _declare_scene(_LIBRARY)
         # Kernels find the functions by name, also those that come out of numba's disk cache.
-        binding.load_library_permanently(_PATH)
-    except (OSError, AttributeError, RuntimeError):
+        binding.load_library_permanently(PATH)
+    except RuntimeError:
         _LIBRARY = None
-
-
-def library() -> ctypes.CDLL | None:
-    """Embree's C library, None where embreex's own interface must do."""
-    return _LIBRARY
 
 
 _trace16 = types.void(types.uintp, types.uintp, types.uintp, types.uintp)

@@ -13,12 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.published.sampling import (
-    UNIFORM,
-    share_at,
-    view_corner,
-)
-from fabricusd.appearance.published.segment import across_deviation
+from fabricusd.appearance.published.sampling import UNIFORM
 from fabricusd.appearance.sampling.lobes import (
     ISOTROPIC,
     STEEPEST,
@@ -41,6 +36,8 @@ from fabricusd.appearance.sampling.stretches import (
     VOLUME_WIDTH,
     nearest_stretch,
 )
+from fabricusd.appearance.sampling.views import share_at, view_corner
+from fabricusd.appearance.scattering.across import across_deviation
 from fabricusd.appearance.scattering.terms import GAMMA_SURFACE, GAMMA_VOLUME
 from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.kernels.real import INLINE, KERNEL, PART, atan2, cos, sin

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError, one_line
 from fabricusd.fabric import Binding
-from fabricusd.reference.rays.triangles import smooth_normals
 from fabricusd.scene.files.gltf import read_gltf
 from fabricusd.scene.files.obj import read_obj
 from fabricusd.scene.files.piece import MeshFile, Piece, unique_names
 from fabricusd.scene.files.ply import read_ply
 from fabricusd.scene.scene import FabricSurface, Material, Mesh, PreviewSurface, Scene
 from fabricusd.scene.size import note_size, unit_length
+from fabricusd.scene.surface.normals import smooth_normals
 
 READERS: dict[str, Callable[[Path], MeshFile]] = {
     ".obj": read_obj,

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
+from fabricusd.scene.surface import embree_library
 
 MOST_CORNERS = 15
 """Corners that a face may have."""
@@ -58,10 +59,7 @@ class _Arguments(ctypes.Structure):
 
 def available() -> bool:
     """Whether surfaces can be evaluated here: embreex must ship its C library."""
-    # Embree comes with a compiler of kernels, which a scene without such surfaces can do without.
-    from fabricusd.reference.rays import embree
-
-    library = embree.library()
+    library = embree_library.library()
     return library is not None and hasattr(library, "rtcInterpolateN")
 
 
@@ -170,12 +168,10 @@ class LimitSurface:
 
 
 def _library() -> ctypes.CDLL:
-    from fabricusd.reference.rays import embree
-
-    library = embree.library()
+    library = embree_library.library()
     if library is None:
         raise FabricError("Embree", "has no C library here, which limit surfaces need")
-    embree.declare(library, (("rtcInterpolateN", None, ctypes.c_void_p),))
+    embree_library.declare(library, (("rtcInterpolateN", None, ctypes.c_void_p),))
     return library
 
 

@@ -9,7 +9,8 @@ import pytest
 from bake.meshes import quad_scene
 from pxr import Usd, UsdGeom
 
-from fabricusd.bake.bake import Settings, bake
+from fabricusd.bake.bake import bake
+from fabricusd.bake.job import Settings
 from fabricusd.bake.layout.garment import garments, tiles_of
 from fabricusd.bake.layout.mesh_layer import write_mesh_layer
 from fabricusd.bake.layout.overlaps import refuse_overlaps

@@ -11,7 +11,8 @@ import pytest
 from bake.killed import leave_half_written
 from bake.meshes import write_quad
 
-from fabricusd.bake.bake import Settings, bake
+from fabricusd.bake.bake import bake
+from fabricusd.bake.job import Settings
 from fabricusd.bake.work.lock import HOLDER, LOCK, locked, refuse_locked
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError

@@ -15,7 +15,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fabricusd.bake import bake as module
-from fabricusd.bake.bake import Settings, bake
+from fabricusd.bake.bake import bake
+from fabricusd.bake.job import Settings
 from fabricusd.bake.texels.encoding import encoding_from
 from fabricusd.bake.work import kept
 from fabricusd.bake.work.kept import DIGEST

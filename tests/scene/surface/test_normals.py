@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fabricusd.reference.rays.triangles import group_numbers, smooth_normals
+from fabricusd.scene.surface.normals import group_numbers, smooth_normals
 
 AROUND = 48
 

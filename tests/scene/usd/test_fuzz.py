@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fabricusd.bake.bake import Settings, plan
+from fabricusd.bake.bake import plan
+from fabricusd.bake.job import Settings
 from fabricusd.scene.read import read_scene
 from tests.conftest import CHECKOUT
 from tests.fuzz import examples, mutated, refusal
