@@ -1,4 +1,6 @@
-"""Seconds to read a million triangles from each format: `python bench/scene/bench_mesh_files.py [SIDE]`.
+"""Seconds to read a million triangles from each format.
+
+    python bench/scene/bench_mesh_files.py [SIDE]
 
 Beside them trimesh and tinyobjloader, where they are installed.
 """
