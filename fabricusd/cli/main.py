@@ -34,6 +34,7 @@ COMMANDS = {
     "render": "path-trace a scene for look-dev review",
     "compare": "measure how far one picture is from another",
     "chart": "measure speed against accuracy, and draw it",
+    "cache": "show or clear what is kept on disk to save time",
     "plugin-path": "print the folder that PXR_PLUGINPATH_NAME needs",
     "demo": "author, check and print every preset into a folder",
 }

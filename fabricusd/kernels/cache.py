@@ -1,7 +1,9 @@
-"""Compiled kernels on disk, thrown away when any source they were made from has changed.
+"""Where numba keeps compiled kernels: a folder for each state of all the sources.
 
-numba keys a cached kernel by its own file alone. A kernel holds what it calls, inlined, so a change
-in another file would leave it stale without a word: after an edit, and after an upgrade too.
+numba looks at a kernel's own file alone to tell whether its machine code is still right. A kernel
+holds what it calls, inlined, and constants of other modules, so a change in another file would
+leave it stale. Here the folder is named by a digest of every source that kernels may read: nothing
+stale is ever found, nothing has to be deleted, and two versions can run side by side.
 """
 
 from __future__ import annotations
@@ -10,42 +12,33 @@ import hashlib
 import os
 from pathlib import Path
 
+import numba
+
+from fabricusd.cache import KERNELS, cache_folder
+
 PACKAGE = Path(__file__).resolve().parents[1]
-FOLDERS = ("appearance", "reference", "bake")
-STAMP = "kernels.stamp"
+FOLDERS = ("kernels", "appearance", "scene", "run", "reference", "bake")
+"""Folders of the package whose modules hold kernels, or constants that kernels read."""
 
 
-def fingerprint(folders: list[Path]) -> str:
-    """A digest of name, size and time of every source in `folders`."""
-    digest = hashlib.sha256()
-    for folder in folders:
-        for entry in sorted(os.scandir(folder), key=lambda e: e.name):
-            if entry.name.endswith(".py"):
-                info = entry.stat()
-                line = f"{folder.name}/{entry.name} {info.st_size} {info.st_mtime_ns}\n"
-                digest.update(line.encode())
+def sources(package: Path = PACKAGE) -> list[Path]:
+    """Every source that may end up in a kernel, in order."""
+    found = list(package.glob("*.py"))
+    for name in FOLDERS:
+        found += (package / name).rglob("*.py")
+    return sorted(found)
+
+
+def fingerprint(package: Path = PACKAGE) -> str:
+    """A digest of the sources' names and contents, and of numba's version."""
+    digest = hashlib.blake2b(numba.__version__.encode(), digest_size=10)
+    for path in sources(package):
+        digest.update(path.relative_to(package).as_posix().encode())
+        digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
-def forget_stale_kernels(package: Path = PACKAGE) -> bool:
-    """Delete the kernels cached beside the sources if those differ from the last time.
-
-    Returns whether it did. Does nothing where the package's folders cannot be written: numba
-    then caches elsewhere, under a name that holds the path alone.
-    """
-    folders = [package / name for name in FOLDERS if (package / name).is_dir()]
-    stamp = package / "__pycache__" / STAMP
-    now = fingerprint(folders)
-    # Without a stamp, whatever is cached is of unknown age.
-    try:
-        if stamp.exists() and stamp.read_bytes() == now.encode():
-            return False
-        for folder in folders:
-            for pattern in ("*.nbi", "*.nbc"):
-                for cached in (folder / "__pycache__").glob(pattern):
-                    cached.unlink(missing_ok=True)
-        stamp.parent.mkdir(exist_ok=True)
-        stamp.write_text(now)
-    except OSError:
-        return False
-    return True
+def use_cache() -> None:
+    """Let numba keep kernels in the user's cache. A folder that NUMBA_CACHE_DIR names stays."""
+    if "NUMBA_CACHE_DIR" not in os.environ:
+        numba.config.CACHE_DIR = str(cache_folder(KERNELS, fingerprint()))

@@ -1,156 +1,67 @@
-"""Cached kernels live exactly as long as the sources they were made from."""
+"""Kernels are cached for one state of the sources, in the user's own folder."""
 
 from __future__ import annotations
 
-import importlib.util
-import os
-import pickle
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import numba
 import pytest
 
-import fabricusd.kernels.start  # noqa: F401
-from fabricusd.kernels.cache import STAMP, forget_stale_kernels
+from fabricusd.kernels.cache import PACKAGE, fingerprint, sources
+
+ROOT = PACKAGE.parent
+WHERE = "from fabricusd.appearance.thread import _density_soa as k; print(k.stats.cache_path)"
 
 
-def package(tmp_path):
-    cache = tmp_path / "appearance" / "__pycache__"
-    cache.mkdir(parents=True)
-    (tmp_path / "appearance" / "lobes.py").write_text("x = 1")
-    (cache / "thread.kernel.nbi").write_text("")
-    (cache / "thread.kernel.1.nbc").write_text("")
-    return cache
+@pytest.fixture
+def copy(tmp_path):
+    """The sources that kernels are made of, to be changed."""
+    for path in sources():
+        target = tmp_path / path.relative_to(PACKAGE)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, target)
+    return tmp_path
 
 
-def test_kernels_of_unknown_age_are_thrown_away_and_later_ones_kept(tmp_path):
-    cache = package(tmp_path)
-    assert forget_stale_kernels(tmp_path)
-    assert list(cache.iterdir()) == []
-    (cache / "thread.kernel.nbi").write_text("")
-    assert not forget_stale_kernels(tmp_path)
-    assert len(list(cache.iterdir())) == 1
+def test_the_same_sources_elsewhere_have_the_same_fingerprint(copy):
+    assert fingerprint(copy) == fingerprint()
 
 
-def test_a_change_in_any_source_throws_every_kernel_away(tmp_path):
-    cache = package(tmp_path)
-    forget_stale_kernels(tmp_path)
-    (cache / "thread.kernel.nbi").write_text("")
-    source = tmp_path / "appearance" / "lobes.py"
-    os.utime(source, (1, 1))
-    assert forget_stale_kernels(tmp_path)
-    assert list(cache.iterdir()) == []
+@pytest.mark.parametrize("name", ["fabric.py", "appearance/scattering/lobes.py", "kernels/real.py"])
+def test_a_change_in_any_source_changes_the_fingerprint(copy, name):
+    with (copy / name).open("a") as stream:
+        stream.write("# changed\n")
+    assert fingerprint(copy) != fingerprint()
 
 
-def test_a_stamp_of_any_bytes_is_of_unknown_age(tmp_path):
-    cache = package(tmp_path)
-    stamp = tmp_path / "__pycache__" / STAMP
-    stamp.parent.mkdir()
-    stamp.write_bytes(b"\xff\x00\xfe")
-    assert forget_stale_kernels(tmp_path)
-    assert list(cache.iterdir()) == []
+def test_every_module_with_kernels_is_among_the_sources_and_chooses_the_folder_first():
+    known = set(sources())
+    with_kernels = [
+        path
+        for path in PACKAGE.rglob("*.py")
+        if re.search(r"^@njit|^@vectorize", path.read_text(), re.M)
+    ]
+    assert len(with_kernels) > 20
+    for path in with_kernels:
+        assert path in known, path
+        assert re.search(r"^(from|import) fabricusd\.kernels", path.read_text(), re.M), path
 
 
-KERNEL = """
-from numba import njit
-
-@njit(cache=True)
-def kernel(x):
-    return 2 * x + 1
-"""
-
-
-def fresh(folder):
-    """The kernel as a new process finds it: nothing in memory, what there is on disk."""
-    spec = importlib.util.spec_from_file_location("one_kernel", folder / "one_kernel.py")
-    module = importlib.util.module_from_spec(spec)
-    # numba pickles the function by the name of its module.
-    sys.modules["one_kernel"] = module
-    spec.loader.exec_module(module)
-    return module.kernel
+def run(code, **variables):
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT,
+        env={"PATH": "", "PYTHONPATH": str(ROOT), **variables},
+    )  # fmt: skip
+    return done.stdout.strip()
 
 
-@pytest.fixture(params=["beside the source", "in NUMBA_CACHE_DIR"])
-def compiled(request, tmp_path, monkeypatch):
-    """(folder of the source, folder of the cache) of a kernel that has been compiled."""
-    where = str(tmp_path / "cache") if request.param == "in NUMBA_CACHE_DIR" else ""
-    monkeypatch.setattr(numba.config, "CACHE_DIR", where)
-    monkeypatch.delitem(sys.modules, "one_kernel", raising=False)
-    (tmp_path / "one_kernel.py").write_text(KERNEL)
-    kernel = fresh(tmp_path)
-    assert kernel(3) == 7
-    yield tmp_path, Path(kernel.stats.cache_path)
-    sys.modules.pop("one_kernel", None)
+def test_kernels_go_into_the_folder_of_the_user_and_not_beside_the_sources(tmp_path):
+    where = Path(run(WHERE, FABRICUSD_CACHE_DIR=str(tmp_path)))
+    assert where.parent == tmp_path / "kernels" / fingerprint()
 
 
-def flipped(data: bytes) -> bytes:
-    middle = len(data) // 2
-    return data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :]
-
-
-DAMAGE = {
-    "one bit": flipped,
-    "empty": lambda data: b"",
-    "cut": lambda data: data[: len(data) // 2],
-    "cut a byte before its checksum": lambda data: data[:-49],
-    "garbage": lambda data: b"\xde\xad\xbe\xef" * 100,
-    "zeros": lambda data: bytes(len(data)),
-    "text": lambda data: b"<html>not found</html>",
-    "another object": lambda data: pickle.dumps([1, 2, 3]),
-    "of another numba": lambda data: pickle.dumps("0.1.0") + b"whatever it wrote",
-}
-
-
-@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
-@pytest.mark.parametrize("damage", DAMAGE)
-def test_a_damaged_file_is_compiled_again_and_whole_from_then_on(compiled, damage, suffix):
-    source, cache = compiled
-    [path] = cache.glob(f"*.{suffix}")
-    path.write_bytes(DAMAGE[damage](path.read_bytes()))
-    kernel = fresh(source)
-    assert kernel(3) == 7
-    assert sum(kernel.stats.cache_hits.values()) == 0
-    again = fresh(source)
-    assert again(3) == 7
-    assert sum(again.stats.cache_hits.values()) == 1
-    assert len(list(cache.glob("*.nb?"))) == 2
-
-
-def test_a_whole_file_is_not_compiled_again(compiled):
-    kernel = fresh(compiled[0])
-    assert kernel(3) == 7
-    assert sum(kernel.stats.cache_hits.values()) == 1
-
-
-def test_numba_alone_reads_what_we_wrote_and_we_what_numba_wrote(compiled):
-    source, cache = compiled
-    [code], [index] = cache.glob("*.nbc"), cache.glob("*.nbi")
-    assert pickle.loads(code.read_bytes())[0]
-    assert pickle.loads(index.read_bytes()) == numba.__version__
-    for path in (code, index):
-        path.write_bytes(path.read_bytes()[:-48])
-    kernel = fresh(source)
-    assert kernel(3) == 7
-    assert sum(kernel.stats.cache_hits.values()) == 1
-
-
-@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
-def test_a_kernel_runs_where_its_cache_cannot_be_written(compiled, suffix):
-    source, cache = compiled
-    [path] = cache.glob(f"*.{suffix}")
-    path.unlink()
-    path.mkdir()
-    assert fresh(source)(3) == 7
-
-
-def test_every_kernel_of_ours_forgives_damage():
-    script = (
-        "from numba.core.caching import Cache\n"
-        "import fabricusd.{}\n"
-        "assert Cache._load_overload.__module__ == 'fabricusd.kernels.damaged_cache'"
-    )
-    for module in ("appearance.compiled", "reference.embree", "bake.raster", "appearance.far"):
-        done = subprocess.run([sys.executable, "-c", script.format(module)])
-        assert done.returncode == 0, module
+def test_a_folder_that_numba_was_given_is_left_alone(tmp_path):
+    assert Path(run(WHERE, NUMBA_CACHE_DIR=str(tmp_path))).parent == tmp_path

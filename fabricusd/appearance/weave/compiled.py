@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+import fabricusd.kernels  # noqa: F401 - chooses where kernels are cached
 from fabricusd.appearance.weave.coverage import GAP, Coverage, coverage, sets
 from fabricusd.appearance.weave.curve import is_pile, pieces
 from fabricusd.errors import FabricError

@@ -21,6 +21,7 @@ from llvmlite import binding
 from numba import njit, types
 from numpy.typing import NDArray
 
+import fabricusd.kernels  # noqa: F401 - chooses where kernels are cached
 from fabricusd.errors import FabricError
 from fabricusd.scene.surface.embree_library import PATH, library
 

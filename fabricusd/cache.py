@@ -1,0 +1,123 @@
+"""What fabricusd keeps on disk to save time: compiled kernels, and tables that take long to make.
+
+Everything lies below one folder of the user, `FABRICUSD_CACHE_DIR` or the platform's cache folder,
+as `KIND/KEY/...`. A key names everything that its content depends on, so nothing in the cache is
+ever out of date; it is only no longer asked for. Losing all of it costs time and nothing else.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import platformdirs
+
+VARIABLE = "FABRICUSD_CACHE_DIR"
+KERNELS = "kernels"
+
+MOST_BYTES = 1 << 30
+"""Size above which the entries that were used least recently are removed: some 20 versions."""
+
+KEPT_SECONDS = 24 * 3600.0
+"""Entries used within that time are never removed to make room: a running process may need them."""
+
+_USED = ".used"
+"""File in an entry whose time tells when the entry was last asked for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """One KIND/KEY of the cache.
+
+    used : seconds since the epoch when it was last asked for
+    """
+
+    kind: str
+    key: str
+    size: int
+    used: float
+
+
+@lru_cache(maxsize=8)
+def _root_of(chosen: str) -> Path:
+    """The cache's folder; a private temporary one where that cannot be written."""
+    folder = Path(chosen) if chosen else Path(platformdirs.user_cache_dir("fabricusd", False))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        user = getattr(os, "getuid", lambda: "user")()
+        folder = Path(tempfile.gettempdir()) / f"fabricusd-cache-{user}"
+        folder.mkdir(mode=0o700, exist_ok=True)
+    return folder
+
+
+def root() -> Path:
+    """The folder of the whole cache."""
+    return _root_of(os.environ.get(VARIABLE, ""))
+
+
+def cache_folder(kind: str, key: str) -> Path:
+    """The folder of an entry, made if need be, and marked as used now.
+
+    Making a new one first removes old entries, so that the cache stays below MOST_BYTES.
+    """
+    folder = root() / kind / key
+    if not folder.is_dir():
+        prune()
+        folder.mkdir(parents=True, exist_ok=True)
+    # A cache that cannot be written still serves.
+    with suppress(OSError):
+        (folder / _USED).touch()
+    return folder
+
+
+def entries() -> list[Entry]:
+    """All entries, the one used least recently first."""
+    found = []
+    for kind in _folders(root()):
+        for folder in _folders(kind):
+            mark = folder / _USED
+            used = mark.stat().st_mtime if mark.exists() else 0.0
+            size = sum(f.stat().st_size for f in folder.rglob("*") if f.is_file())
+            found.append(Entry(kind=kind.name, key=folder.name, size=size, used=used))
+    return sorted(found, key=lambda entry: entry.used)
+
+
+def prune(most: int = MOST_BYTES, now: float | None = None) -> list[Entry]:
+    """Remove the entries used least recently until at most `most` bytes are left; returns them."""
+    now = time.time() if now is None else now
+    known = entries()
+    total = sum(entry.size for entry in known)
+    removed = []
+    for entry in known:
+        if total <= most:
+            break
+        if now - entry.used < KEPT_SECONDS:
+            continue
+        _remove(entry)
+        removed.append(entry)
+        total -= entry.size
+    return removed
+
+
+def clear() -> list[Entry]:
+    """Remove every entry; returns them."""
+    known = entries()
+    for entry in known:
+        _remove(entry)
+    return known
+
+
+def _remove(entry: Entry) -> None:
+    shutil.rmtree(root() / entry.kind / entry.key, ignore_errors=True)
+
+
+def _folders(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
