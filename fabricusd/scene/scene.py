@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from fabricusd.fabric import Binding
 
-DISTANT, DOME, RECT, DISK, SPHERE, CYLINDER = range(6)
-"""Kinds of light."""
+LIGHT_KINDS = ("distant", "dome", "rect", "disk", "sphere", "cylinder")
+"""Kinds of light; `Light.kind` is an index into this."""
+
+DISTANT, DOME, RECT, DISK, SPHERE, CYLINDER = range(len(LIGHT_KINDS))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

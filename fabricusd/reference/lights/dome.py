@@ -15,11 +15,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.kernels.real import INLINE, acos, atan2, cos, sin
+from fabricusd.reference.lights.row import LUMINANCE
 
 R = np.float32
 _PI = R(math.pi)
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-
 DENSITY, UPTO, GUIDE, CELL = 3, 4, 5, 8
 """Columns of `Dome.cells` after the radiance, and how many there are: two to a cache line."""
 

@@ -1,5 +1,4 @@
-"""Lights as rows of one table: chosen by power. `light_sampling` draws from them, `light_hits` is
-what rays meet.
+"""Lights as rows of one table, chosen by power; `sampling` draws from them, `hits` meets them.
 
 Lights are no obstacles: a ray goes on behind them, so what a ray sees is the sum over all that it
 passes before its first triangle. That keeps sampling and hitting two estimators of one integral.
@@ -15,16 +14,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.kernels.real import LEAN, cos, sin
-from fabricusd.reference.lights.dome import LUMINANCE, Dome, build_dome, place_of, smooth_radiance
-from fabricusd.scene.scene import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE, Light
+from fabricusd.reference.lights.dome import Dome, build_dome, place_of, smooth_radiance
+from fabricusd.reference.lights.kinds import KINDS
+from fabricusd.reference.lights.row import CHANCE, COLUMNS, KIND, RED, VISIBLE, P, axes_of
+from fabricusd.scene.scene import DOME, Light
 
 R = np.float32
 _PI = R(math.pi)
-
-# Columns of the table. X and Y are half the extent of a rect, the radii of a disk, X half the axis
-# of a cylinder; Z is the unit direction it shines to, for a distant light the one it comes from.
-KIND, CHANCE, RED, P, X, Y, Z, SIZE, AREA, VISIBLE = 0, 1, 2, 5, 8, 11, 14, 17, 18, 19
-COLUMNS = 20
 
 
 def build_lights(
@@ -39,10 +35,8 @@ def build_lights(
     domes = [light for light in lights if light.kind == DOME]
     dome = _merge_domes(domes)
     if domes:
-        row = np.zeros(COLUMNS)
-        row[KIND] = DOME
-        row[VISIBLE] = 1.0
-        rows.append(row)
+        # Its picture is all of them.
+        rows.append(_row(Light(path="", kind=DOME, radiance=(0.0, 0.0, 0.0)), centre))
     if rows:
         table = np.ascontiguousarray(rows, np.float32)
         table[:, CHANCE] = 1 / len(rows)
@@ -56,7 +50,7 @@ def share_out(table: NDArray[np.float32], dome: Dome, places: NDArray[np.float32
     """
     if not len(places):
         return
-    power = np.array([_irradiance(row, dome, places) for row in table])
+    power = np.array([KINDS[int(row[KIND])].irradiance(row, dome, places) for row in table])
     if power.sum() > 0:
         # No light is forgotten altogether: shadows and surfaces' directions are not known.
         table[:, CHANCE] = 0.8 * power / power.sum() + 0.2 / len(table)
@@ -64,59 +58,11 @@ def share_out(table: NDArray[np.float32], dome: Dome, places: NDArray[np.float32
 
 def _row(light: Light, centre: NDArray[np.float64]) -> NDArray[np.float64]:
     row = np.zeros(COLUMNS)
-    axes, position = light.frame[:3, :3], light.frame[:3, 3] - centre
-    lengths = np.maximum(np.linalg.norm(axes, axis=0), 1e-30)
-    row[KIND], row[RED : RED + 3], row[P : P + 3] = light.kind, light.radiance, position
+    row[KIND], row[RED : RED + 3] = light.kind, light.radiance
+    row[P : P + 3] = light.frame[:3, 3] - centre
     row[VISIBLE] = float(light.camera_visible)
-    x, y = axes[:, 0], axes[:, 1]
-    # Square to the surface, also where the frame is sheared or flat.
-    normal = np.cross(x, y)
-    z = (
-        -normal
-        * math.copysign(1.0, normal @ axes[:, 2])
-        / max(float(np.linalg.norm(normal)), 1e-30)
-    )
-    if light.kind == DISTANT:
-        z = axes[:, 2] / lengths[2]
-        x, y = x / lengths[0], y / lengths[1]
-        row[SIZE] = math.cos(0.5 * light.angle)
-        # 1 - cos without cancellation, for the solid angle.
-        row[AREA] = 2 * math.sin(0.25 * light.angle) ** 2
-    elif light.kind == RECT:
-        x, y = 0.5 * light.width * x, 0.5 * light.height * y
-        row[AREA] = 4 * np.linalg.norm(np.cross(x, y))
-    elif light.kind == DISK:
-        x, y = light.radius * x, light.radius * y
-        row[AREA] = math.pi * np.linalg.norm(np.cross(x, y))
-    elif light.kind == SPHERE:
-        row[SIZE] = light.radius * float(np.mean(lengths))
-        row[AREA] = 4 * math.pi * row[SIZE] ** 2
-    elif light.kind == CYLINDER:
-        row[SIZE] = light.radius * float(np.mean(lengths[1:]))
-        x, y, z = 0.5 * light.height * x, y / lengths[1], axes[:, 2] / lengths[2]
-        row[AREA] = 2 * math.pi * row[SIZE] * light.height * lengths[0]
-    row[X : X + 3], row[Y : Y + 3], row[Z : Z + 3] = x, y, z
+    KINDS[light.kind].fill(row, light, axes_of(light))
     return row
-
-
-def _irradiance(row: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]) -> float:
-    """Mean irradiance of surfaces at `places` that face any way that the light reaches."""
-    if row[KIND] == DOME:
-        h, w = (int(n) for n in dome.size)
-        edges = np.cos(np.pi * np.arange(h + 1) / h)
-        solid = np.repeat((edges[:-1] - edges[1:]) * 2 * np.pi / w, w)
-        return float((dome.cells[:, :3] @ LUMINANCE) @ solid / 4)
-    brightness = float(row[RED : RED + 3] @ LUMINANCE) / 2
-    if row[KIND] == DISTANT:
-        return brightness * (2 * math.pi * row[AREA] if row[AREA] > 0 else 1.0)
-    away = np.asarray(places, np.float64) - row[P : P + 3]
-    # Nearer than its size a light is no brighter.
-    distance2 = np.maximum(np.einsum("ij,ij->i", away, away), max(float(row[AREA]), 1e-12))
-    # The share of its surface that is seen, foreshortened.
-    seen = np.full(len(away), 0.25)
-    if row[KIND] not in (SPHERE, CYLINDER):
-        seen = np.maximum(away @ row[Z : Z + 3], 0.0) / np.sqrt(distance2)
-    return brightness * float(row[AREA]) * float((seen / distance2).mean())
 
 
 def _merge_domes(domes: list[Light]) -> Dome:

@@ -12,7 +12,8 @@ from numba import njit
 
 from fabricusd.appearance.weave.footprint import level_weights, pick_level
 from fabricusd.kernels.real import INLINE, KERNEL, LEAN, PART, whole
-from fabricusd.reference.lights.hits import (
+from fabricusd.reference.lights.hits import meet_lights
+from fabricusd.reference.lights.ray_block import (
     BEFORE,
     BLOCK,
     D_X,
@@ -26,7 +27,6 @@ from fabricusd.reference.lights.hits import (
     SEEN_B,
     SEEN_G,
     SEEN_R,
-    meet_lights,
 )
 from fabricusd.reference.rays.embree import (
     DX,
@@ -64,7 +64,7 @@ NUMBERS_PER_STEP = 4
 QUEUES = 6
 """Queues of a material: three levels, two sides."""
 
-# Rows of a block after those of `light_hits`: the geometric normal, its cosine with the ray; for
+# Rows of a block after those of `ray_block`: the geometric normal, its cosine with the ray; for
 # level `auto` the steepness of both coordinates, the direction of growing u, the limits, the cone's
 # width and a uniform number, and the level they lead to.
 _NORMAL, _COSINE, _STEEP, _GRAIN, _LIMITS, _WIDTH, _NUMBER, _LEVEL = (

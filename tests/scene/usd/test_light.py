@@ -9,7 +9,8 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdUtils
 
 from fabricusd.images.files import write_exr, write_png
-from fabricusd.reference.lights.table import AREA, P, X, Y, Z, build_lights
+from fabricusd.reference.lights.row import AREA, P, X, Y, Z
+from fabricusd.reference.lights.table import build_lights
 from fabricusd.scene.scene import DOME, Camera, Light
 from tests.reference.scenes import above, grid, lambert, looking, picture
 from tests.reference.stages import new_stage, read, square
