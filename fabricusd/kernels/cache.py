@@ -15,6 +15,7 @@ from pathlib import Path
 import numba
 
 from fabricusd.cache import KERNELS, cache_folder
+from fabricusd.kernels.internals import use_internals
 
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = ("kernels", "appearance", "scene", "run", "reference", "bake")
@@ -30,8 +31,9 @@ def sources(package: Path = PACKAGE) -> list[Path]:
 
 
 def fingerprint(package: Path = PACKAGE) -> str:
-    """A digest of the sources' names and contents, and of numba's version."""
-    digest = hashlib.blake2b(numba.__version__.encode(), digest_size=10)
+    """A digest of the sources' names and contents, of numba's version, and of how it is used."""
+    compiler = f"{numba.__version__} {use_internals()}"
+    digest = hashlib.blake2b(compiler.encode(), digest_size=10)
     for path in sources(package):
         digest.update(path.relative_to(package).as_posix().encode())
         digest.update(path.read_bytes())

@@ -16,7 +16,17 @@ import numpy as np
 from numba import jit, njit, types
 from numba.extending import overload, register_jitable
 
-from fabricusd.kernels.parts import PartCompiler
+from fabricusd.kernels.internals import use_internals
+
+try:
+    if not use_internals():
+        raise ImportError
+    from fabricusd.kernels.parts import PartCompiler as _Compiler
+except (ImportError, AttributeError):
+    from numba.core.compiler import Compiler as _Compiler
+
+PartCompiler: Any = _Compiler
+"""What compiles functions that only kernels call."""
 
 # NaN and infinity must stay what they are, since callers count them; the rest may be reordered.
 # numpy's error model: a division by zero is an infinity, not an exception that stops vectorising.
