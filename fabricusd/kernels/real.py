@@ -10,6 +10,7 @@ and are tested against float64. NaN goes in and comes out.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -18,15 +19,20 @@ from numba.extending import overload, register_jitable
 
 from fabricusd.kernels.internals import use_internals
 
-try:
-    if not use_internals():
-        raise ImportError
-    from fabricusd.kernels.parts import PartCompiler as _Compiler
-except (ImportError, AttributeError):
-    from numba.core.compiler import Compiler as _Compiler
 
-PartCompiler: Any = _Compiler
-"""What compiles functions that only kernels call."""
+def _compiler() -> Any:
+    """What compiles functions that only kernels call."""
+    if use_internals():
+        with suppress(ImportError, AttributeError):
+            from fabricusd.kernels.parts import PartCompiler
+
+            return PartCompiler
+    from numba.core.compiler import Compiler
+
+    return Compiler
+
+
+PartCompiler = _compiler()
 
 # NaN and infinity must stay what they are, since callers count them; the rest may be reordered.
 # numpy's error model: a division by zero is an infinity, not an exception that stops vectorising.
