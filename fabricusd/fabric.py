@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from fabricusd.errors import FabricError
 
 MODELS = ("thesis", "microcylinder", "conserving")
-"""Thread scattering models, `docs/model.md` section 2."""
+"""Thread scattering models, each a module of that name in `appearance/scattering/models`; they are
+the schema's tokens. A model's number is its place here, so new ones go to the end."""
 
 DEFAULT_MODEL = "microcylinder"
 PILE_ANGLE = math.radians(85.0)

@@ -19,6 +19,7 @@ import math
 import numpy as np
 
 from fabricusd.appearance import plain
+from fabricusd.appearance.scattering.plain_lobes import angles
 from fabricusd.appearance.shadow.methods import compile_shadow, shadowing
 from fabricusd.appearance.weave.compiled import compile_fabric
 from fabricusd.appearance.weave.lookup import lookup
@@ -71,7 +72,7 @@ def compare(fabric: Fabric, pairs: int, count: int) -> Array:
             i, o = (
                 plain.to_thread(np.tile(w, (len(psi0), 1)), share.is_warp, psi0) for w in (wi, wo)
             )
-            a, b = plain.angles(i), plain.angles(o)
+            a, b = angles(i), angles(o)
             value = plain.thread_value(share.thread, share.model, i, o).mean(axis=-1)
             f[here] = value * np.cos(a.theta)
             m[here] = plain.masked(a.phi, b.phi, fabric.masking_width)

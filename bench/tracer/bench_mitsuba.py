@@ -29,12 +29,12 @@ import numpy as np
 from bench_tracer import drape
 
 from fabricusd.appearance.published.tables import surface_tables
-from fabricusd.appearance.scattering.terms import (
+from fabricusd.appearance.scattering.columns import (
     ALBEDO_R,
     IOR_EXCESS,
     ISOTROPIC,
-    SURFACE_GAUSSIAN,
-    VOLUME_GAUSSIAN,
+    SURFACE_LOBE,
+    VOLUME_LOBE,
 )
 from fabricusd.reference.rays.triangles import N, build_tables
 from fabricusd.reference.render import render_scene
@@ -86,7 +86,7 @@ def far_law(fabric: Any, dr: Any, mi: Any) -> Any:
         reflected, once = fresnel(float(row[IOR_EXCESS]), dr.sqrt(cos2_d) * cos_half)
         lobes = [
             float(row[at + 1]) * dr.exp(-float(row[at]) * theta_h * theta_h)
-            for at in (SURFACE_GAUSSIAN, VOLUME_GAUSSIAN)
+            for at in (SURFACE_LOBE, VOLUME_LOBE)
         ]
         kd, compressed = float(row[ISOTROPIC]), 1 / dr.maximum(cos2_d, 1e-6)
         surface = reflected * cos_half * lobes[0] * compressed

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.conserving.single import conserving_single, single_tables
 from fabricusd.appearance.published.far import far_values
 from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.scattering.models import any_conserving, model_of
 from fabricusd.appearance.weave.quadrature import (
     CANDIDATES,
     MOST_NODES_EVER,
@@ -90,13 +91,13 @@ def choose_rule(fabric: Fabric, max_error: float) -> Rule:
     )
 
 
-def _has_conserving(fabric: Fabric) -> bool:
-    return any(fabric.model_of(t) == "conserving" for t in fabric.thread_list)
+def _points_only(fabric: Fabric) -> bool:
+    return any(model_of(fabric, t).cell_lobes is None for t in fabric.thread_list)
 
 
 def _candidates(fabric: Fabric) -> list[Rule]:
-    """Those that all of the fabric's models know: `conserving` lobes have no mean over a cell."""
-    points_only = _has_conserving(fabric)
+    """Those that all of the fabric's models know: not all have a mean over a cell."""
+    points_only = _points_only(fabric)
     return [r for r in CANDIDATES if r.form == POINTS or not points_only]
 
 
@@ -104,7 +105,7 @@ def _candidates(fabric: Fabric) -> list[Rule]:
 def _reference(fabric: Fabric, pairs: int) -> Floats:
     points, cells = REFERENCES
     few = count_nodes(fabric, points) <= 4 * MOST_NODES_EVER
-    return _far(fabric, points if few or _has_conserving(fabric) else cells, pairs)
+    return _far(fabric, points if few or _points_only(fabric) else cells, pairs)
 
 
 def _far(fabric: Fabric, rule: Rule, pairs: int) -> Floats:
@@ -112,7 +113,7 @@ def _far(fabric: Fabric, rule: Rule, pairs: int) -> Floats:
     out = np.zeros_like(wi)
     real: Any = np.float64
     far_values(real, surface_tables(fabric, precision=real, rule=rule), wi, wo, out, 0, pairs)
-    if _has_conserving(fabric):
+    if any_conserving(fabric):
         _add_single(real, single_tables(fabric, precision=real, rule=rule), wi, wo, out)
     return out
 

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from fabricusd.appearance.plain import (
-    Angles,
     Share,
     curve_points,
     gap,
@@ -24,6 +23,9 @@ from fabricusd.appearance.plain import (
     shares,
     thread_terms,
 )
+from fabricusd.appearance.scattering.model import CONSERVING
+from fabricusd.appearance.scattering.models import named
+from fabricusd.appearance.scattering.plain_lobes import Angles
 from fabricusd.fabric import PILE_ANGLE, Fabric
 
 Floats = NDArray[np.float64]
@@ -67,7 +69,7 @@ def directional_albedo(
     theta : (n,) polar angles of the viewer [rad]
     Returns two (n, azimuths, groups) arrays, the volume's for a white thread, `A = 1`; groups are
     those of `groups`. The fabric's own value is the sum over groups of surface + A volume.
-    Published models only: threads of `conserving` count as black.
+    Published models only: threads of the conserving law count as black.
     """
     angles = np.asarray(theta, np.float64)
     around = np.arange(effort.azimuths) * (2 * math.pi / effort.azimuths)
@@ -76,7 +78,7 @@ def directional_albedo(
     parts = [group for group, _ in groups(fabric)]
     surface, volume = np.zeros((2, len(views), len(parts)))
     for k, part in enumerate(parts):
-        if part.model == "conserving":
+        if named(part.model).law == CONSERVING:
             continue
         for psi0, weight in zip(*_nodes(part, effort), strict=True):
             s, v = _node(fabric, parts, part, psi0, views, effort)

@@ -42,6 +42,7 @@ from fabricusd.appearance.published.shares import sampling_tables
 from fabricusd.appearance.published.tables import SurfaceTables, surface_tables
 from fabricusd.appearance.sampling.share_fit import AZIMUTHS, ELEVATIONS
 from fabricusd.appearance.sampling.stretches import STRETCH_COLUMNS
+from fabricusd.appearance.scattering.models import any_conserving, any_published
 from fabricusd.appearance.weave.quadrature import Rule
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import PART
@@ -80,8 +81,9 @@ def surface_law(
     rule : quadrature over the curves; None takes each model's default
     multiple : whether `conserving` cloth scatters light more than once; its table takes a second
     """
-    models = {fabric.model_of(t) == "conserving" for t in fabric.thread_list}
-    kind = MIXED if len(models) == 2 else CONSERVING_ONLY if models == {True} else PUBLISHED_ONLY
+    kind = PUBLISHED_ONLY
+    if any_conserving(fabric):
+        kind = MIXED if any_published(fabric) else CONSERVING_ONLY
     published = surface_tables(fabric, precision=precision, rule=rule)
     nothing = np.zeros((0, STRETCH_COLUMNS), precision)
     none = np.zeros((ELEVATIONS, AZIMUTHS, 0), precision)

@@ -1,7 +1,8 @@
 """The appearance model as it is written down: slow, plain float64 NumPy, shared with no kernel.
 
-What the compiled kernels are tested against. Directions are (n, 3) unit vectors; every function
-broadcasts over n. Source: MODEL sections 1, 2 and 4 (`docs/model.md`).
+What the compiled kernels are tested against; a thread's formula is in the module of its model,
+beside the kernels. Directions are (n, 3) unit vectors; every function broadcasts over n. Source:
+MODEL sections 1, 2 and 4 (`docs/model.md`).
 """
 
 from __future__ import annotations
@@ -9,47 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.special import erf, i0e
+from scipy.special import erf
 
+from fabricusd.appearance.scattering.models import named
+from fabricusd.appearance.scattering.plain_lobes import Angles, Array, angles, wrap
 from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage
 from fabricusd.fabric import PILE_ANGLE, Fabric, TangentCurve, Thread
 
-Array = NDArray[np.float64]
-
 NOTHING = 1e-12
 """`Q` at or below which the published surface law is 0."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Angles:
-    """One direction in a thread's frame (t, b, n_t): inclination and the two azimuths [rad].
-
-    theta : (n,) - asin(w.t); phi : (n,) - atan2(w.b, w.n_t); psi : (n,) - atan2(w.t, w.n_t)
-    """
-
-    theta: Array
-    phi: Array
-    psi: Array
-
-
-def azimuth(y: Array, x: Array) -> Array:
-    """atan2(y, x) [rad] with atan2(0, 0) = 0 whatever the signs of the zeros."""
-    return np.where((y == 0) & (x == 0), 0.0, np.arctan2(y, x))
-
-
-def wrap(angle: Array) -> Array:
-    """`angle` [rad] moved into (-pi, pi]."""
-    return math.pi - np.mod(math.pi - angle, 2 * math.pi)
-
-
-def angles(w: Array) -> Angles:
-    """Of `w` : (n, 3) in the thread frame, x along `t`, y along `b`, z along `n_t`."""
-    t, b, n = np.moveaxis(np.asarray(w, np.float64), -1, 0)
-    return Angles(theta=np.arctan2(t, np.hypot(b, n)), phi=azimuth(b, n), psi=azimuth(t, n))
 
 
 def to_thread(w: Array, is_warp: bool, psi0: float | Array) -> Array:
@@ -64,86 +35,9 @@ def to_thread(w: Array, is_warp: bool, psi0: float | Array) -> Array:
     return np.stack((c * along - s * w[..., 2], b, s * along + c * w[..., 2]), axis=-1)
 
 
-def gaussian(s: float, x: Array) -> Array:
-    """Unit-area Gaussian of standard deviation `s` [rad] at `x` [rad]."""
-    return np.exp(-0.5 * (x / s) ** 2) / (s * math.sqrt(2 * math.pi))
-
-
-def fresnel(ior: float, cosine: Array) -> Array:
-    """Unpolarised reflectance of a dielectric at incidence cosine `cosine` in [0, 1]."""
-    cosine = np.broadcast_to(cosine, np.shape(cosine))
-    if ior == 1.0:
-        return np.zeros_like(cosine)
-    inside = np.sqrt(np.maximum(1 - (1 - cosine**2) / ior**2, 0))
-    parallel = (ior * cosine - inside) / (ior * cosine + inside)
-    perpendicular = (cosine - ior * inside) / (cosine + ior * inside)
-    return 0.5 * (parallel**2 + perpendicular**2)
-
-
-def longitudinal(a: Array, b: Array, s: float) -> Array:
-    """`K(a, b; s)`, [dEon2011] eq. 7 without cancellation; its integral over cos b db is 1."""
-    v = s * s
-    peak = np.exp(-2 * np.sin(0.5 * (a + b)) ** 2 / v)
-    return peak * i0e(np.cos(a) * np.cos(b) / v) / (v * -math.expm1(-2 / v))
-
-
-def conserving_surface(thread: Thread, i: Angles, o: Angles) -> Array:
-    """(n,) surface term of the `conserving` model [1/sr]."""
-    cos_half = np.cos(0.5 * wrap(i.phi - o.phi))
-    f = fresnel(thread.ior, np.cos(0.5 * (i.theta - o.theta)) * cos_half)
-    k = longitudinal(i.theta, o.theta, 2 * thread.gamma_surface)
-    widest = np.maximum(np.maximum(np.cos(i.theta), np.cos(o.theta)), 1e-6)
-    return np.minimum(1, thread.surface_gain * f) * cos_half / 4 * k / widest
-
-
-@lru_cache(maxsize=64)
-def surface_albedo(thread: Thread, count: int = 181) -> tuple[Array, Array]:
-    """(|theta|, E): directional albedo of the `conserving` surface term, clamped to 1."""
-    theta = np.linspace(0, math.pi / 2, count)
-    x, x_weight = np.polynomial.legendre.leggauss(200)
-    y, y_weight = np.polynomial.legendre.leggauss(64)
-    shape = (len(x), len(y))
-    still = np.zeros(shape)
-    o_phi = np.broadcast_to((y + 1) * math.pi / 2, shape)
-    narrow = 2 * thread.gamma_surface
-    albedo = np.empty(count)
-    for k, t in enumerate(theta):
-        # The nodes follow the lobe, which narrow threads squeeze between any fixed grid.
-        lo, hi = max(-math.pi / 2, -t - 9 * narrow), min(math.pi / 2, -t + 9 * narrow)
-        out = np.broadcast_to((lo + (hi - lo) * (x + 1) / 2)[:, None], shape)
-        i = Angles(theta=np.full(shape, t), phi=still, psi=still)
-        o = Angles(theta=out, phi=o_phi, psi=still)
-        value = conserving_surface(thread, i, o) * np.cos(out) ** 2
-        albedo[k] = x_weight @ value @ y_weight * math.pi * (hi - lo) / 2
-    return theta, np.minimum(albedo, 1.0)
-
-
 def thread_terms(thread: Thread, model: str, i: Angles, o: Angles) -> tuple[Array, Array]:
     """Surface and volume term of `f_s` [1/sr], each (n,), the volume's without `A`. Section 2."""
-    ci, co = np.cos(i.theta), np.cos(o.theta)
-    cos_half = np.cos(0.5 * wrap(i.phi - o.phi))
-    theta_h, theta_d = 0.5 * (i.theta + o.theta), 0.5 * (i.theta - o.theta)
-    if model == "conserving":
-        table, albedo = surface_albedo(thread)
-        widest = np.maximum(np.maximum(ci, co), 1e-6)
-        kept = 1 - albedo
-        t_i, t_o = np.interp(abs(i.theta), table, kept), np.interp(abs(o.theta), table, kept)
-        k = longitudinal(i.theta, o.theta, 2 * thread.gamma_volume)
-        lobe = (1 - thread.isotropic) * k / (2 * math.pi * widest)
-        volume = t_i * t_o / kept.max() * (lobe + thread.isotropic / math.pi**2)
-        return conserving_surface(thread, i, o), volume
-    if model == "thesis":
-        f = fresnel(thread.ior, np.cos(theta_h) * cos_half)
-        transmitted = (1 - fresnel(thread.ior, ci)) * (1 - fresnel(thread.ior, co))
-    else:
-        f = fresnel(thread.ior, np.cos(theta_d) * cos_half)
-        transmitted = (1 - f) ** 2
-    kd = thread.isotropic
-    surface = f * cos_half * gaussian(thread.gamma_surface, theta_h)
-    lobe = (1 - kd) * gaussian(thread.gamma_volume, theta_h) + kd
-    volume = transmitted * lobe / np.maximum(ci + co, 1e-3)
-    compressed = np.maximum(np.cos(theta_d) ** 2, 1e-6)
-    return surface / compressed, volume / compressed
+    return named(model).plain(thread, i, o)
 
 
 def thread_value(thread: Thread, model: str, wi: Array, wo: Array) -> Array:
@@ -154,7 +48,7 @@ def thread_value(thread: Thread, model: str, wi: Array, wo: Array) -> Array:
 
 def albedo_of(thread: Thread, model: str) -> Array:
     """(3,) `A`, clamped to 1 where it is an albedo."""
-    return np.minimum(thread.albedo, 1.0) if model == "conserving" else np.array(thread.albedo)
+    return np.minimum(thread.albedo, named(model).most_albedo)
 
 
 def masked(x: Array, y: Array, width: float) -> Array:

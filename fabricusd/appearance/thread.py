@@ -18,48 +18,47 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
-from fabricusd.appearance.scattering.sampling import density, sample_direction
-from fabricusd.appearance.scattering.table import pack_threads, thread_row
-from fabricusd.appearance.scattering.terms import (
+from fabricusd.appearance.scattering.columns import (
     ALBEDO_B,
     ALBEDO_G,
     ALBEDO_R,
     BRIGHTNESS,
-    CONSERVING,
+    CONSTANTS,
     GAMMA_SURFACE,
     GAMMA_VOLUME,
-    INVERSE_T_MAX,
     IOR_EXCESS,
     ISOTROPIC,
-    MICROCYLINDER,
     MODEL,
     SURFACE_GAIN,
-    THESIS,
-    conserving_terms,
+)
+from fabricusd.appearance.scattering.models import REGISTRY
+from fabricusd.appearance.scattering.sampling import density, sample_direction
+from fabricusd.appearance.scattering.table import pack_threads, thread_row
+from fabricusd.appearance.scattering.terms import (
+    ALL,
+    factors,
+    lobes,
+    looked_up,
     pair_angles,
-    published_terms,
     terms,
     terms_at,
-    transmission,
 )
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEFAULT_MODEL, MODELS, Thread
-from fabricusd.kernels.real import KERNEL
+from fabricusd.kernels.choice import specialised, tuple_reader
+from fabricusd.kernels.real import INLINE, KERNEL
 
 __all__ = [
     "ALBEDO_B",
     "ALBEDO_G",
     "ALBEDO_R",
     "BRIGHTNESS",
-    "CONSERVING",
     "GAMMA_SURFACE",
     "GAMMA_VOLUME",
     "IOR_EXCESS",
     "ISOTROPIC",
-    "MICROCYLINDER",
     "MODEL",
     "SURFACE_GAIN",
-    "THESIS",
     "Sample",
     "density",
     "evaluate",
@@ -197,62 +196,73 @@ def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Floats, Floats]:
 # assume that every store into `out` changes them, and would not vectorise.
 
 
-@njit(**KERNEL)
-def _constants(row):
-    """The row's columns before the transmission table."""
-    return (
-        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9],
-        row[10], row[11], row[12], row[13], row[14], row[15], row[16], row[17], row[18],
-    )  # fmt: skip
+_constants = tuple_reader(CONSTANTS)
+
+_HAS_TABLE = tuple(model.looked_up is not None for model in REGISTRY)
 
 
-@njit(**KERNEL)
-def _published_block(R, thesis, row, ix, iy, iz, ox, oy, oz, r, g, b):
+@njit(**INLINE)
+def _add_directly(R, model, row, ix, iy, iz, ox, oy, oz, r, g, b):
     for k in range(ix.size):
         cos_i, cos_o, cos_half = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
-        surface, volume = published_terms(R, thesis, row, ix[k], cos_i, ox[k], cos_o, cos_half)
+        surface, volume = factors(R, model, row, ix[k], cos_i, ox[k], cos_o, cos_half)
+        on_surface, on_volume = lobes(R, model, row, ix[k], cos_i, ox[k], cos_o)
+        surface, volume = surface * on_surface, volume * on_volume
         r[k] = surface + volume * row[ALBEDO_R]
         g[k] = surface + volume * row[ALBEDO_G]
         b[k] = surface + volume * row[ALBEDO_B]
 
 
-@njit(**KERNEL)
-def _conserving_block(R, row, through, ix, iy, iz, ox, oy, oz, r, g, b):
+@njit(**INLINE)
+def _add_by_table(R, model, row, through, ix, iy, iz, ox, oy, oz, r, g, b):
     for k in range(ix.size):
         cos_i, cos_o, cos_half = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
-        surface, volume = conserving_terms(R, row, through[k], ix[k], cos_i, ox[k], cos_o, cos_half)
+        surface, volume = factors(R, model, row, ix[k], cos_i, ox[k], cos_o, cos_half)
+        on_surface, on_volume = lobes(R, model, row, ix[k], cos_i, ox[k], cos_o)
+        surface, volume = surface * on_surface, volume * on_volume * through[k]
         r[k] = surface + volume * row[ALBEDO_R]
         g[k] = surface + volume * row[ALBEDO_G]
         b[k] = surface + volume * row[ALBEDO_B]
 
 
+_directly = specialised(_add_directly, [k for k in ALL if not _HAS_TABLE[k]])
+_by_table = specialised(_add_by_table, [k for k in ALL if _HAS_TABLE[k]])
+
+
 @njit(**KERNEL)
-def _through_block(R, row, iy, iz, oy, oz, out):
-    """T(theta_i) T(theta_o)/T_max: the table look-up, which keeps the loop above from gathering."""
+def _direct_block(R, model, row, ix, iy, iz, ox, oy, oz, r, g, b):
+    _directly(R, model, row, ix, iy, iz, ox, oy, oz, r, g, b)
+
+
+@njit(**KERNEL)
+def _table_block(R, model, row, through, ix, iy, iz, ox, oy, oz, r, g, b):
+    _by_table(R, model, row, through, ix, iy, iz, ox, oy, oz, r, g, b)
+
+
+@njit(**KERNEL)
+def _through_block(R, model, row, iy, iz, oy, oz, out):
+    """What models read from tables: by itself, which keeps the loop above from gathering."""
     for k in range(out.size):
         cos_i, cos_o, _ = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
-        through = transmission(R, row, cos_i) * transmission(R, row, cos_o)
-        out[k] = through * row[INVERSE_T_MAX]
+        out[k] = looked_up(R, model, row, cos_i, cos_o)
 
 
 @njit(**KERNEL, parallel=True)
 def _evaluate_soa(R, row, wi, wo, out):
     n = wi.shape[1]
-    constants = _constants(row)
-    model = row[MODEL]
+    constants = _constants(row, 0)
+    model = int(row[MODEL])
     for block in prange((n + BLOCK - 1) // BLOCK):
         s = slice(block * BLOCK, min(n, (block + 1) * BLOCK))
         ix, iy, iz = wi[0, s], wi[1, s], wi[2, s]
         ox, oy, oz = wo[0, s], wo[1, s], wo[2, s]
         r, g, b = out[0, s], out[1, s], out[2, s]
-        if model == R(CONSERVING):
+        if _HAS_TABLE[model]:
             through = np.empty(ix.size, R)
-            _through_block(R, row, iy, iz, oy, oz, through)
-            _conserving_block(R, constants, through, ix, iy, iz, ox, oy, oz, r, g, b)
-        elif model == R(THESIS):
-            _published_block(R, True, constants, ix, iy, iz, ox, oy, oz, r, g, b)
+            _through_block(R, model, row, iy, iz, oy, oz, through)
+            _table_block(R, model, constants, through, ix, iy, iz, ox, oy, oz, r, g, b)
         else:
-            _published_block(R, False, constants, ix, iy, iz, ox, oy, oz, r, g, b)
+            _direct_block(R, model, constants, ix, iy, iz, ox, oy, oz, r, g, b)
 
 
 @njit(**KERNEL, parallel=True)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance import plain
+from fabricusd.appearance.scattering import plain_lobes
 from fabricusd.appearance.surface import evaluate
 from fabricusd.appearance.thread import evaluate as thread_value
 from fabricusd.appearance.weave.footprint import weights
@@ -84,7 +85,7 @@ def along_the_thread() -> Case:
         # As printed: the azimuth of the normalised projection on the normal plane.
         length = np.sqrt(np.maximum(1.0 - (wi[:, 0] / np.linalg.norm(wi, axis=1)) ** 2, 0.0))
         azimuth = np.degrees(np.arccos(np.clip(0.8 * off / length, -9, 9)))
-    exact = np.degrees(plain.angles(wi).phi)
+    exact = np.degrees(plain_lobes.angles(wi).phi)
     thread = next(iter(load("linen_plain").threads.values()))
     assert np.isfinite(thread_value(thread, wi / np.linalg.norm(wi, axis=1)[:, None], wo)).all()
     return Case(
@@ -103,8 +104,10 @@ def wide_lobes() -> Case:
     for k, s in enumerate(lobes):
         reach = min(12.0 * s, 0.5 * math.pi)
         b = np.linspace(-reach, reach, 20001)
-        published[k] = np.trapezoid(plain.gaussian(float(s), b), b)
-        ours[k] = np.trapezoid(plain.longitudinal(np.zeros_like(b), b, float(s)) * np.cos(b), b)
+        published[k] = np.trapezoid(plain_lobes.gaussian(float(s), b), b)
+        ours[k] = np.trapezoid(
+            plain_lobes.longitudinal(np.zeros_like(b), b, float(s)) * np.cos(b), b
+        )
     return Case(
         where="gs → 0, gv ≥ 60°", axis="lobe width [degrees]", unit="area of the lobe", x=widths,
         published=published, ours=ours, log_x=True, log_y=False,

@@ -1,4 +1,4 @@
-"""Make the plugin folder, which other tools are pointed at, from `schema.usda` and the rules.
+"""Make the plugin folder, which other tools are pointed at: from `schema.usda`, models and rules.
 
 `python -m fabricusd.schema.generate` writes them, `--check` only compares. A developer's step: it
 needs jinja2, which usdGenSchema uses.
@@ -12,13 +12,28 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
+
+from fabricusd.fabric import MODELS
 
 HERE = Path(__file__).resolve().parent
 PLUGIN = HERE / "plugin"
 
 
-def _source_with_whole_docs(folder: Path) -> Path:
-    """A copy of schema.usda in which every property's user doc is its whole documentation.
+def _name_models(layer: Any) -> None:
+    """Write the thread models' names, and what each is, into the properties that choose one."""
+    from fabricusd.appearance.scattering.models import named
+
+    fabric = layer.GetAttributeAtPath("/Fabric.fabric:model")
+    thread = layer.GetAttributeAtPath("/FabricThread.thread:model")
+    fabric.allowedTokens, thread.allowedTokens = MODELS, ("inherit", *MODELS)
+    meaning = " ".join(f"{name}: {named(name).summary}." for name in MODELS)
+    fabric.documentation = fabric.documentation.replace("Unit:", f"{meaning} Unit:")
+
+
+def _whole_source(folder: Path) -> Path:
+    """A copy of schema.usda that names the models, and in which every property's user doc is its
+    whole documentation.
 
     usdGenSchema would keep the first sentence alone, and the unit would be lost to usdview.
     """
@@ -27,6 +42,7 @@ def _source_with_whole_docs(folder: Path) -> Path:
     layer = Sdf.Layer.FindOrOpen(str(HERE / "schema.usda"))
     copy = Sdf.Layer.CreateAnonymous(".usda")
     copy.TransferContent(layer)
+    _name_models(copy)
 
     def keep_docs(path: Sdf.Path) -> None:
         spec = copy.GetObjectAtPath(path)
@@ -49,7 +65,7 @@ def generate() -> dict[str, str]:
     tool = Path(Usd.__file__).with_name("usdGenSchema.py")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        source = _source_with_whole_docs(folder)
+        source = _whole_source(folder)
         out = folder / "out"
         out.mkdir()
         done = subprocess.run(

@@ -12,13 +12,15 @@ from fabricusd.appearance import plain, surface
 from fabricusd.appearance.published.far import far_values
 from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.scattering import models
+from fabricusd.appearance.scattering.model import PUBLISHED as LAW
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEGREE, MODELS, Fabric, TangentCurve, Thread, ThreadSet, Weave
 from tests.appearance.directions import VIEWS, direction, random_directions
 from tests.appearance.presets import PRESETS, with_model
 
 PLACES = np.random.default_rng(3).random((4000, 2)) * 20
-PUBLISHED = ("thesis", "microcylinder")
+PUBLISHED = models.names(LAW)
 
 SPECIAL = np.array(
     [

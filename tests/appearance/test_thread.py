@@ -1,4 +1,4 @@
-"""The three thread models: identities, limits, precision, and an independent second version."""
+"""The thread models: identities, limits, precision, and an independent second version."""
 
 import math
 import re
@@ -10,6 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fabricusd.appearance import plain, thread
+from fabricusd.appearance.scattering import models
+from fabricusd.appearance.scattering.model import PUBLISHED
 from fabricusd.errors import FabricError
 from fabricusd.fabric import MODELS, Thread
 from tests.appearance.presets import PRESETS
@@ -160,7 +162,7 @@ def test_an_index_of_one_has_no_surface_and_a_black_thread_no_volume(model):
     assert np.all(thread.evaluate(Thread(ior=1.0, albedo=(0, 0, 0)), wi, wo, model) == 0)
 
 
-@pytest.mark.parametrize("model", ["thesis", "microcylinder"])
+@pytest.mark.parametrize("model", models.names(PUBLISHED))
 def test_a_very_large_index_lets_nothing_in(model):
     generator = np.random.default_rng(5)
     wi, wo = (_random_directions(generator, 1000).T for _ in range(2))
@@ -203,7 +205,7 @@ def test_any_thread_is_finite_and_not_negative(gs, gv, ior, kd):
 def test_the_model_is_the_arguments_or_the_threads_or_the_default():
     wi, wo = [0.6, 0, 0.8], [0.0, 0.6, 0.8]
     values = {m: thread.evaluate(Thread(), wi, wo, m)[0, 0] for m in MODELS}
-    assert len(set(values.values())) == 3
+    assert len(set(values.values())) == len(MODELS)
     assert thread.evaluate(Thread(), wi, wo)[0, 0] == values["microcylinder"]
     own = Thread(model="thesis")
     assert thread.evaluate(own, wi, wo)[0, 0] == values["thesis"]
@@ -238,7 +240,7 @@ def test_the_float32_loops_are_vectorised_without_a_call():
     wi = np.ones((3, 16), np.float32)
     for model in MODELS:
         thread.evaluate_soa(thread.thread_row(Thread(), model).astype(np.float32), wi, wi)
-    for block in (thread._published_block, thread._conserving_block):
+    for block in (thread._direct_block, thread._table_block):
         for signature, text in block.inspect_llvm().items():
             if "class(float32)" in str(signature):
                 assert re.search(r"fadd.*<(8|16) x float>", text), block

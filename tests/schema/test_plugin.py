@@ -132,7 +132,8 @@ def test_every_attribute_has_a_fallback_and_every_token_its_allowed_values(owner
     attribute = definition(owner).GetAttributeDefinition(prop)
     assert attribute.GetFallbackValue() is not None
     if attribute.GetTypeName() == "token" and prop != "fabric:binding:uvSet":
-        assert set(MODELS) <= set(attribute.GetMetadata("allowedTokens"))
+        allowed = list(attribute.GetMetadata("allowedTokens"))
+        assert allowed == (["inherit"] if owner == "FabricThread" else []) + list(MODELS)
 
 
 @pytest.mark.parametrize(

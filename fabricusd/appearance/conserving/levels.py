@@ -8,7 +8,8 @@ from fabricusd.appearance.conserving.multiple import conserving_point_value, mul
 from fabricusd.appearance.conserving.single import facet_terms, visible
 from fabricusd.appearance.frame import to_thread
 from fabricusd.appearance.scattering.across import across_at
-from fabricusd.appearance.scattering.terms import ALBEDO_B, ALBEDO_G, ALBEDO_R, CONSERVING, MODEL
+from fabricusd.appearance.scattering.columns import ALBEDO_B, ALBEDO_G, ALBEDO_R, LAW
+from fabricusd.appearance.scattering.model import CONSERVING
 from fabricusd.fabric import PILE_ANGLE
 from fabricusd.kernels.real import PART, cos, sin
 
@@ -19,7 +20,7 @@ def conserving_level_value(
 ):  # type: ignore[no-untyped-def]
     """`multiple.conserving_point_value`, with the factors across the width if `across_too`."""
     row = tables.threads[thread]
-    if not across_too or row[MODEL] != R(CONSERVING):
+    if not across_too or row[LAW] != R(CONSERVING):
         return conserving_point_value(R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz)
     scale = visible(R, tables, ix, iy, iz) * visible(R, tables, ox, oy, oz) * abs(iz)
     if tables.opaque != 0 and (iz > R(0)) != (oz > R(0)):

@@ -38,18 +38,15 @@ from fabricusd.appearance.conserving.single import (
     visible,
 )
 from fabricusd.appearance.frame import from_thread, to_thread
+from fabricusd.appearance.scattering.columns import ALBEDO_B, ALBEDO_R, BRIGHTNESS
+from fabricusd.appearance.scattering.model import CONSERVING
+from fabricusd.appearance.scattering.models import model_of
 from fabricusd.appearance.scattering.sampling import density, sample_direction
-from fabricusd.appearance.scattering.table import surface_albedo
-from fabricusd.appearance.scattering.terms import (
-    ALBEDO_B,
-    ALBEDO_R,
-    BRIGHTNESS,
-    terms,
-)
+from fabricusd.appearance.scattering.terms import terms
 from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage
 from fabricusd.appearance.weave.curve import is_pile
 from fabricusd.appearance.weave.quadrature import Rule
-from fabricusd.fabric import Fabric, Thread
+from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE, KERNEL, LEAN, PART, acos, asin, atan2
 
 Reals = NDArray[Any]
@@ -105,15 +102,16 @@ def mean_albedo(fabric: Fabric) -> NDArray[np.float64]:
     area = coverage(fabric).type_area.sum(axis=0)
     total = np.zeros(3)
     for share, thread in zip(area, fabric.thread_list, strict=True):
-        if fabric.model_of(thread) == "conserving":
-            surface = _mean_surface_albedo(thread)
+        model = model_of(fabric, thread)
+        if model.law == CONSERVING:
+            through = model.transmission(thread) if model.transmission else np.ones(2)
+            surface = _mean_surface_albedo(1.0 - through)
             total += float(share) * (surface + (1.0 - surface) * np.clip(thread.albedo, 0.0, 1.0))
     return np.asarray(total / max(float(area.sum()), 1e-300))
 
 
-def _mean_surface_albedo(thread: Thread) -> float:
-    """(2/pi) integral of E cos^2 theta over +-90 degrees, from the table of E."""
-    albedo = surface_albedo(thread.gamma_surface, thread.ior, thread.surface_gain)
+def _mean_surface_albedo(albedo: NDArray[np.float64]) -> float:
+    """(2/pi) integral of E cos^2 theta over +-90 degrees; albedo : E at even sqrt(cos theta)."""
     cos_theta = np.linspace(0.0, 1.0, len(albedo)) ** 2
     theta = np.arccos(cos_theta)
     # theta falls along the table.

@@ -43,7 +43,7 @@ from fabricusd.appearance.sampling.stretches import (
     VOLUME_WIDTH,
     stretches_of,
 )
-from fabricusd.appearance.scattering.terms import GAMMA_SURFACE, GAMMA_VOLUME
+from fabricusd.appearance.scattering.columns import GAMMA_SURFACE, GAMMA_VOLUME
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE, KERNEL, PART
 

@@ -24,18 +24,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import to_thread
+from fabricusd.appearance.scattering.columns import ALBEDO_B, ALBEDO_G, ALBEDO_R, LAW
+from fabricusd.appearance.scattering.model import CONSERVING
 from fabricusd.appearance.scattering.table import pack_threads
-from fabricusd.appearance.scattering.terms import (
-    ALBEDO_B,
-    ALBEDO_G,
-    ALBEDO_R,
-    CONSERVING,
-    MODEL,
-    terms,
-)
+from fabricusd.appearance.scattering.terms import conserving_terms
 from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage
 from fabricusd.appearance.weave.curve import is_pile
-from fabricusd.appearance.weave.quadrature import POINTS, Rule, count_nodes, curve_nodes
+from fabricusd.appearance.weave.quadrature import Rule, curve_nodes, fewer_points
 from fabricusd.errors import FabricError
 from fabricusd.fabric import PILE_ANGLE, Fabric
 from fabricusd.kernels.real import INLINE, PART, cos, sin
@@ -59,7 +54,7 @@ _STEEPEST_COS = math.cos(PILE_ANGLE)
 class ConservingTables(NamedTuple):
     """What the kernels read; `real` is the precision asked for.
 
-    threads : (k, COLUMNS) real - see `thread_terms`
+    threads : (k, COLUMNS) real - see `scattering.columns`
     nodes : (n, 3) real - NODE_ columns, by set (weft first), thread and tangent angle
     node_thread : (n,) int32
     scatters : (n,) uint8 - 1 where the node's thread is `conserving`
@@ -107,7 +102,7 @@ def single_tables(
         threads=threads.astype(precision),
         nodes=np.ascontiguousarray(nodes, dtype=precision),
         node_thread=thread,
-        scatters=(threads[thread, MODEL] == CONSERVING).astype(np.uint8),
+        scatters=(threads[thread, LAW] == CONSERVING).astype(np.uint8),
         warp_start=q.warp_start,
         covered=precision(1.0 - coverage(fabric).gap),
         opaque=int(fabric.opaque),
@@ -120,10 +115,7 @@ def single_tables(
 def _default_rule(fabric: Fabric) -> Rule:
     """Points one surface lobe's width apart, or as much farther as MOST_NODES demands."""
     pile = any(is_pile(t.curve) for t in fabric.thread_list)
-    spacing = PILE_SPACING if pile else 1.0
-    while count_nodes(fabric, Rule(POINTS, spacing)) > MOST_NODES and spacing < 1e9:
-        spacing *= 1.5
-    return Rule(POINTS, spacing)
+    return fewer_points(fabric, PILE_SPACING if pile else 1.0, MOST_NODES)
 
 
 @njit(**INLINE)
@@ -162,7 +154,7 @@ def facet_terms(R, tables, thread_set, thread, c, s, ix, iy, iz, ox, oy, oz):
     seen = max(R(0), tn if iz > R(0) else -tn) * max(R(0), vn if oz > R(0) else -vn)
     if seen == R(0):
         return R(0), R(0)
-    surface, volume = terms(R, tables.threads[thread], ta, tb, tn, va, vb, vn)
+    surface, volume = conserving_terms(R, tables.threads[thread], ta, tb, tn, va, vb, vn)
     return surface * seen, volume * seen
 
 
@@ -201,7 +193,7 @@ def conserving_point_single(R, tables, thread_set, thread, psi0, ix, iy, iz, ox,
     scale = visible(R, tables, ix, iy, iz) * visible(R, tables, ox, oy, oz) * abs(iz)
     if tables.opaque != 0 and (iz > R(0)) != (oz > R(0)):
         scale = R(0)
-    if scale == R(0) or row[MODEL] != R(CONSERVING):
+    if scale == R(0) or row[LAW] != R(CONSERVING):
         return R(0), R(0), R(0)
     angle = min(max(psi0, R(-PILE_ANGLE)), R(PILE_ANGLE))
     c, s = cos(R, angle), sin(R, angle)

@@ -32,15 +32,17 @@ from fabricusd.appearance.published.blocks import (
     node_range,
     prepare,
 )
-from fabricusd.appearance.published.segment import along_set, cell_lobes, seen_along, segment
-from fabricusd.appearance.published.tables import NODE_COS, NODE_HALF, NODE_SIN, NODE_WEIGHT
-from fabricusd.appearance.scattering.terms import (
-    ALBEDO_B,
-    ALBEDO_G,
-    ALBEDO_R,
-    MODEL,
-    THESIS,
+from fabricusd.appearance.published.segment import (
+    along_set,
+    mean_segment,
+    seen_along,
+    segment,
 )
+from fabricusd.appearance.published.tables import NODE_COS, NODE_HALF, NODE_SIN, NODE_WEIGHT
+from fabricusd.appearance.scattering.columns import ALBEDO_B, ALBEDO_G, ALBEDO_R, MODEL
+from fabricusd.appearance.scattering.models import PUBLISHED_MODELS
+from fabricusd.appearance.scattering.terms import CELL_MODELS
+from fabricusd.kernels.choice import specialised
 from fabricusd.kernels.real import INLINE, KERNEL, PART, index
 
 
@@ -65,21 +67,14 @@ def normalization(R, tables, ix, iy, iz, ox, oy, oz):
 @njit(**INLINE)
 def node_terms(R, tables, k, a_i, b_i, iz, a_o, b_o, oz):
     """`f_s M cos theta_i` at node k: (surface, volume without `A`)."""
-    thread = tables.node_thread[k]
     c, s, half = tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN], tables.nodes[k, NODE_HALF]
-    row = tables.threads[thread]
-    thesis = row[MODEL] == R(THESIS)
+    row = tables.threads[tables.node_thread[k]]
+    model = int(row[MODEL])
     if half > R(0):
-        surface, volume = segment(
-            R, thesis, tables.smooth[thread], tables.overlap_precision,
-            c, s, a_i, b_i, iz, a_o, b_o, oz,
-        )  # fmt: skip
-        surface_lobe, volume_lobe = cell_lobes(R, row, half, c, s, a_i, b_i, iz, a_o, b_o, oz)
-        return surface * surface_lobe, volume * volume_lobe
-    surface, volume = segment(
-        R, thesis, row, tables.overlap_precision, c, s, a_i, b_i, iz, a_o, b_o, oz
-    )
-    return surface, volume
+        return mean_segment(
+            R, model, row, half, tables.overlap_precision, c, s, a_i, b_i, iz, a_o, b_o, oz
+        )
+    return segment(R, model, row, tables.overlap_precision, c, s, a_i, b_i, iz, a_o, b_o, oz)
 
 
 @njit(**PART)
@@ -140,26 +135,8 @@ def far_values(R, tables, wi, wo, out, begin, end):
         divide(R, out, start, size, block)
 
 
-@njit(**PART)
-def _add_node(R, tables, k, size, block):
-    """Node k's share of `Q` and of the value, for a block, by the loop that its kind needs."""
-    thread = tables.node_thread[k]
-    row = tables.threads[thread]
-    if tables.published[k] == 0:
-        add_masking(R, tables, k, size, block)
-    elif tables.nodes[k, NODE_HALF] > R(0):
-        if row[MODEL] == R(THESIS):
-            _add_cell(R, True, tables, k, row, tables.smooth[thread], size, block)
-        else:
-            _add_cell(R, False, tables, k, row, tables.smooth[thread], size, block)
-    elif row[MODEL] == R(THESIS):
-        _add_point(R, True, tables, k, row, size, block)
-    else:
-        _add_point(R, False, tables, k, row, size, block)
-
-
 @njit(**INLINE)
-def _add_point(R, thesis, tables, k, row, size, block):
+def _add_point(R, model, tables, k, row, size, block):
     c, s, weight = (
         tables.nodes[k, NODE_COS],
         tables.nodes[k, NODE_SIN],
@@ -169,7 +146,7 @@ def _add_point(R, thesis, tables, k, row, size, block):
     for x in range(size):
         p = weight * masking_at(R, c, s, block, x)
         surface, volume = segment(
-            R, thesis, row, tables.overlap_precision, c, s,
+            R, model, row, tables.overlap_precision, c, s,
             block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x],
             block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x],
         )  # fmt: skip
@@ -180,7 +157,7 @@ def _add_point(R, thesis, tables, k, row, size, block):
 
 
 @njit(**INLINE)
-def _add_cell(R, thesis, tables, k, row, smooth, size, block):
+def _add_cell(R, model, tables, k, row, size, block):
     c, s, weight = (
         tables.nodes[k, NODE_COS],
         tables.nodes[k, NODE_SIN],
@@ -190,17 +167,29 @@ def _add_cell(R, thesis, tables, k, row, smooth, size, block):
     red, green, blue = row[ALBEDO_R], row[ALBEDO_G], row[ALBEDO_B]
     for x in range(size):
         p = weight * masking_at(R, c, s, block, x)
-        surface, volume = segment(
-            R, thesis, smooth, tables.overlap_precision, c, s,
+        surface, volume = mean_segment(
+            R, model, row, half, tables.overlap_precision, c, s,
             block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x],
             block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x],
         )  # fmt: skip
-        surface_lobe, volume_lobe = cell_lobes(
-            R, row, half, c, s, block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x],
-            block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x],
-        )  # fmt: skip
-        surface, volume = surface * surface_lobe, volume * volume_lobe
         block[NORMALIZATION + x] += p
         block[RED + x] += p * (surface + volume * red)
         block[GREEN + x] += p * (surface + volume * green)
         block[BLUE + x] += p * (surface + volume * blue)
+
+
+_point_of = specialised(_add_point, PUBLISHED_MODELS)
+_cell_of = specialised(_add_cell, CELL_MODELS)
+
+
+@njit(**PART)
+def _add_node(R, tables, k, size, block):
+    """Node k's share of `Q` and of the value, for a block, by the loop that its kind needs."""
+    row = tables.threads[tables.node_thread[k]]
+    model = int(row[MODEL])
+    if tables.published[k] == 0:
+        add_masking(R, tables, k, size, block)
+    elif tables.nodes[k, NODE_HALF] > R(0):
+        _cell_of(R, model, tables, k, row, size, block)
+    else:
+        _point_of(R, model, tables, k, row, size, block)

@@ -36,25 +36,25 @@ from fabricusd.appearance.published.blocks import (
 from fabricusd.appearance.published.far import normalization
 from fabricusd.appearance.published.segment import along_set, seen_along, segment
 from fabricusd.appearance.scattering.across import across_at
-from fabricusd.appearance.scattering.terms import (
+from fabricusd.appearance.scattering.columns import (
     ALBEDO_B,
     ALBEDO_G,
     ALBEDO_R,
-    CONSERVING,
-    MICROCYLINDER,
+    LAW,
     MODEL,
-    THESIS,
-    VOLUME_GAUSSIAN,
+    POINT_COLUMNS,
 )
+from fabricusd.appearance.scattering.model import PUBLISHED
+from fabricusd.appearance.scattering.models import PUBLISHED_MODELS
+from fabricusd.kernels.choice import for_each, tuple_reader
 from fabricusd.kernels.real import INLINE, KERNEL, PART, cos, index, sin
 
 _WARP = 13 * BLOCK
 """Where the warp's nine rows start; the weft's are the block's own."""
 _IS_WARP, _COS, _SIN, _ACROSS = 22 * BLOCK, 23 * BLOCK, 24 * BLOCK, 25 * BLOCK
 _THREAD = 26 * BLOCK
-"""Where the columns of each point's own thread start: those before TRANSMISSION's."""
-_COLUMNS = VOLUME_GAUSSIAN + 2
-POINT_ROWS = 26 + _COLUMNS
+"""Where the columns of each point's own thread start."""
+POINT_ROWS = 26 + POINT_COLUMNS
 _NO_MODEL = -1.0
 
 
@@ -66,7 +66,7 @@ def point_value(R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, 
     """
     none = R(0)
     row = tables.threads[thread]
-    if iz <= none or oz <= none or row[MODEL] == R(CONSERVING):
+    if iz <= none or oz <= none or row[LAW] != R(PUBLISHED):
         return none, none, none
     q = normalization(R, tables, ix, iy, iz, ox, oy, oz)
     if q <= R(NOTHING):
@@ -77,7 +77,7 @@ def point_value(R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, 
     c, s = cos(R, psi0), sin(R, psi0)
     p = seen_along(R, c, s, a_i, iz, scale_i, a_o, oz, scale_o, u)
     surface, volume = _bit_of_thread(
-        R, row[MODEL] == R(THESIS), across_too, row, tables.overlap_precision,
+        R, int(row[MODEL]), across_too, row, tables.overlap_precision,
         c, s, w, a_i, b_i, iz, a_o, b_o, oz,
     )  # fmt: skip
     p /= q
@@ -91,9 +91,9 @@ def point_value(R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, 
 
 
 @njit(**INLINE)
-def _bit_of_thread(R, thesis, across_too, row, precision, c, s, w, a_i, b_i, iz, a_o, b_o, oz):
+def _bit_of_thread(R, model, across_too, row, precision, c, s, w, a_i, b_i, iz, a_o, b_o, oz):
     """`segment`, with the factors across the width where they are asked for."""
-    surface, volume = segment(R, thesis, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz)
+    surface, volume = segment(R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz)
     if across_too:
         n_i, n_o = s * a_i + c * iz, s * a_o + c * oz
         on_surface, on_volume = across_at(R, row, w, b_i, n_i, b_o, n_o)
@@ -137,10 +137,7 @@ def point_block(
     for k in range(tables.warp_start, tables.nodes.shape[0]):
         add_masking(R, tables, k, size, block, _WARP)
     _copy_threads(R, tables, sets, threads, psi0, w, first, size, block)
-    if _has_model(R, tables, THESIS):
-        _of_model(R, True, across_too, tables.overlap_precision, size, block)
-    if _has_model(R, tables, MICROCYLINDER):
-        _of_model(R, False, across_too, tables.overlap_precision, size, block)
+    _of_models(R, tables, across_too, size, block)
     divide(R, out, start, size, block)
 
 
@@ -160,7 +157,7 @@ def _copy_threads(R, tables, sets, threads, psi0, w, first, size, block):
         which, thread = sets[k], np.uintp(threads[k])
         block[_IS_WARP + x] = R(1) if which == WARP else R(0)
         block[_ACROSS + x] = w[k]
-        for column in range(_COLUMNS):
+        for column in range(POINT_COLUMNS):
             block[_THREAD + column * BLOCK + x] = tables.threads[thread, column]
         if which != WEFT and which != WARP:
             block[_THREAD + MODEL * BLOCK + x] = R(_NO_MODEL)
@@ -169,16 +166,8 @@ def _copy_threads(R, tables, sets, threads, psi0, w, first, size, block):
         block[_COS + x], block[_SIN + x] = cos(R, psi0[k]), sin(R, psi0[k])
 
 
-@njit(**INLINE)
-def _row_at(block, x):
-    """The columns of the point's thread, to be read as a row of the table."""
-    x += _THREAD
-    return (
-        block[x], block[x + BLOCK], block[x + 2 * BLOCK], block[x + 3 * BLOCK],
-        block[x + 4 * BLOCK], block[x + 5 * BLOCK], block[x + 6 * BLOCK], block[x + 7 * BLOCK],
-        block[x + 8 * BLOCK], block[x + 9 * BLOCK], block[x + 10 * BLOCK], block[x + 11 * BLOCK],
-        block[x + 12 * BLOCK],
-    )  # fmt: skip
+_row_at = tuple_reader(POINT_COLUMNS, BLOCK)
+"""(block, _THREAD + x): the columns of the point's thread, to be read as a row of the table."""
 
 
 @njit(**INLINE)
@@ -189,11 +178,13 @@ def _own(block, x, warp):
 
 
 @njit(**INLINE)
-def _of_model(R, thesis, across_too, precision, size, block):
+def _of_model(R, model, tables, across_too, size, block):
     """The value without `1/Q` of the points whose thread has the model, into the sums' rows."""
-    model = R(THESIS) if thesis else R(MICROCYLINDER)
+    if not _has_model(R, tables, model):
+        return
+    precision = tables.overlap_precision
     for x in range(size):
-        row = _row_at(block, x)
+        row = _row_at(block, _THREAD + x)
         c, s, warp = block[_COS + x], block[_SIN + x], block[_IS_WARP + x] > R(0)
         iz, oz = block[UP_I + x], block[UP_O + x]
         a_i, b_i = _own(block, AXIS_I + x, warp), _own(block, ACROSS_I + x, warp)
@@ -202,10 +193,13 @@ def _of_model(R, thesis, across_too, precision, size, block):
         u = _own(block, OVERLAP + x, warp)
         p = seen_along(R, c, s, a_i, iz, scale_i, a_o, oz, scale_o, u)
         surface, volume = _bit_of_thread(
-            R, thesis, across_too, row, precision, c, s, block[_ACROSS + x],
+            R, model, across_too, row, precision, c, s, block[_ACROSS + x],
             a_i, b_i, iz, a_o, b_o, oz,
         )  # fmt: skip
-        share = p if row[MODEL] == model else R(0)
+        share = p if row[MODEL] == R(model) else R(0)
         block[RED + x] += share * (surface + volume * row[ALBEDO_R])
         block[GREEN + x] += share * (surface + volume * row[ALBEDO_G])
         block[BLUE + x] += share * (surface + volume * row[ALBEDO_B])
+
+
+_of_models = for_each(_of_model, PUBLISHED_MODELS)

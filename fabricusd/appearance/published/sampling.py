@@ -35,10 +35,7 @@ from fabricusd.appearance.sampling.stretches import (
     nearest_stretch,
 )
 from fabricusd.appearance.sampling.views import share_at, uniform_direction, view_corner
-from fabricusd.appearance.scattering.terms import (
-    GAMMA_SURFACE,
-    GAMMA_VOLUME,
-)
+from fabricusd.appearance.scattering.columns import GAMMA_SURFACE, GAMMA_VOLUME
 from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.kernels.real import INLINE, PART, atan2, cos, sin
 

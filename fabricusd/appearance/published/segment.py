@@ -14,19 +14,14 @@ from fabricusd.appearance.frame import (
     WARP,
     cos_half_difference,
     cos_inclination,
-    half_inclination,
     unit_azimuth,
 )
-from fabricusd.appearance.scattering.lobes import gaussian
 from fabricusd.appearance.scattering.terms import (
-    GAMMA_SURFACE,
-    GAMMA_VOLUME,
-    ISOTROPIC,
-    SURFACE_GAUSSIAN,
-    VOLUME_GAUSSIAN,
-    published_terms,
+    cell_lobes,
+    published_factors,
+    published_lobes,
 )
-from fabricusd.kernels.real import INLINE, acos, erf, exp
+from fabricusd.kernels.real import INLINE, acos, exp
 
 
 @njit(**INLINE)
@@ -70,11 +65,34 @@ def seen_along(R, c, s, a_i, iz, scale_i, a_o, oz, scale_o, u):
 
 
 @njit(**INLINE)
-def segment(R, thesis, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
-    """`f_s M cos theta_i` as (surface, volume without `A`).
+def segment(R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
+    """`f_s M cos theta_i` as (surface, volume without `A`); model : the row's, a published one.
 
     Times `seen_along` it is the integrand of level `far`; 0 where `M` is.
     """
+    t_i, cos_i, _, t_o, cos_o, _, surface, volume = _masked_factors(
+        R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz
+    )
+    on_surface, on_volume = published_lobes(R, model, row, t_i, cos_i, t_o, cos_o)
+    return surface * on_surface, volume * on_volume
+
+
+@njit(**INLINE)
+def mean_segment(R, model, row, half, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
+    """`segment` with its lobes averaged over tangent angles `half` [rad] to each side."""
+    t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o, surface, volume = _masked_factors(
+        R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz
+    )
+    on_surface, on_volume = cell_lobes(
+        R, model, row, half, t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o
+    )
+    return surface * on_surface, volume * on_volume
+
+
+@njit(**INLINE)
+def _masked_factors(R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
+    """Sine and cosine of the inclination and cosine of the azimuth of wi and of wo; the model's
+    (surface, volume) factors times `M cos theta_i`."""
     t_i, n_i = c * a_i - s * iz, s * a_i + c * iz
     t_o, n_o = c * a_o - s * oz, s * a_o + c * oz
     cos_i, cos_o = cos_inclination(R, b_i, n_i), cos_inclination(R, b_o, n_o)
@@ -83,43 +101,5 @@ def segment(R, thesis, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
     cos_half = cos_half_difference(R, sin_phi_i, cos_phi_i, sin_phi_o, cos_phi_o)
     u = overlap(R, cos_half, precision)
     m = masked(R, max(cos_phi_i, R(0)), max(cos_phi_o, R(0)), u) * cos_i
-    surface, volume = published_terms(R, thesis, row, t_i, cos_i, t_o, cos_o, cos_half)
-    return surface * m, volume * m
-
-
-@njit(**INLINE)
-def cell_lobes(R, row, half, c, s, a_i, b_i, iz, a_o, b_o, oz):
-    """Surface and volume lobe averaged over a stretch of tangent angle, `half` [rad] to each side.
-
-    Across it theta_h is taken as linear in the tangent angle, with slope
-    -(cos phi_i + cos phi_o)/2: exact in the plane of the thread, an approximation out of it.
-    """
-    t_i, n_i = c * a_i - s * iz, s * a_i + c * iz
-    t_o, n_o = c * a_o - s * oz, s * a_o + c * oz
-    cos_i, cos_o = cos_inclination(R, b_i, n_i), cos_inclination(R, b_o, n_o)
-    _, cos_phi_i = unit_azimuth(R, b_i, n_i, cos_i)
-    _, cos_phi_o = unit_azimuth(R, b_o, n_o, cos_o)
-    theta_h = half_inclination(R, t_i, cos_i, t_o, cos_o)
-    reach = R(0.5) * abs(cos_phi_i + cos_phi_o) * half
-    surface = mean_gaussian(
-        R, row[GAMMA_SURFACE], row[SURFACE_GAUSSIAN], row[SURFACE_GAUSSIAN + 1], theta_h, reach
-    )
-    volume = mean_gaussian(
-        R, row[GAMMA_VOLUME], row[VOLUME_GAUSSIAN], row[VOLUME_GAUSSIAN + 1], theta_h, reach
-    )
-    kd = row[ISOTROPIC]
-    return surface, (R(1) - kd) * volume + kd
-
-
-@njit(**INLINE)
-def mean_gaussian(R, width, half_precision, norm, x, reach):
-    """Mean of the Gaussian over [x - reach, x + reach]."""
-    ratio = reach / width
-    if ratio < R(0.05):
-        # The difference of error functions would cancel; two terms of its series do not.
-        z = x / width
-        g = gaussian(R, half_precision, norm, x)
-        return g * (R(1) + (z * z - R(1)) * ratio * ratio * R(1.0 / 6.0))
-    scale = R(math.sqrt(0.5)) / width
-    high, low = erf(R, (x + reach) * scale), erf(R, (x - reach) * scale)
-    return R(0.25) * (high - low) / reach
+    surface, volume = published_factors(R, model, row, t_i, cos_i, t_o, cos_o, cos_half)
+    return t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o, surface * m, volume * m

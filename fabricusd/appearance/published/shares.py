@@ -46,7 +46,7 @@ from fabricusd.appearance.sampling.stretches import (
     VOLUME_WIDTH,
     stretches_of,
 )
-from fabricusd.appearance.scattering.terms import GAMMA_SURFACE, GAMMA_VOLUME
+from fabricusd.appearance.scattering.columns import GAMMA_SURFACE, GAMMA_VOLUME
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE, KERNEL, whole
 
@@ -85,7 +85,6 @@ def _in_single_precision(tables: SurfaceTables) -> SurfaceTables:
     """Shares need no more, and one kernel serves both precisions."""
     return tables._replace(
         threads=tables.threads.astype(np.float32),
-        smooth=tables.smooth.astype(np.float32),
         nodes=tables.nodes.astype(np.float32),
         gap=np.float32(tables.gap),
         overlap_precision=np.float32(tables.overlap_precision),

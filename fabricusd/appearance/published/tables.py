@@ -7,13 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.scattering.columns import LAW
+from fabricusd.appearance.scattering.model import PUBLISHED
+from fabricusd.appearance.scattering.models import model_of
 from fabricusd.appearance.scattering.table import pack_threads
-from fabricusd.appearance.scattering.terms import (
-    CONSERVING,
-    MODEL,
-    SURFACE_GAUSSIAN,
-    VOLUME_GAUSSIAN,
-)
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.quadrature import Rule, curve_nodes, default_rule
 from fabricusd.errors import FabricError
@@ -33,9 +30,8 @@ NARROWEST_MASKING = 1e-6
 class SurfaceTables(NamedTuple):
     """Arrays of one fabric for the surface law; `real` is the precision asked for.
 
-    threads : (k, COLUMNS) real - see `thread_terms`
-    smooth : (k, COLUMNS) real - the same with both lobes replaced by 1: the factors beside them
-    nodes : (q, 4) real - NODE_ columns, weft nodes first; those of `conserving` threads included
+    threads : (k, COLUMNS) real - see `scattering.columns`
+    nodes : (q, 4) real - NODE_ columns, weft nodes first; those of conserving threads included
     node_thread : (q,) int32
     published : (q,) uint8 - 1 where the node's thread has a published model
     warp_start : int - nodes from here on are warp
@@ -44,7 +40,6 @@ class SurfaceTables(NamedTuple):
     """
 
     threads: Reals
-    smooth: Reals
     nodes: Reals
     node_thread: NDArray[np.int32]
     published: NDArray[np.uint8]
@@ -62,21 +57,29 @@ def surface_tables(
     """Tables of `fabric` in `precision`; `rule` None takes `quadrature.default_rule`."""
     if precision not in (np.float32, np.float64):
         raise FabricError("precision", f"is {precision!r}; it must be float32 or float64")
-    q = curve_nodes(fabric, rule or default_rule(fabric))
+    cells = has_cell_lobes(fabric)
+    q = curve_nodes(fabric, rule or default_rule(fabric, cells=cells))
+    if not cells and q.half.any():
+        raise FabricError(
+            "rule",
+            f"averages lobes over cells, which a model of {fabric.name} has no formula for; "
+            "its form must be points",
+        )
     threads = pack_threads(fabric, np.float64)
-    smooth = threads.copy()
-    for first in (SURFACE_GAUSSIAN, VOLUME_GAUSSIAN):
-        # g(x) = norm exp(-half_precision x^2) = 1
-        smooth[:, first : first + 2] = (0.0, 1.0)
     width = max(fabric.masking_width, NARROWEST_MASKING)
     nodes = np.stack((np.cos(q.psi0), np.sin(q.psi0), q.weight, q.half), axis=1)
     return SurfaceTables(
         threads=threads.astype(precision),
-        smooth=smooth.astype(precision),
         nodes=np.ascontiguousarray(nodes, dtype=precision),
         node_thread=q.thread,
-        published=(threads[q.thread, MODEL] != CONSERVING).astype(np.uint8),
+        published=(threads[q.thread, LAW] == PUBLISHED).astype(np.uint8),
         warp_start=q.warp_start,
         gap=precision(coverage(fabric).gap),
         overlap_precision=precision(2.0 / width**2),
     )
+
+
+def has_cell_lobes(fabric: Fabric) -> bool:
+    """Whether the lobes of all threads that follow the published law have a mean over a cell."""
+    models = [model_of(fabric, t) for t in fabric.thread_list]
+    return all(m.cell_lobes is not None for m in models if m.law == PUBLISHED)

@@ -7,7 +7,7 @@ import math
 from numba import njit
 
 from fabricusd.appearance.frame import cos_inclination, unit_azimuth
-from fabricusd.appearance.scattering.terms import GAMMA_SURFACE
+from fabricusd.appearance.scattering.columns import GAMMA_SURFACE
 from fabricusd.kernels.real import INLINE, erf, exp
 
 ACROSS_MINIMUM = 0.1

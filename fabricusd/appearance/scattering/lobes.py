@@ -16,6 +16,8 @@ from fabricusd.kernels.real import INLINE, exp, i0e
 NARROWEST = 1e-6
 """Standard deviation below which a lobe is taken as this wide [rad]: its peak and 1/s^2 stay finite
 in float32, and no float32 direction resolves it."""
+COS_MINIMUM = 1e-6
+"""Floor of a cosine that is divided by."""
 LARGEST_IOR = 1e8
 """Index of refraction above which reflection is total to float32's rounding."""
 

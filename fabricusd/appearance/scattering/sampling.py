@@ -2,13 +2,14 @@
 
 A mixture, each of its lobes exact in closed form per steradian:
 
-- surface, azimuth by cos(phi_d/2)/4: theta_i normal with about twice gs, cut at +-90 degrees;
+- surface, azimuth by cos(phi_d/2)/4: theta_i normal with the model's width, about twice gs, cut at
+  +-90 degrees;
 - surface, azimuth uniform: where Fresnel's rise towards phi_d = 180 degrees evens the cosine out;
-- volume: the same with gv, azimuth uniform;
+- volume: the same with its own width, azimuth uniform;
 - isotropic: uniform on the sphere.
 
-The shares follow estimates of the terms' energies; the isotropic lobe keeps at least a tenth, which
-bounds the weight of every direction. Source: MODEL section 6.
+The shares follow the model's estimates of its terms' energies; the isotropic lobe keeps at least a
+tenth, which bounds the weight of every direction. Source: MODEL section 6.
 """
 
 from __future__ import annotations
@@ -18,20 +19,14 @@ import math
 from numba import njit
 
 from fabricusd.appearance.frame import cos_inclination, unit_azimuth
-from fabricusd.appearance.scattering.lobes import fresnel
-from fabricusd.appearance.scattering.terms import (
-    BRIGHTNESS,
-    CONSERVING,
-    COS_MINIMUM,
-    GAMMA_SURFACE,
-    GAMMA_VOLUME,
-    INVERSE_T_MAX,
+from fabricusd.appearance.scattering.columns import (
     IOR_EXCESS,
-    ISOTROPIC,
     MODEL,
-    pair_angles,
-    transmission,
+    SURFACE_WIDTH,
+    VOLUME_WIDTH,
 )
+from fabricusd.appearance.scattering.lobes import COS_MINIMUM, fresnel
+from fabricusd.appearance.scattering.terms import energies, pair_angles
 from fabricusd.kernels.real import INLINE, PART, asin, atan2, cos, erf, erfinv, exp, sin
 
 ISOTROPIC_SHARE = 0.1
@@ -41,14 +36,14 @@ _SQRT_2 = math.sqrt(2.0)
 
 
 @njit(**INLINE)
-def inclination_lobe(R, gamma, sin_o, cos_o):
+def inclination_lobe(R, wide, sin_o, cos_o):
     """(mean, deviation, narrowing) [rad] of the normal distribution that stands for a lobe.
 
-    The lobe is g(gamma, theta_h) cos^2(theta_i)/cos^2(theta_d); the cosines, to second order around
-    the mirror direction, narrow it and shift it towards the normal plane. Towards grazing views
-    that expansion fails and is faded out. `narrowing` is the deviation over 2 gamma: its energy.
+    The lobe has the deviation `wide` in theta_i, times cos^2(theta_i)/cos^2(theta_d); the cosines,
+    to second order around the mirror direction, narrow it and shift it towards the normal plane.
+    Towards grazing views that expansion fails and is faded out. `narrowing` is the deviation over
+    `wide`: its energy.
     """
-    wide = R(2) * gamma
     narrowing = R(1) / math.sqrt(R(1) + R(1.5) * cos_o * wide * wide)
     deviation = wide * narrowing
     shift = sin_o * cos_o * deviation * deviation
@@ -59,27 +54,20 @@ def inclination_lobe(R, gamma, sin_o, cos_o):
 def lobe_shares(R, row, cos_o, narrow_s, narrow_v):
     """(surface by cosine, surface uniform, volume): shares of the mixture; isotropic the rest.
 
-    narrow_s, narrow_v : `narrowing` of `inclination_lobe` for gs and gv
+    narrow_s, narrow_v : `narrowing` of `inclination_lobe` for both widths
     """
-    kd = row[ISOTROPIC]
     # F cos(phi_d/2) at theta_d = -theta_o as a + b cos(phi_d/2), through phi_d = 0 and 120 degrees.
     f_0, transmitted = fresnel(R, row[IOR_EXCESS], cos_o)
     f_1, _ = fresnel(R, row[IOR_EXCESS], R(0.5) * cos_o)
     even = max(f_1 - f_0, R(0))
     by_cosine = max(R(2) * f_0 - f_1, R(0))
-    if row[MODEL] == R(CONSERVING):
-        through = transmission(R, row, cos_o)
-        surface = (R(1) - through) / max(R(2 * math.pi) * even + R(4) * by_cosine, R(1e-30))
-        whole = through * through * row[INVERSE_T_MAX] * row[BRIGHTNESS]
-        isotropic = kd * whole
-        volume = (R(1) - kd) * whole
-    else:
-        surface = R(2) * narrow_s
-        whole = R(2 * math.pi) * transmitted * transmitted * row[BRIGHTNESS]
-        volume = (R(1) - kd) * whole * narrow_v / max(cos_o, row[GAMMA_VOLUME])
-        isotropic = kd * whole / max(cos_o, R(0.2))
-    even *= R(2 * math.pi) * surface
-    by_cosine *= R(4) * surface
+    even *= R(2 * math.pi)
+    by_cosine *= R(4)
+    surface, volume, isotropic = energies(
+        R, int(row[MODEL]), row, cos_o, transmitted, even + by_cosine, narrow_s, narrow_v
+    )
+    even *= surface
+    by_cosine *= surface
     # A black, unreflecting thread scatters nothing; any density will do.
     total = max(even + by_cosine + volume + isotropic, R(1e-30))
     scale = min(R(1) / total, R(1 - ISOTROPIC_SHARE) / max(total - isotropic, R(1e-30)))
@@ -114,8 +102,8 @@ def density(R, row, ix, iy, iz, ox, oy, oz):
     """pdf(wi) [1/sr] of `sample_direction`, over the whole sphere."""
     cos_i, cos_o, cos_half = pair_angles(R, iy, iz, oy, oz)
     theta_i = atan2(R, ix, cos_i)
-    mean_s, deviation_s, narrow_s = inclination_lobe(R, row[GAMMA_SURFACE], ox, cos_o)
-    mean_v, deviation_v, narrow_v = inclination_lobe(R, row[GAMMA_VOLUME], ox, cos_o)
+    mean_s, deviation_s, narrow_s = inclination_lobe(R, row[SURFACE_WIDTH], ox, cos_o)
+    mean_v, deviation_v, narrow_v = inclination_lobe(R, row[VOLUME_WIDTH], ox, cos_o)
     by_cosine, even, volume = lobe_shares(R, row, cos_o, narrow_s, narrow_v)
     around = R(0.25) * cos_half * by_cosine + R(0.5 / math.pi) * even
     p = around * cut_normal(R, theta_i, mean_s, deviation_s)
@@ -129,8 +117,8 @@ def sample_direction(R, row, ox, oy, oz, u0, u1, u2):
     """wi in the thread frame for three numbers in [0, 1): lobe, inclination, azimuth."""
     cos_o = cos_inclination(R, oy, oz)
     sin_phi_o, cos_phi_o = unit_azimuth(R, oy, oz, cos_o)
-    mean_s, deviation_s, narrow_s = inclination_lobe(R, row[GAMMA_SURFACE], ox, cos_o)
-    mean_v, deviation_v, narrow_v = inclination_lobe(R, row[GAMMA_VOLUME], ox, cos_o)
+    mean_s, deviation_s, narrow_s = inclination_lobe(R, row[SURFACE_WIDTH], ox, cos_o)
+    mean_v, deviation_v, narrow_v = inclination_lobe(R, row[VOLUME_WIDTH], ox, cos_o)
     by_cosine, even, volume = lobe_shares(R, row, cos_o, narrow_s, narrow_v)
     turn = R(2) * u2 - R(1)
     # The integral of cos(phi_d/2)/4 is (1 + sin(phi_d/2))/2.

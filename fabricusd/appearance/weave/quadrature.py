@@ -119,9 +119,21 @@ def count_nodes(fabric: Fabric, rule: Rule) -> int:
     )
 
 
-def default_rule(fabric: Fabric) -> Rule:
-    """`DEFAULT`, or `NARROW` where points would be too many."""
-    return DEFAULT if count_nodes(fabric, DEFAULT) <= MOST_NODES else NARROW
+def default_rule(fabric: Fabric, *, cells: bool = True) -> Rule:
+    """`DEFAULT`, or `NARROW` where points would be too many.
+
+    cells : whether the threads' lobes have means over cells; without them points lie farther apart
+    """
+    if cells:
+        return DEFAULT if count_nodes(fabric, DEFAULT) <= MOST_NODES else NARROW
+    return fewer_points(fabric, DEFAULT.spacing, MOST_NODES)
+
+
+def fewer_points(fabric: Fabric, spacing: float, most: int) -> Rule:
+    """Points `spacing` lobe widths apart, or as much farther as it takes for at most `most`."""
+    while count_nodes(fabric, Rule(POINTS, spacing)) > most and spacing < 1e9:
+        spacing *= 1.5
+    return Rule(POINTS, spacing)
 
 
 def _counts(p: Pieces, width: float, rule: Rule) -> NDArray[np.int64]:

@@ -21,7 +21,7 @@ from fabricusd.appearance.published.blocks import NOTHING
 from fabricusd.appearance.published.far import normalization
 from fabricusd.appearance.published.segment import along_set, seen_along, segment
 from fabricusd.appearance.published.tables import surface_tables
-from fabricusd.appearance.scattering.terms import GAMMA_SURFACE, MODEL, THESIS
+from fabricusd.appearance.scattering.columns import GAMMA_SURFACE, MODEL
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.lookup import NO_THREAD
 from fabricusd.bake.manifest_file import file_in, read_manifest
@@ -217,7 +217,7 @@ def _stretch(  # type: ignore[no-untyped-def]
         angle = min(max(angle, -0.5 * math.pi), 0.5 * math.pi)
         c, s = math.cos(angle), math.sin(angle)
         surface, volume = segment(
-            R, row[MODEL] == THESIS, row, tables.overlap_precision,
+            R, int(row[MODEL]), row, tables.overlap_precision,
             c, s, a_i, b_i, iz, a_o, b_o, oz,
         )  # fmt: skip
         p = seen_along(R, c, s, a_i, iz, s_i, a_o, oz, s_o, u) / nodes

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.scattering.model import CONSERVING, PUBLISHED
+from fabricusd.appearance.scattering.models import model_of, names
 from fabricusd.appearance.surface import points_all
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -61,11 +63,12 @@ def reflectance_table(fabric: Fabric) -> NDArray[np.float64]:
 def refuse_conserving(fabric: Fabric) -> None:
     """Raise FabricError where a thread's model is one that the baker does not know."""
     for name, thread in fabric.threads.items():
-        if fabric.model_of(thread) == "conserving":
+        if model_of(fabric, thread).law == CONSERVING:
+            baked = " or ".join(f"'{n}'" for n in sorted(names(PUBLISHED)))
             raise FabricError(
                 f"{fabric.name} {name} model",
-                "is 'conserving', whose light goes from thread to thread and is not baked; it must "
-                "be 'microcylinder' or 'thesis'",
+                f"is '{fabric.model_of(thread)}', whose light goes from thread to thread and is "
+                f"not baked; it must be {baked}",
             )
 
 

@@ -38,7 +38,7 @@ from fabricusd.appearance.sampling.stretches import (
 )
 from fabricusd.appearance.sampling.views import share_at, view_corner
 from fabricusd.appearance.scattering.across import across_deviation
-from fabricusd.appearance.scattering.terms import GAMMA_SURFACE, GAMMA_VOLUME
+from fabricusd.appearance.scattering.columns import GAMMA_SURFACE, GAMMA_VOLUME
 from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.kernels.real import INLINE, KERNEL, PART, atan2, cos, sin
 

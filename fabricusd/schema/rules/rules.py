@@ -280,6 +280,7 @@ def threads_used(prim: Usd.Prim) -> Iterator[Fault]:
 def albedo_is_safe(prim: Usd.Prim) -> Iterator[Fault]:
     """In no view does the fabric send back more light than it gets."""
     from fabricusd.appearance.albedo import QUICK, WORST_VIEWS, albedo_by_view, safe_albedo
+    from fabricusd.appearance.scattering.models import model_of
     from fabricusd.schema.read import read_side
 
     try:
@@ -295,8 +296,13 @@ def albedo_is_safe(prim: Usd.Prim) -> Iterator[Fault]:
             f"white is safe up to {safe:.2g}, or fabric:model conserving",
         )
     for name, thread in fabric.threads.items():
-        if fabric.model_of(thread) == "conserving" and max(thread.albedo) > 1.0:
-            yield "fabric:threads", f"{name} has an albedo above 1, which conserving takes as 1"
+        most = model_of(fabric, thread).most_albedo
+        if max(thread.albedo) > most:
+            yield (
+                "fabric:threads",
+                f"{name} has an albedo above {most:g}, which {fabric.model_of(thread)} takes as "
+                f"{most:g}",
+            )
 
 
 # ---- FabricThread -------------------------------------------------------------------------------

@@ -13,6 +13,8 @@ from fabricusd.appearance.accuracy import choose_rule, measure_rule, spread_pair
 from fabricusd.appearance.law import surface_law
 from fabricusd.appearance.published.far import far_value, far_values, normalization
 from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.scattering import models
+from fabricusd.appearance.scattering.model import PUBLISHED as LAW
 from fabricusd.appearance.weave.quadrature import (
     CANDIDATES,
     CELLS,
@@ -29,7 +31,7 @@ from fabricusd.fabric import DEGREE, TangentCurve
 from tests.appearance.directions import random_directions
 from tests.appearance.presets import PRESETS, with_model
 
-PUBLISHED = ("thesis", "microcylinder")
+PUBLISHED = models.names(LAW)
 CASES = [(n, m) for n in PRESETS for m in PUBLISHED]
 STEPS = TangentCurve(
     positions=(0, 1, 1, 3, 3, 4), angles=tuple(x * DEGREE for x in (-30, -30, 8, 8, 41, 41))

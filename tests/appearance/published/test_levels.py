@@ -21,6 +21,8 @@ from fabricusd.appearance.law import (
 from fabricusd.appearance.published.far import far_value, normalization
 from fabricusd.appearance.published.levels import point_value, point_values
 from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.scattering import models
+from fabricusd.appearance.scattering.model import PUBLISHED as LAW
 from fabricusd.appearance.shadow.methods import METHODS, compile_shadow, mean_lit, shadowing
 from fabricusd.appearance.weave.compiled import compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
@@ -31,7 +33,7 @@ from tests.appearance.directions import VIEWS, direction, random_directions
 from tests.appearance.presets import PRESETS, with_model
 
 R = np.float64
-PUBLISHED = ("thesis", "microcylinder")
+PUBLISHED = models.names(LAW)
 CASES = [(n, m) for n in PRESETS for m in PUBLISHED]
 WI, WO = random_directions(12, 1), random_directions(12, 2)
 
