@@ -17,31 +17,23 @@ from fabricusd.appearance.conserving.multiple import (
     conserving_tables,
     conserving_value,
 )
-from fabricusd.appearance.conserving.sampling import (
-    ConservingSamplingTables,
-    conserving_density,
-    conserving_direction,
-    conserving_point_density,
-    conserving_point_direction,
-)
-from fabricusd.appearance.conserving.shares import conserving_sampling_tables
+from fabricusd.appearance.conserving.shares import conserving_mixture
 from fabricusd.appearance.conserving.single import (
     ConservingTables,
     single_tables,
 )
 from fabricusd.appearance.published.far import far_value
 from fabricusd.appearance.published.levels import point_value
-from fabricusd.appearance.published.sampling import (
-    SamplingTables,
-    far_density,
-    far_direction,
+from fabricusd.appearance.published.shares import published_mixture
+from fabricusd.appearance.published.tables import SurfaceTables, surface_tables
+from fabricusd.appearance.sampling.fit import no_mixture
+from fabricusd.appearance.sampling.mixture import (
+    Mixture,
+    density,
+    direction,
     point_density,
     point_direction,
 )
-from fabricusd.appearance.published.shares import sampling_tables
-from fabricusd.appearance.published.tables import SurfaceTables, surface_tables
-from fabricusd.appearance.sampling.share_fit import AZIMUTHS, ELEVATIONS
-from fabricusd.appearance.sampling.stretches import STRETCH_COLUMNS
 from fabricusd.appearance.scattering.models import any_conserving, any_published
 from fabricusd.appearance.weave.quadrature import Rule
 from fabricusd.fabric import Fabric
@@ -64,9 +56,9 @@ class SurfaceLaw(NamedTuple):
 
     kind: int
     published: SurfaceTables
-    lobes: SamplingTables
+    lobes: Mixture
     conserving: ConservingTables
-    conserving_lobes: ConservingSamplingTables
+    conserving_lobes: Mixture
 
 
 def surface_law(
@@ -85,18 +77,15 @@ def surface_law(
     if any_conserving(fabric):
         kind = MIXED if any_published(fabric) else CONSERVING_ONLY
     published = surface_tables(fabric, precision=precision, rule=rule)
-    nothing = np.zeros((0, STRETCH_COLUMNS), precision)
-    none = np.zeros((ELEVATIONS, AZIMUTHS, 0), precision)
-    lobes = SamplingTables(nothing, none, none)
+    lobes = no_mixture(precision)
     if kind != CONSERVING_ONLY:
-        lobes = sampling_tables(fabric, published)
+        lobes = published_mixture(fabric, published)
     if kind == PUBLISHED_ONLY:
         conserving = single_tables(fabric, precision=precision, rule=rule)
-        shares = np.zeros((ELEVATIONS, AZIMUTHS, 2), precision)
-        both = ConservingSamplingTables(nothing, shares, none, 0)
+        both = no_mixture(precision, sides=2, cosines=1)
     else:
         conserving = conserving_tables(fabric, precision=precision, multiple=multiple, rule=rule)
-        both = conserving_sampling_tables(fabric, conserving)
+        both = conserving_mixture(fabric, conserving)
     return SurfaceLaw(kind, published, lobes, conserving, both)
 
 
@@ -134,19 +123,19 @@ def law_density(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, 
     p, q = R(0), R(0)
     if law.kind != CONSERVING_ONLY:
         if level == FAR:
-            p = far_density(R, law.lobes, ix, iy, iz, ox, oy, oz)
+            p = density(R, law.lobes, ix, iy, iz, ox, oy, oz)
         else:
             p = point_density(
-                R, law.published, law.lobes, level == THREAD, thread_set, thread, psi0, w,
+                R, law.published.threads, law.lobes, level == THREAD, thread_set, thread, psi0, w,
                 ix, iy, iz, ox, oy, oz,
             )  # fmt: skip
     if law.kind != PUBLISHED_ONLY:
         if level == FAR:
-            q = conserving_density(R, law.conserving_lobes, ix, iy, iz, ox, oy, oz)
+            q = density(R, law.conserving_lobes, ix, iy, iz, ox, oy, oz)
         else:
-            q = conserving_point_density(
-                R, law.conserving, law.conserving_lobes, level == THREAD, thread_set, thread,
-                psi0, w, ix, iy, iz, ox, oy, oz,
+            q = point_density(
+                R, law.conserving.threads, law.conserving_lobes, level == THREAD, thread_set,
+                thread, psi0, w, ix, iy, iz, ox, oy, oz,
             )  # fmt: skip
     # A viewer below the cloth sees no published model: all directions are the other's.
     if law.kind == MIXED and oz > R(0):
@@ -163,14 +152,14 @@ def law_direction(R, law, level, thread_set, thread, psi0, w, ox, oy, oz, u0, u1
         u0 = R(2) * u0 if published else R(2) * u0 - R(1)
     if published:
         if level == FAR:
-            return far_direction(R, law.lobes, ox, oy, oz, u0, u1, u2)
+            return direction(R, law.lobes, ox, oy, oz, u0, u1, u2)
         return point_direction(
-            R, law.published, law.lobes, level == THREAD, thread_set, thread, psi0, w,
+            R, law.published.threads, law.lobes, level == THREAD, thread_set, thread, psi0, w,
             ox, oy, oz, u0, u1, u2,
         )  # fmt: skip
     if level == FAR:
-        return conserving_direction(R, law.conserving_lobes, ox, oy, oz, u0, u1, u2)
-    return conserving_point_direction(
-        R, law.conserving, law.conserving_lobes, level == THREAD, thread_set, thread, psi0, w,
-        ox, oy, oz, u0, u1, u2,
+        return direction(R, law.conserving_lobes, ox, oy, oz, u0, u1, u2)
+    return point_direction(
+        R, law.conserving.threads, law.conserving_lobes, level == THREAD, thread_set, thread,
+        psi0, w, ox, oy, oz, u0, u1, u2,
     )  # fmt: skip

@@ -10,7 +10,7 @@ is at or below the cloth.
     thread  the same, and the place across the thread
 
 Arrays are float64 and exact to rounding; the kernels behind them take float32 as well and are what
-the path tracer calls: `far`, `levels`, `surface_sampling`. Source: `docs/model.md` sections 4-6.
+the path tracer calls: `far`, `levels`, `mixture`. Source: `docs/model.md` sections 4-6.
 """
 
 from __future__ import annotations

@@ -45,8 +45,9 @@ from fabricusd.appearance.scattering.terms import (
 )
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEFAULT_MODEL, MODELS, Thread
-from fabricusd.kernels.choice import specialised, tuple_reader
+from fabricusd.kernels.choice import specialised
 from fabricusd.kernels.real import INLINE, KERNEL
+from fabricusd.kernels.unrolled import tuple_reader
 
 __all__ = [
     "ALBEDO_B",

@@ -50,19 +50,6 @@ def for_each(body: Any, numbers: Iterable[int]) -> Any:
     return chain
 
 
-def tuple_reader(count: int, stride: int = 1) -> Any:
-    """A kernel `read(numbers, first)`: a tuple of `count` entries from `first`, `stride` apart.
-
-    For loops that read constants: of loads from an array LLVM would have to assume that every store
-    into another one changes them.
-    """
-    entries = ", ".join(f"numbers[first + {k * stride}]" for k in range(count))
-    made: dict[str, Any] = {"__name__": __name__}
-    # numba wants every index of a tuple's making spelt out, which nobody should count by hand.
-    exec(f"def read(numbers, first):\n    return ({entries},)", made)
-    return njit(**INLINE)(made["read"])
-
-
 @njit(**INLINE)
 def _nothing(R, *rest):
     pass

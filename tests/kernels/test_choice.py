@@ -1,10 +1,11 @@
-"""Functions chosen by number, and tuples read from arrays, as kernels use them."""
+"""Functions chosen by number, and tuples written out, as kernels use them."""
 
 import numpy as np
 from numba import njit
 
-from fabricusd.kernels.choice import by_number, for_each, specialised, tuple_reader
+from fabricusd.kernels.choice import by_number, for_each, specialised
 from fabricusd.kernels.real import INLINE, KERNEL
+from fabricusd.kernels.unrolled import sum_of_products, tuple_of, tuple_reader
 
 R = np.float64
 
@@ -28,6 +29,20 @@ _chosen = by_number({0: _double, 3: _square, 5: _double})
 _noted = specialised(_note, (1, 2))
 _noted_all = for_each(_note, (0, 2, 3))
 _read = tuple_reader(3, stride=2)
+_dot = sum_of_products(3)
+
+
+@njit(**INLINE)
+def _power(R, k, x):
+    return x**k
+
+
+_powers = tuple_of(_power, 3)
+
+
+@njit(**KERNEL)
+def _polynomial(R, x):
+    return _dot(_powers(R, x), (1.0, 2.0, 3.0))
 
 
 @njit(**KERNEL)
@@ -70,3 +85,7 @@ def test_for_each_runs_all_numbers_once():
 
 def test_a_tuple_is_read_from_an_array_in_strides():
     assert _sum(np.arange(10), 1) == 1 + 30 + 500
+
+
+def test_a_tuple_is_made_of_numbered_entries():
+    assert _polynomial(R, 2.0) == 1 + 4 + 12

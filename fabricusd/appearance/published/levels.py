@@ -46,8 +46,9 @@ from fabricusd.appearance.scattering.columns import (
 )
 from fabricusd.appearance.scattering.model import PUBLISHED
 from fabricusd.appearance.scattering.models import PUBLISHED_MODELS
-from fabricusd.kernels.choice import for_each, tuple_reader
+from fabricusd.kernels.choice import for_each
 from fabricusd.kernels.real import INLINE, KERNEL, PART, cos, index, sin
+from fabricusd.kernels.unrolled import tuple_reader
 
 _WARP = 13 * BLOCK
 """Where the warp's nine rows start; the weft's are the block's own."""

@@ -22,10 +22,10 @@ def narrower(R, gamma, c, s, thread_set, w, ix, iy, iz, ox, oy, oz):
 
 
 @njit(**INLINE)
-def narrow_direction(R, gamma, c, s, psi0, thread_set, w, ox, oy, oz, u1, u2):
-    """A direction of the surface lobe at the place w across its thread."""
+def narrow_direction(R, gamma, width, c, s, psi0, thread_set, w, ox, oy, oz, u1, u2):
+    """A direction of the surface lobe, `width` [rad] wide, at the place w across its thread."""
     t_o, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
     theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
     phi_o, beta = azimuth_seen(R, b_o, n_o), across_deviation(R, gamma)
-    t, b, n = sample_across(R, psi0, s / c, R(2) * gamma, theta_o, phi_o, w, beta, u1, u2)
+    t, b, n = sample_across(R, psi0, s / c, width, theta_o, phi_o, w, beta, u1, u2)
     return from_thread(R, thread_set, c, s, t, b, n)

@@ -35,6 +35,9 @@ STEEPEST = math.radians(89.5)
 
 SURFACE, VOLUME, ISOTROPIC = 0, 1, 2
 """The lobes of one thread, in the order of every table."""
+THREAD_LOBES = 3
+"""To add a lobe: its number above, its density in `lobe_densities`, and how it is drawn in
+`sample_lobe` and `sample_any_lobe`; all else counts to THREAD_LOBES."""
 
 _HALF_PI = math.pi / 2
 _SQRT_2 = math.sqrt(2.0)
@@ -68,7 +71,7 @@ def sample_cut_normal(R, u, mean, deviation, low, high):
 
 @njit(**INLINE)
 def lobe_densities(R, psi0, tangent, surface, volume, theta_o, t, b, n):
-    """Densities [1/sr] of the three lobes at a direction (t, b, n) of the thread frame.
+    """Densities [1/sr] of the lobes at a direction (t, b, n) of the thread frame.
 
     The direction is above the cloth and n > 0; tangent : tan psi0; surface, volume : the normals'
     deviations [rad].
@@ -85,6 +88,12 @@ def lobe_densities(R, psi0, tangent, surface, volume, theta_o, t, b, n):
     on_volume = cut_normal(R, theta, mean, volume, low, high) * inverse * around
     cosine = R(1) / math.sqrt(R(1) + tangent * tangent)
     return on_surface, on_volume, R(2 / math.pi) * n / (R(1) + cosine)
+
+
+@njit(**INLINE)
+def narrowed(densities, by):
+    """`lobe_densities` with the surface lobe's multiplied by `density_across`."""
+    return densities[SURFACE] * by, densities[VOLUME], densities[ISOTROPIC]
 
 
 _NARROWEST = 2e-3
@@ -150,10 +159,26 @@ def sample_across(R, psi0, tangent, deviation, theta_o, phi_o, w, beta, u1, u2):
 
 
 @njit(**INLINE)
-def sample_lobe(R, lobe, psi0, tangent, deviation, theta_o, u1, u2):
-    """(t, b, n) of the thread frame from `lobe`, whose normal has `deviation` [rad]."""
+def sample_lobe(R, lobe, psi0, tangent, surface, volume, theta_o, u1, u2):
+    """(t, b, n) of the thread frame from `lobe`; surface, volume : the deviations [rad]."""
     if lobe == ISOTROPIC:
         return _sample_cosine(R, tangent, u1, u2)
+    width = surface if lobe == SURFACE else volume
+    return _sample_normal(R, psi0, tangent, width, theta_o, u1, u2)
+
+
+@njit(**INLINE)
+def sample_any_lobe(R, lobe, psi0, tangent, surface, volume, theta_o, u1, u2):
+    """`sample_lobe` without a branch, for loops to be vectorised; lobe : a number of type R."""
+    width = surface if lobe == R(SURFACE) else volume
+    t, b, n = _sample_normal(R, psi0, tangent, width, theta_o, u1, u2)
+    ti, bi, ni = _sample_cosine(R, tangent, u1, u2)
+    isotropic = lobe == R(ISOTROPIC)
+    return (ti if isotropic else t), (bi if isotropic else b), (ni if isotropic else n)
+
+
+@njit(**INLINE)
+def _sample_normal(R, psi0, tangent, deviation, theta_o, u1, u2):
     low, high = theta_range(R, psi0)
     mean = min(max(-theta_o, low), high)
     theta = sample_cut_normal(R, u1, mean, deviation, low, high)

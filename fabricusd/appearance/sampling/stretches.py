@@ -15,6 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.sampling.lobes import STEEPEST
+from fabricusd.appearance.scattering.models import model_of
 from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage
 from fabricusd.appearance.weave.curve import pieces
 from fabricusd.fabric import Fabric, TangentCurve
@@ -44,8 +45,10 @@ def stretches_of(fabric: Fabric) -> NDArray[np.float64]:
                 psi0 = min(max(middle, -STEEPEST), STEEPEST)
                 # A tangent turned by x moves the mirror inclination by up to 2 x.
                 widths = [
-                    math.hypot(2 * g, 2 * deviation)
-                    for g in (thread.gamma_surface, thread.gamma_volume)
+                    math.hypot(width, 2 * deviation)
+                    for width in model_of(fabric, thread).widths(
+                        thread.gamma_surface, thread.gamma_volume
+                    )
                 ]
                 rows.append((j, k, psi0, math.cos(psi0), math.sin(psi0), math.tan(psi0), *widths))
     return np.array(rows, np.float64).reshape(-1, STRETCH_COLUMNS)

@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fabricusd.appearance.published.levels import point_values
-from fabricusd.appearance.published.sampling import SamplingTables
-from fabricusd.appearance.published.shares import sampling_tables
+from fabricusd.appearance.published.shares import published_mixture
 from fabricusd.appearance.published.tables import SurfaceTables, surface_tables
+from fabricusd.appearance.sampling.blocks import sample_points
+from fabricusd.appearance.sampling.fit import no_mixture
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.fabric import Fabric
@@ -32,7 +33,6 @@ from fabricusd.reference.stages.hits import prepare
 from fabricusd.reference.stages.shadow_rays import settle, thin_out
 from fabricusd.reference.surfaces.fabric import finish_point, look_up
 from fabricusd.reference.surfaces.fabric_far import shade_far
-from fabricusd.reference.surfaces.fabric_sampling import sample_points
 from fabricusd.reference.surfaces.preview import build_surfaces, shade_preview
 from fabricusd.scene.scene import Camera, Mesh, PreviewSurface, Scene
 
@@ -76,16 +76,12 @@ def _prepare() -> None:
     )  # fmt: skip
 
 
-def _no_lobes() -> SamplingTables:
-    return SamplingTables(*(np.zeros(shape, np.float32) for shape in ((0, 8), *2 * [(1, 1, 0)])))
-
-
 def _shade_far() -> None:
-    shade_far(R, _cloth()[1], _no_lobes(), R(0), _sample().wave.hits, 0, 0)
+    shade_far(R, _cloth()[1], no_mixture(R), R(0), _sample().wave.hits, 0, 0)
 
 
 def _share_lobes() -> None:
-    sampling_tables(*_cloth())
+    published_mixture(*_cloth())
 
 
 def _arrive() -> None:
@@ -159,7 +155,7 @@ def _sample_points() -> None:
     sets, threads, _, across, psi0, _ = _scratch()
     hits, vectors = _sample().wave.hits, np.zeros((3, 0), np.float32)
     sample_points(
-        R, _cloth()[1], _no_lobes(), False, sets, threads, psi0, across, vectors, vectors,
+        R, _cloth()[1].threads, no_mixture(R), False, sets, threads, psi0, across, vectors, vectors,
         *hits[CHANCE : CHANCE + 3], vectors, hits[F_PDF], hits[GO_PDF], 0, 0,
     )  # fmt: skip
 

@@ -24,6 +24,7 @@ from fabricusd.appearance.law import (
     surface_law,
 )
 from fabricusd.appearance.published.levels import point_values
+from fabricusd.appearance.sampling.blocks import sample_points
 from fabricusd.appearance.shadow.methods import NONE, Shadow, compile_shadow, shade
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, WARP
@@ -46,7 +47,6 @@ from fabricusd.reference.rays.wave import (
     Wave,
 )
 from fabricusd.reference.surfaces.fabric_far import STRAIGHT, finish_far, gather, shade_far
-from fabricusd.reference.surfaces.fabric_sampling import sample_points
 
 R = np.float32
 _ONE_AT_A_TIME = threading.Lock()
@@ -164,9 +164,8 @@ class FabricShader:
         look_up(R, cloth, v_sign, hits, first, *found)
         if law.kind == PUBLISHED_ONLY:
             sample_points(
-                R, law.published, law.lobes, level == THREAD_LEVEL, sets, threads, psi0, across,
-                wo, wi,
-                *hits[CHANCE : CHANCE + 3], go, hits[F_PDF], hits[GO_PDF], first,
+                R, law.published.threads, law.lobes, level == THREAD_LEVEL, sets, threads, psi0,
+                across, wo, wi, *hits[CHANCE : CHANCE + 3], go, hits[F_PDF], hits[GO_PDF], first,
                 count,
             )  # fmt: skip
             near = (R, law.published, level == THREAD_LEVEL, sets, threads, psi0, across)

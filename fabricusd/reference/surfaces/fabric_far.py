@@ -9,9 +9,9 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.published.far import far_values
+from fabricusd.appearance.sampling.blocks import BLOCK, sample_far
 from fabricusd.kernels.real import KERNEL, LEAN, as_part
 from fabricusd.reference.rays.wave import CHANCE, F_PDF, GO, GO_PDF, KEEP, THREAD, WEIGHT, WI, WO, F
-from fabricusd.reference.surfaces.fabric_sampling import BLOCK, sample_far
 
 STRAIGHT = np.float32(-1)
 """In GO_PDF: the path goes straight on."""

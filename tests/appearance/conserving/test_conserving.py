@@ -10,11 +10,8 @@ from numba import njit, prange
 from fabricusd.appearance import plain
 from fabricusd.appearance.conserving import multiple
 from fabricusd.appearance.conserving import single as conserving
-from fabricusd.appearance.conserving.sampling import (
-    conserving_density,
-    conserving_direction,
-)
-from fabricusd.appearance.conserving.shares import conserving_sampling_tables
+from fabricusd.appearance.conserving.shares import conserving_mixture
+from fabricusd.appearance.sampling.mixture import density, direction
 from fabricusd.appearance.weave.quadrature import POINTS, Rule
 from fabricusd.errors import FabricError
 from fabricusd.fabric import TangentCurve
@@ -59,12 +56,12 @@ def _value(tables, wi, wo):
 def _draw(R, tables, sampling, wo, n, wi, pdf):
     """The R2 sequence, the first number in order: lobes are strata of it."""
     for k in prange(n):
-        x, y, z = conserving_direction(
+        x, y, z = direction(
             R, sampling, wo[0], wo[1], wo[2], R((k + 0.5) / n),
             R((0.5 + k * 0.7548776662466927) % 1.0), R((0.5 + k * 0.5698402909980532) % 1.0),
         )  # fmt: skip
         wi[k, 0], wi[k, 1], wi[k, 2] = x, y, z
-        pdf[k] = conserving_density(R, sampling, x, y, z, wo[0], wo[1], wo[2])
+        pdf[k] = density(R, sampling, x, y, z, wo[0], wo[1], wo[2])
 
 
 def _given_back(tables, sampling, wo, n):
@@ -108,7 +105,7 @@ def test_cloth_is_reciprocal(name, multiple_too):
 @pytest.mark.parametrize("name", CLOTHS)
 def test_single_scattering_is_passive_to_the_horizon(name):
     tables = _tables(name, False)
-    sampling = conserving_sampling_tables(WHITE[name], tables)
+    sampling = conserving_mixture(WHITE[name], tables)
     for degrees in (0, 45, 75, 89, 89.9):
         given_back = sum(_given_back(tables, sampling, _view(degrees, 30), 4096))
         assert 0 < given_back <= tables.covered + 1e-4, degrees
@@ -118,7 +115,7 @@ def test_single_scattering_is_passive_to_the_horizon(name):
 def test_white_cloth_gives_everything_back(name):
     # MODEL section 7: reflected + transmitted + gap = 1.
     tables = _tables(name)
-    sampling = conserving_sampling_tables(WHITE[name], tables)
+    sampling = conserving_mixture(WHITE[name], tables)
     gap = 1.0 - tables.covered
     views = [(d, a) for d in (0, 30, 60, 75, 85) for a in (5, 130)]
     found = [sum(_given_back(tables, sampling, _view(*v), 1 << 14)) + gap - 1 for v in views]
@@ -134,7 +131,7 @@ def test_cloth_that_loses_its_multiple_scattering_does_not(name):
     # The twin of the test above, with a strength that is 5 % wrong.
     tables = _tables(name)
     wrong = tables._replace(strength=0.95 * tables.strength)
-    sampling = conserving_sampling_tables(WHITE[name], wrong)
+    sampling = conserving_mixture(WHITE[name], wrong)
     given_back = sum(_given_back(wrong, sampling, _view(30, 50), 1 << 14))
     assert given_back + 1.0 - tables.covered < 1 - 0.005
 
@@ -142,7 +139,7 @@ def test_cloth_that_loses_its_multiple_scattering_does_not(name):
 def test_a_grazing_view_of_white_cloth_gains_nothing_either():
     for name in WOVEN:
         tables = _tables(name)
-        sampling = conserving_sampling_tables(WHITE[name], tables)
+        sampling = conserving_mixture(WHITE[name], tables)
         for degrees in (88, 89.9):
             total = sum(_given_back(tables, sampling, _view(degrees, 50), 1 << 14))
             assert abs(total - tables.covered) < 0.005, (name, degrees)

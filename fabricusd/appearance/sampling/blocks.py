@@ -1,9 +1,9 @@
-"""The samplers of published cloth, many hits at a time.
+"""`mixture`, for many hits at a time: the densities and directions of one side of the cloth.
 
-The same lobes, shares and densities as `appearance.surface_sampling`, whose scalar functions are
-what these loops are tested against; here each hit's shares are read once for one drawing and two
-densities, and loops run over hits so that LLVM vectorises them. All rows of a block lie in one
-array, their distances known to the compiler, which therefore need not check them for overlap.
+Here each hit's shares are read once for one drawing and two densities, and loops run over hits so
+that LLVM vectorises them; the scalar functions of `mixture` are what they are tested against. The
+mixtures are of one side, without cosine lobes, as those of published cloth. All rows of a block
+lie in one array, their distances known to the compiler, which need not check them for overlap.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ import math
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.published.sampling import UNIFORM
 from fabricusd.appearance.sampling.lobes import (
-    ISOTROPIC,
     STEEPEST,
     SURFACE,
-    VOLUME,
+    THREAD_LOBES,
     azimuth_seen,
     density_across,
     lobe_densities,
+    narrowed,
     sample_across,
-    sample_lobe,
+    sample_any_lobe,
 )
+from fabricusd.appearance.sampling.mixture import mixed
 from fabricusd.appearance.sampling.share_fit import AZIMUTHS
 from fabricusd.appearance.sampling.stretches import (
     COS,
@@ -37,24 +37,29 @@ from fabricusd.appearance.sampling.stretches import (
     nearest_stretch,
 )
 from fabricusd.appearance.sampling.views import share_at, view_corner
+from fabricusd.appearance.scattering import columns
 from fabricusd.appearance.scattering.across import across_deviation
-from fabricusd.appearance.scattering.columns import GAMMA_SURFACE, GAMMA_VOLUME
 from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.kernels.real import INLINE, KERNEL, PART, atan2, cos, sin
+from fabricusd.kernels.unrolled import tuple_reader
 
 BLOCK = 256
-_EVEN = 3
+_EVEN = THREAD_LOBES
 """In place of a lobe: uniform over the hemisphere."""
 
 # Rows of a block: the viewer, the light, the drawn direction; the stretch of thread it is drawn
-# from; two uniform numbers; both densities; three shares; where the view lies on their grid; the
-# place across the thread and what that makes of both surface densities; after that the shares of
-# all lobes.
+# from, with its thread's surface lobe; two uniform numbers; both densities; where the view lies on
+# the grid of shares; the place across the thread and what that makes of both surface densities; the
+# shares of one stretch's lobes, and after them those of all.
 (_OX, _OY, _OZ, _IX, _IY, _IZ, _GX, _GY, _GZ, _WARP, _PSI0, _COS, _SIN, _TAN, _ON_SURFACE,
- _ON_VOLUME, _LOBE, _U1, _U2, _P_LIGHT, _P_GO, _A, _B, _D, _ELEVATION, _AZIMUTH, _UP, _ROUND,
- _W, _NARROW_LIGHT, _NARROW_GO, _SHARES) = (
-    row * BLOCK for row in range(32)
+ _ON_VOLUME, _GAMMA, _LOBE, _U1, _U2, _P_LIGHT, _P_GO, _ELEVATION, _AZIMUTH, _UP, _ROUND, _W,
+ _NARROW_LIGHT, _NARROW_GO, _OURS) = (
+    row * BLOCK for row in range(30)
 )  # fmt: skip
+_SHARES = _OURS + THREAD_LOBES * BLOCK
+
+_shares_of = tuple_reader(THREAD_LOBES, BLOCK)
+"""(block, _OURS + x): shares of the lobes of the stretch at hand."""
 
 
 @njit(**INLINE)
@@ -66,13 +71,11 @@ def _into(R, warp, c, s, x, y, z):
 
 
 @njit(**INLINE)
-def _lobes_at(R, warp, psi0, c, s, tangent, surface, volume, theta_o, x, y, z, a, b, d):
-    """The lobes' densities at a direction, times their shares a, b, d; 0 behind the thread."""
+def _lobes_at(R, warp, psi0, c, s, tangent, surface, volume, theta_o, x, y, z, shares, narrow):
+    """The lobes' densities at a direction, times their shares; 0 behind the thread."""
     t, across, n = _into(R, warp, c, s, x, y, z)
-    on_surface, on_volume, isotropic = lobe_densities(
-        R, psi0, tangent, surface, volume, theta_o, t, across, max(n, R(1e-12))
-    )
-    p = a * on_surface + b * on_volume + d * isotropic
+    found = lobe_densities(R, psi0, tangent, surface, volume, theta_o, t, across, max(n, R(1e-12)))
+    p = mixed(shares, narrowed(found, narrow))
     return p if n > R(0) else R(0)
 
 
@@ -123,9 +126,9 @@ def _read_shares(R, shares, size, block, mixed):
 
 
 @njit(**INLINE)
-def _choose(R, shares, count, u0, block, x):
+def _choose(R, even, shares, count, u0, block, x):
     """Lobe of `count` that u0 falls on, -1 for none of them: uniform."""
-    left = u0 - R(UNIFORM)
+    left = u0 - even
     if left < R(0) or count == 0:
         return -1
     k = 0
@@ -146,13 +149,10 @@ def _draw(R, size, block):
         u1, u2 = block[_U1 + x], block[_U2 + x]
         t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
         theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-        on_surface, on_volume = block[_ON_SURFACE + x], block[_ON_VOLUME + x]
-        width = on_surface if lobe == R(SURFACE) else on_volume
-        psi0, tangent = block[_PSI0 + x], block[_TAN + x]
-        t, b, n = sample_lobe(R, VOLUME, psi0, tangent, width, theta_o, u1, u2)
-        ti, bi, ni = sample_lobe(R, ISOTROPIC, psi0, tangent, width, theta_o, u1, u2)
-        isotropic = lobe == R(ISOTROPIC)
-        t, b, n = (ti if isotropic else t), (bi if isotropic else b), (ni if isotropic else n)
+        t, b, n = sample_any_lobe(
+            R, lobe, block[_PSI0 + x], block[_TAN + x], block[_ON_SURFACE + x],
+            block[_ON_VOLUME + x], theta_o, u1, u2,
+        )  # fmt: skip
         along, z = c * t + s * n, c * n - s * t
         gx, gy = warp * -b + (R(1) - warp) * along, warp * along + (R(1) - warp) * b
         flat = math.sqrt(max(R(0), (R(1) - u1) * (R(1) + u1)))
@@ -185,7 +185,7 @@ def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first, n):
     wo, wi, go : (3, n) real; u0, u1, u2, p_light, p_go : rows of which hits `first`... are used
     """
     stretches = sampling.stretches
-    lobes = 3 * stretches.shape[0]
+    lobes = THREAD_LOBES * stretches.shape[0]
     block = np.empty(_SHARES + lobes * BLOCK, wo.dtype)
     mixed = np.empty(lobes * BLOCK, wo.dtype)
     for start in range(0, n, BLOCK):
@@ -195,23 +195,23 @@ def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first, n):
         _read_shares(R, sampling.shares, size, block, mixed)
         for x in range(size):
             h = first + start + x
-            k = _choose(R, _SHARES, lobes, u0[h], block, x)
+            k = _choose(R, sampling.even, _SHARES, lobes, u0[h], block, x)
             block[_U1 + x], block[_U2 + x] = u1[h], u2[h]
-            block[_LOBE + x] = R(_EVEN) if k < 0 else R(k % 3)
+            block[_LOBE + x] = R(_EVEN) if k < 0 else R(k % THREAD_LOBES)
             if lobes == 0:
                 block[_WARP + x] = block[_PSI0 + x] = block[_SIN + x] = block[_TAN + x] = R(0)
                 block[_COS + x] = block[_ON_SURFACE + x] = block[_ON_VOLUME + x] = R(1)
                 continue
-            row = stretches[max(k, 0) // 3]
+            row = stretches[max(k, 0) // THREAD_LOBES]
             block[_WARP + x] = R(1) if int(row[SET]) == WARP else R(0)
             block[_PSI0 + x], block[_COS + x] = row[PSI0], row[COS]
             block[_SIN + x], block[_TAN + x] = row[SIN], row[TAN]
             block[_ON_SURFACE + x], block[_ON_VOLUME + x] = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
         _draw(R, size, block)
         for x in range(size):
-            block[_P_LIGHT + x] = block[_P_GO + x] = R(UNIFORM / (2 * math.pi))
+            block[_P_LIGHT + x] = block[_P_GO + x] = sampling.even * R(1 / (2 * math.pi))
         for y in range(stretches.shape[0]):
-            _add_stretch(R, stretches[y], _SHARES + 3 * y * BLOCK, size, block)
+            _add_stretch(R, stretches[y], _SHARES + THREAD_LOBES * y * BLOCK, size, block)
         _store(R, start, size, block, go, p_light, p_go, first)
 
 
@@ -222,57 +222,42 @@ def _add_stretch(R, row, shares, size, block):
     psi0, c, s, tangent = row[PSI0], row[COS], row[SIN], row[TAN]
     surface, volume = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
     # To a known place: a distance that the compiler does not know would keep the loop scalar.
-    for x in range(3 * BLOCK):
-        block[_A + x] = block[shares + x]
+    for x in range(THREAD_LOBES * BLOCK):
+        block[_OURS + x] = block[shares + x]
     for x in range(size):
         t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
         theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-        a, b, d = block[_A + x], block[_B + x], block[_D + x]
+        ours = _shares_of(block, _OURS + x)
         block[_P_LIGHT + x] += _lobes_at(
             R, warp, psi0, c, s, tangent, surface, volume, theta_o,
-            block[_IX + x], block[_IY + x], block[_IZ + x], a, b, d,
+            block[_IX + x], block[_IY + x], block[_IZ + x], ours, R(1),
         )  # fmt: skip
         block[_P_GO + x] += _lobes_at(
             R, warp, psi0, c, s, tangent, surface, volume, theta_o,
-            block[_GX + x], block[_GY + x], block[_GZ + x], a, b, d,
+            block[_GX + x], block[_GY + x], block[_GZ + x], ours, R(1),
         )  # fmt: skip
 
 
 @njit(**KERNEL)
-def sample_points(R, tables, sampling, across_too, sets, threads, psi0, w, wo, wi, u0, u1, u2, go,
+def sample_points(R, table, sampling, across_too, sets, threads, psi0, w, wo, wi, u0, u1, u2, go,
                   p_light, p_go, first, n):  # fmt: skip
     """As `sample_far` with `point_direction` and `point_density`, at the threads found.
 
-    sets, threads, psi0, w : (n,) what lies under each hit; a gap is sampled uniformly
+    table : rows of `pack_threads`; sets, threads, psi0, w : (n,) what lies under each hit; a gap is
+    sampled uniformly
     """
-    count = sampling.stretches.shape[0]
     block = np.empty(_SHARES, wo.dtype)
     for start in range(0, n, BLOCK):
         size = min(BLOCK, n - start)
         _load(wo, wi, start, size, block)
         _find_views(R, size, block)
+        _find_threads(R, table, sampling, sets, threads, psi0, w, start, size, block)
         for x in range(size):
             h = first + start + x
             block[_U1 + x], block[_U2 + x] = u1[h], u2[h]
-            on_thread = sets[start + x] <= WARP and count > 0
-            thread_set, thread, angle = 0, 0, R(0)
-            if on_thread:
-                thread_set, thread = sets[start + x], threads[start + x]
-                angle = min(max(psi0[start + x], R(-STEEPEST)), R(STEEPEST))
-            row = tables.threads[thread]
-            block[_WARP + x] = R(1) if thread_set == WARP else R(0)
-            block[_PSI0 + x], block[_W + x] = angle, w[start + x]
-            block[_ON_SURFACE + x] = R(2) * row[GAMMA_SURFACE]
-            block[_ON_VOLUME + x] = R(2) * row[GAMMA_VOLUME]
-            a = b = d = R(0)
-            if on_thread:
-                k = 3 * nearest_stretch(R, sampling.stretches, thread_set, thread, psi0[start + x])
-                corner = _corner(block, x)
-                a = share_at(R, sampling.point_shares, corner, k + SURFACE)
-                b = share_at(R, sampling.point_shares, corner, k + VOLUME)
-                d = share_at(R, sampling.point_shares, corner, k + ISOTROPIC)
-            block[_A + x], block[_B + x], block[_D + x] = a, b, d
-            k = _choose(R, _A, 3 if on_thread else 0, u0[h], block, x)
+            on_thread = sets[start + x] <= WARP and sampling.stretches.shape[0] > 0
+            count = THREAD_LOBES if on_thread else 0
+            k = _choose(R, sampling.even, _OURS, count, u0[h], block, x)
             block[_LOBE + x] = R(_EVEN) if k < 0 else R(k)
         _turn(R, size, block)
         _draw(R, size, block)
@@ -282,8 +267,34 @@ def sample_points(R, tables, sampling, across_too, sets, threads, psi0, w, wo, w
             block[_NARROW_LIGHT + x] = block[_NARROW_GO + x] = R(1)
         if across_too:
             _narrow(R, size, block)
-        _add_points(R, size, block)
+        _add_points(R, sampling.even, size, block)
         _store(R, start, size, block, go, p_light, p_go, first)
+
+
+@njit(**PART)
+def _find_threads(R, table, sampling, sets, threads, psi0, w, start, size, block):
+    """The thread under each hit, with the shares of its lobes; 0 in a gap."""
+    for x in range(size):
+        on_thread = sets[start + x] <= WARP and sampling.stretches.shape[0] > 0
+        thread_set, thread, angle = 0, 0, R(0)
+        if on_thread:
+            thread_set, thread = sets[start + x], threads[start + x]
+            angle = min(max(psi0[start + x], R(-STEEPEST)), R(STEEPEST))
+        row = table[thread]
+        block[_WARP + x] = R(1) if thread_set == WARP else R(0)
+        block[_PSI0 + x], block[_W + x] = angle, w[start + x]
+        block[_ON_SURFACE + x] = row[columns.SURFACE_WIDTH]
+        block[_ON_VOLUME + x] = row[columns.VOLUME_WIDTH]
+        block[_GAMMA + x] = row[columns.GAMMA_SURFACE]
+        k = 0
+        if on_thread:
+            k = nearest_stretch(R, sampling.stretches, thread_set, thread, psi0[start + x])
+        corner = _corner(block, x)
+        for lobe in range(THREAD_LOBES):
+            share = R(0)
+            if on_thread:
+                share = share_at(R, sampling.point_shares, corner, THREAD_LOBES * k + lobe)
+            block[_OURS + lobe * BLOCK + x] = share
 
 
 @njit(**PART)
@@ -304,7 +315,7 @@ def _draw_across(R, size, block):
         width = block[_ON_SURFACE + x]
         t, b, n = sample_across(
             R, block[_PSI0 + x], block[_TAN + x], width, theta_o, azimuth_seen(R, b_o, n_o),
-            block[_W + x], across_deviation(R, R(0.5) * width), block[_U1 + x], block[_U2 + x],
+            block[_W + x], across_deviation(R, block[_GAMMA + x]), block[_U1 + x], block[_U2 + x],
         )  # fmt: skip
         along, z = c * t + s * n, c * n - s * t
         ours = block[_LOBE + x] == R(SURFACE)
@@ -321,7 +332,7 @@ def _narrow(R, size, block):
         warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
         _, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
         phi_o, w = azimuth_seen(R, b_o, n_o), block[_W + x]
-        beta, tangent = across_deviation(R, R(0.5) * block[_ON_SURFACE + x]), block[_TAN + x]
+        beta, tangent = across_deviation(R, block[_GAMMA + x]), block[_TAN + x]
         t, b, n = _into(R, warp, c, s, block[_IX + x], block[_IY + x], block[_IZ + x])
         block[_NARROW_LIGHT + x] = density_across(
             R, tangent, phi_o, w, beta, t, b, max(n, R(1e-12))
@@ -331,22 +342,23 @@ def _narrow(R, size, block):
 
 
 @njit(**PART)
-def _add_points(R, size, block):
+def _add_points(R, uniform, size, block):
     """Both densities at each hit's own stretch."""
     for x in range(size):
         warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
         t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
         theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-        a, b, d = block[_A + x], block[_B + x], block[_D + x]
+        ours = _shares_of(block, _OURS + x)
         angle, tangent = block[_PSI0 + x], block[_TAN + x]
         surface, volume = block[_ON_SURFACE + x], block[_ON_VOLUME + x]
         # Without a thread all shares are 0 and the whole is uniform.
-        even = R(UNIFORM / (2 * math.pi)) if a + b + d > R(0) else R(1 / (2 * math.pi))
+        even = R(1 / (2 * math.pi))
+        even = uniform * even if mixed(ours, ours) > R(0) else even
         block[_P_LIGHT + x] = even + _lobes_at(
             R, warp, angle, c, s, tangent, surface, volume, theta_o,
-            block[_IX + x], block[_IY + x], block[_IZ + x], a * block[_NARROW_LIGHT + x], b, d,
+            block[_IX + x], block[_IY + x], block[_IZ + x], ours, block[_NARROW_LIGHT + x],
         )  # fmt: skip
         block[_P_GO + x] = even + _lobes_at(
             R, warp, angle, c, s, tangent, surface, volume, theta_o,
-            block[_GX + x], block[_GY + x], block[_GZ + x], a * block[_NARROW_GO + x], b, d,
+            block[_GX + x], block[_GY + x], block[_GZ + x], ours, block[_NARROW_GO + x],
         )  # fmt: skip

@@ -9,9 +9,7 @@ from scipy import stats
 
 from fabricusd.appearance import surface
 from fabricusd.appearance.sampling.lobes import (
-    ISOTROPIC,
-    SURFACE,
-    VOLUME,
+    THREAD_LOBES,
     lobe_densities,
     sample_lobe,
     theta_range,
@@ -100,7 +98,7 @@ def test_each_lobe_integrates_to_one_in_its_own_frame(psi0, theta_o):
     turn = 0.5 * math.pi * (x + 1)
     theta = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(turn)
     weight = wx * 0.25 * math.pi * (high - low) * np.sin(turn)
-    total = np.zeros(3)
+    total = np.zeros(THREAD_LOBES)
     for t, wt in zip(theta, weight, strict=True):
         limit = math.acos(min(max(math.tan(t) * math.tan(psi0), 0.0), 1.0))
         for f, wf in zip(0.5 * limit * (y + 1), wy * limit, strict=True):
@@ -110,16 +108,16 @@ def test_each_lobe_integrates_to_one_in_its_own_frame(psi0, theta_o):
                 math.sin(t), c * math.sin(f), c * math.cos(f),
             )  # fmt: skip
             total += np.array(d) * c * wt * wf
-    assert total == pytest.approx(np.ones(3), abs=1e-6)
+    assert total == pytest.approx(np.ones(THREAD_LOBES), abs=1e-6)
 
 
-@pytest.mark.parametrize("lobe", [SURFACE, VOLUME, ISOTROPIC])
+@pytest.mark.parametrize("lobe", range(THREAD_LOBES))
 @pytest.mark.parametrize("psi0", [0.0, 0.6, -1.2, 1.56])
 @pytest.mark.parametrize("theta_o", [0.0, 1.5, -1.5])
 def test_a_lobe_never_draws_below_the_cloth_or_behind_its_thread(lobe, psi0, theta_o):
     for u1 in (0.0, 1e-9, 0.3, 0.999999, 1.0):
         for u2 in (0.0, 0.5, 1.0):
-            t, b, n = sample_lobe(R, lobe, psi0, math.tan(psi0), 0.2, theta_o, u1, u2)
+            t, b, n = sample_lobe(R, lobe, psi0, math.tan(psi0), 0.2, 0.2, theta_o, u1, u2)
             assert t * t + b * b + n * n == pytest.approx(1.0, abs=1e-12)
             assert n >= 0.0
             assert math.cos(psi0) * n - math.sin(psi0) * t >= -1e-9

@@ -5,16 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fabricusd.appearance.published.sampling import (
-    far_density,
-    far_direction,
-    point_density,
-    point_direction,
-)
-from fabricusd.appearance.published.shares import sampling_tables
+from fabricusd.appearance.published.shares import published_mixture
 from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.sampling.blocks import sample_far, sample_points
+from fabricusd.appearance.sampling.mixture import density as far_density
+from fabricusd.appearance.sampling.mixture import direction as far_direction
+from fabricusd.appearance.sampling.mixture import point_density, point_direction
 from fabricusd.appearance.weave.lookup import lookup
-from fabricusd.reference.surfaces.fabric_sampling import sample_far, sample_points
 from fabricusd.schema import load
 
 PRESETS = ("linen_plain", "polyester_satin_charmeuse", "silk_shot", "velvet")
@@ -36,7 +33,7 @@ def views(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def test_the_far_sampler_draws_the_same_directions_with_the_same_densities(preset):
     fabric = load(preset)
     tables = surface_tables(fabric, precision=R)
-    sampling = sampling_tables(fabric, tables)
+    sampling = published_mixture(fabric, tables)
     wo, wi, u = views(700)
     go, p_light, p_go = np.empty_like(wo), np.empty(705, R), np.empty(705, R)
     rows = [np.concatenate([np.zeros(5, R), row]) for row in u]
@@ -55,20 +52,20 @@ def test_the_far_sampler_draws_the_same_directions_with_the_same_densities(prese
 def test_the_sampler_at_a_point_does_too_and_gaps_are_uniform(preset, across_too):
     fabric = load(preset)
     tables = surface_tables(fabric, precision=R)
-    sampling = sampling_tables(fabric, tables)
+    sampling = published_mixture(fabric, tables)
     wo, wi, u = views(700)
     hit = lookup(fabric, np.random.default_rng(1).uniform(0, 40, (700, 2)))
     psi0 = hit.angle.astype(R)
     go, p_light, p_go = np.empty_like(wo), np.empty(700, R), np.empty(700, R)
     w = hit.across.astype(R)
     sample_points(
-        R, tables, sampling, across_too, hit.set, hit.thread, psi0, w, wo, wi, *u, go, p_light,
-        p_go, 0, 700,
+        R, tables.threads, sampling, across_too, hit.set, hit.thread, psi0, w, wo, wi, *u, go,
+        p_light, p_go, 0, 700,
     )  # fmt: skip
     for k in range(700):
         at = (across_too, int(hit.set[k]), int(hit.thread[k]), psi0[k], w[k])
-        one = point_direction(R, tables, sampling, *at, *wo[:, k], *u[:, k])
+        one = point_direction(R, tables.threads, sampling, *at, *wo[:, k], *u[:, k])
         assert go[:, k] == pytest.approx(one, abs=2e-5)
         for direction, density in ((go, p_go), (wi, p_light)):
-            expected = point_density(R, tables, sampling, *at, *direction[:, k], *wo[:, k])
+            expected = point_density(R, tables.threads, sampling, *at, *direction[:, k], *wo[:, k])
             assert density[k] == pytest.approx(expected, rel=2e-3, abs=1e-5)

@@ -1,0 +1,311 @@
+"""Importance sampling of cloth: one mixture of lobes, which every surface law hands its lobes to.
+
+A part of the directions is even over the sphere or the hemisphere. The rest goes to the lobes of
+`lobes`, THREAD_LOBES for each of the `stretches` of tangent angle, and to cosine lobes about the
+cloth's normal, which stand for light scattered more than once. Their shares are measured once per
+fabric and view, by `fit`; at a point of the weave only the lobes of the thread there take part.
+
+Below the cloth a lobe's directions are those above it, negated, around the mirror inclination of
+that side. A viewer below is one above with both directions negated: a law that is the same then has
+a mixture of two sides. A mixture of one side draws nothing below and has no viewers there.
+
+Source: `docs/model.md` section 6. Scalar kernels, precision `R` first; `blocks` has the same for
+many hits at a time.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from numba import njit
+from numpy.typing import NDArray
+
+from fabricusd.appearance.frame import from_thread, to_thread
+from fabricusd.appearance.sampling.across import narrow_direction, narrower
+from fabricusd.appearance.sampling.lobes import (
+    STEEPEST,
+    SURFACE,
+    THREAD_LOBES,
+    lobe_densities,
+    narrowed,
+    sample_lobe,
+)
+from fabricusd.appearance.sampling.stretches import (
+    COS,
+    PSI0,
+    SET,
+    SIN,
+    SURFACE_WIDTH,
+    TAN,
+    VOLUME_WIDTH,
+    nearest_stretch,
+)
+from fabricusd.appearance.sampling.views import share_at, uniform_direction, view_corner
+from fabricusd.appearance.scattering import columns
+from fabricusd.appearance.weave.coverage import WARP
+from fabricusd.kernels.real import INLINE, PART, atan2, cos, sin
+from fabricusd.kernels.unrolled import sum_of_products, tuple_of
+
+Reals = NDArray[Any]
+_GAMMA, _ON_SURFACE, _ON_VOLUME = (
+    columns.GAMMA_SURFACE, columns.SURFACE_WIDTH, columns.VOLUME_WIDTH,
+)  # fmt: skip
+
+
+class Mixture(NamedTuple):
+    """What the sampler reads; `real` is the law's precision.
+
+    stretches : (s, STRETCH_COLUMNS) real - see `stretches_of`
+    shares : (ELEVATIONS, AZIMUTHS, lobes) real - at level `far`, of the lobes in this order:
+        THREAD_LOBES of every stretch, above the cloth and then below, then the cosine lobes above
+        and below; a mixture of one side has none below. They sum to 1 - even at each view
+    point_shares : (ELEVATIONS, AZIMUTHS, s lobes) real - at a point of each stretch, in the same
+        order and with the same sum
+    even : real - share of directions that are even over the sphere, or the upper hemisphere: it
+        bounds the weight of what no lobe expects
+    sides : int - 1 or 2
+    opaque : int - 1 where nothing is drawn on the side that the viewer is not on
+    cosines : int - 1 where there are cosine lobes
+    """
+
+    stretches: Reals
+    shares: Reals
+    point_shares: Reals
+    even: Any
+    sides: int
+    opaque: int
+    cosines: int
+
+
+def count_lobes(stretches: int, sides: int, cosines: int) -> int:
+    """Lobes of a mixture, in `shares`; of one stretch, at a point of it."""
+    return sides * (THREAD_LOBES * stretches + cosines)
+
+
+@njit(**INLINE)
+def even_density(R, mixture, iz):
+    """Density [1/sr] of the even part, the viewer being above."""
+    if mixture.opaque != 0:
+        return R(0.5 / math.pi) if iz > R(0) else R(0)
+    return R(0.25 / math.pi)
+
+
+@njit(**INLINE)
+def even_direction(R, mixture, u0, u1, u2):
+    """A direction of the even part; u0 : in [0, even)."""
+    x, y, z = uniform_direction(R, u1, u2)
+    if mixture.opaque == 0 and u0 < R(0.5) * mixture.even:
+        return -x, -y, -z
+    return x, y, z
+
+
+@njit(**INLINE)
+def stretch_densities(R, c, s, psi0, tangent, surface_width, volume_width, thread_set,
+                      ix, iy, iz, ox, oy, oz):  # fmt: skip
+    """Densities [1/sr] of one tangent angle's lobes on wi's own side, the viewer being above."""
+    turn = R(1) if iz > R(0) else R(-1)
+    t, b, n = to_thread(R, thread_set, c, s, turn * ix, turn * iy, turn * iz)
+    t_o, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
+    theta_o = turn * atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
+    found = lobe_densities(
+        R, psi0, tangent, surface_width, volume_width, theta_o, t, b, max(n, R(1e-12))
+    )
+    # Behind the thread there is nothing; without a branch, since loops are vectorised.
+    return _times(R, R(1) if n > R(0) else R(0), found)
+
+
+@njit(**INLINE)
+def _product(R, k, factor, numbers):
+    return factor * numbers[k]
+
+
+@njit(**INLINE)
+def _share(R, k, shares, corner, first):
+    return share_at(R, shares, corner, first + k)
+
+
+_times = tuple_of(_product, THREAD_LOBES)
+_thread_shares = tuple_of(_share, THREAD_LOBES)
+mixed = sum_of_products(THREAD_LOBES)
+
+
+@njit(**PART)
+def density(R, mixture, ix, iy, iz, ox, oy, oz):
+    """pdf(wi) [1/sr] of `direction`, at level `far`; 0 at the horizon and where it never goes."""
+    if iz == R(0) or oz == R(0) or (mixture.sides == 1 and min(iz, oz) < R(0)):
+        return R(0)
+    if oz < R(0):
+        ix, iy, iz, ox, oy, oz = -ix, -iy, -iz, -ox, -oy, -oz
+    even = even_density(R, mixture, iz)
+    if even == R(0):
+        return even
+    corner = view_corner(R, ox, oy, oz)
+    lobes = THREAD_LOBES * mixture.stretches.shape[0]
+    side = 0 if iz > R(0) else 1
+    p = mixture.even * even
+    if mixture.cosines != 0:
+        share = share_at(R, mixture.shares, corner, mixture.sides * lobes + side)
+        p += share * abs(iz) * R(1 / math.pi)
+    for y in range(mixture.stretches.shape[0]):
+        row = mixture.stretches[y]
+        found = stretch_densities(
+            R, row[COS], row[SIN], row[PSI0], row[TAN], row[SURFACE_WIDTH], row[VOLUME_WIDTH],
+            int(row[SET]), ix, iy, iz, ox, oy, oz,
+        )  # fmt: skip
+        first = side * lobes + THREAD_LOBES * y
+        p += mixed(_thread_shares(R, mixture.shares, corner, first), found)
+    return p
+
+
+@njit(**INLINE)
+def _choose(R, shares, corner, first, count, left):
+    """The lobe of `count`, from `first` on, that `left` falls on."""
+    k = 0
+    while k < count - 1:
+        left -= share_at(R, shares, corner, first + k)
+        if left < R(0):
+            break
+        k += 1
+    return k
+
+
+@njit(**INLINE)
+def _drawn_lobe(mixture, stretches, k):
+    """`k`, or the cosine lobe above for the last, which lies below where the cloth is opaque:
+    rounding alone leads there, its share is 0."""
+    cosine = mixture.sides * THREAD_LOBES * stretches
+    if mixture.opaque != 0 and mixture.sides == 2 and k > cosine:
+        return cosine
+    return k
+
+
+@njit(**PART)
+def direction(R, mixture, ox, oy, oz, u0, u1, u2):
+    """wi (x, y, z) at level `far` for a viewer and three numbers in [0, 1)."""
+    flip = R(-1) if oz < R(0) and mixture.sides == 2 else R(1)
+    ox, oy, oz = flip * ox, flip * oy, flip * oz
+    left = u0 - mixture.even
+    count = mixture.shares.shape[2]
+    if left < R(0) or count == 0:
+        x, y, z = even_direction(R, mixture, u0, u1, u2)
+        return flip * x, flip * y, flip * z
+    corner = view_corner(R, ox, oy, oz)
+    k = _choose(R, mixture.shares, corner, 0, count, left)
+    k = _drawn_lobe(mixture, mixture.stretches.shape[0], k)
+    x, y, z = lobe_direction(R, mixture, k, ox, oy, oz, u1, u2)
+    return flip * x, flip * y, flip * z
+
+
+@njit(**INLINE)
+def lobe_direction(R, mixture, k, ox, oy, oz, u1, u2):
+    """A direction of lobe k in the order of `shares`, for a viewer above the cloth."""
+    lobes = THREAD_LOBES * mixture.stretches.shape[0]
+    if k >= mixture.sides * lobes:
+        below = k > mixture.sides * lobes
+        x, y, z = uniform_direction(R, math.sqrt(u1), u2)
+        turn = R(-1) if below else R(1)
+        return turn * x, turn * y, turn * z
+    row = mixture.stretches[(k % lobes) // THREAD_LOBES]
+    return _stretch_direction(
+        R, k % THREAD_LOBES, k >= lobes, row[COS], row[SIN], row[PSI0], row[TAN],
+        row[SURFACE_WIDTH], row[VOLUME_WIDTH], int(row[SET]), ox, oy, oz, u1, u2,
+    )  # fmt: skip
+
+
+@njit(**INLINE)
+def _stretch_direction(R, lobe, below, c, s, psi0, tangent, surface_width, volume_width, thread_set,
+                       ox, oy, oz, u1, u2):  # fmt: skip
+    """A direction of one of a tangent angle's lobes, above the cloth or below."""
+    turn = R(-1) if below else R(1)
+    t_o, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
+    theta_o = turn * atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
+    t, b, n = sample_lobe(R, lobe, psi0, tangent, surface_width, volume_width, theta_o, u1, u2)
+    x, y, z = from_thread(R, thread_set, c, s, t, b, n)
+    return turn * x, turn * y, turn * z
+
+
+@njit(**PART)
+def point_density(R, threads, mixture, across_too, thread_set, thread, psi0, w,
+                  ix, iy, iz, ox, oy, oz):  # fmt: skip
+    """pdf(wi) [1/sr] of `point_direction`; 0 at the horizon and where it never goes.
+
+    threads : rows of `pack_threads`; thread_set, thread, psi0, w : what `weave.find` gave
+    """
+    if iz == R(0) or oz == R(0) or (mixture.sides == 1 and min(iz, oz) < R(0)):
+        return R(0)
+    # The place across the thread narrows the lobe of viewers and light on the front.
+    narrow = across_too and oz > R(0) and iz > R(0)
+    if oz < R(0):
+        ix, iy, iz, ox, oy, oz = -ix, -iy, -iz, -ox, -oy, -oz
+    even = even_density(R, mixture, iz)
+    if thread_set > WARP or even == R(0) or mixture.stretches.shape[0] == 0:
+        return even
+    psi0 = min(max(psi0, R(-STEEPEST)), R(STEEPEST))
+    c, s = cos(R, psi0), sin(R, psi0)
+    row = threads[thread]
+    found = stretch_densities(
+        R, c, s, psi0, s / c, row[_ON_SURFACE], row[_ON_VOLUME], thread_set,
+        ix, iy, iz, ox, oy, oz,
+    )  # fmt: skip
+    if narrow:
+        by = narrower(R, row[_GAMMA], c, s, thread_set, w, ix, iy, iz, ox, oy, oz)
+        found = narrowed(found, by)
+    corner = view_corner(R, ox, oy, oz)
+    first = _first_at(R, mixture, thread_set, thread, psi0)
+    side = 0 if iz > R(0) else 1
+    p = mixture.even * even
+    if mixture.cosines != 0:
+        k = first + mixture.sides * THREAD_LOBES + side
+        p += share_at(R, mixture.point_shares, corner, k) * abs(iz) * R(1 / math.pi)
+    shares = _thread_shares(R, mixture.point_shares, corner, first + THREAD_LOBES * side)
+    return p + mixed(shares, found)
+
+
+@njit(**INLINE)
+def _lobes_at(mixture):
+    """Lobes at a point."""
+    return mixture.sides * (THREAD_LOBES + mixture.cosines)
+
+
+@njit(**INLINE)
+def _first_at(R, mixture, thread_set, thread, psi0):
+    """Where in `point_shares` those of the stretch start that a tangent angle is in."""
+    stretch = nearest_stretch(R, mixture.stretches, thread_set, thread, psi0)
+    return _lobes_at(mixture) * stretch
+
+
+@njit(**PART)
+def point_direction(R, threads, mixture, across_too, thread_set, thread, psi0, w,
+                    ox, oy, oz, u0, u1, u2):  # fmt: skip
+    """wi (x, y, z) at level `weave`, or `thread` if `across_too`.
+
+    A gap is sampled evenly.
+    """
+    flip = R(-1) if oz < R(0) and mixture.sides == 2 else R(1)
+    ox, oy, oz = flip * ox, flip * oy, flip * oz
+    gap = thread_set > WARP or mixture.stretches.shape[0] == 0
+    left = u0 - mixture.even
+    if gap or left < R(0):
+        x, y, z = even_direction(R, mixture, u0 * mixture.even if gap else u0, u1, u2)
+        return flip * x, flip * y, flip * z
+    psi0 = min(max(psi0, R(-STEEPEST)), R(STEEPEST))
+    c, s = cos(R, psi0), sin(R, psi0)
+    corner = view_corner(R, ox, oy, oz)
+    first = _first_at(R, mixture, thread_set, thread, psi0)
+    k = _choose(R, mixture.point_shares, corner, first, _lobes_at(mixture), left)
+    k = _drawn_lobe(mixture, 1, k)
+    row = threads[thread]
+    if across_too and flip > R(0) and k == SURFACE:
+        return narrow_direction(
+            R, row[_GAMMA], row[_ON_SURFACE], c, s, psi0, thread_set, w, ox, oy, oz, u1, u2
+        )
+    if k >= mixture.sides * THREAD_LOBES:
+        x, y, z = uniform_direction(R, math.sqrt(u1), u2)
+        turn = flip if k == mixture.sides * THREAD_LOBES else -flip
+        return turn * x, turn * y, turn * z
+    x, y, z = _stretch_direction(
+        R, k % THREAD_LOBES, k >= THREAD_LOBES, c, s, psi0, s / c, row[_ON_SURFACE],
+        row[_ON_VOLUME], thread_set, ox, oy, oz, u1, u2,
+    )  # fmt: skip
+    return flip * x, flip * y, flip * z
