@@ -22,6 +22,7 @@ from fabricusd.appearance.conserving.single import (
     ConservingTables,
     single_tables,
 )
+from fabricusd.appearance.levels import FAR, THREAD
 from fabricusd.appearance.published.far import far_value
 from fabricusd.appearance.published.levels import point_value
 from fabricusd.appearance.published.shares import published_mixture
@@ -38,9 +39,6 @@ from fabricusd.appearance.scattering.models import any_conserving, any_published
 from fabricusd.appearance.weave.quadrature import Rule
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import PART
-
-FAR, WEAVE, THREAD = 0, 1, 2
-"""Levels, in the order of `surface.LEVELS`."""
 
 PUBLISHED_ONLY, CONSERVING_ONLY, MIXED = 0, 1, 2
 """Values of `SurfaceLaw.kind`."""

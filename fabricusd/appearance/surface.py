@@ -27,15 +27,13 @@ from fabricusd.appearance.conserving.levels import conserving_level_value
 from fabricusd.appearance.conserving.multiple import conserving_value
 from fabricusd.appearance.law import (
     CONSERVING_ONLY,
-    FAR,
     PUBLISHED_ONLY,
-    THREAD,
     SurfaceLaw,
     law_density,
     law_direction,
     surface_law,
 )
-from fabricusd.appearance.published.blocks import BLOCK
+from fabricusd.appearance.levels import FAR, LEVELS, THREAD
 from fabricusd.appearance.published.far import far_values
 from fabricusd.appearance.published.levels import POINT_ROWS, point_block, point_values
 from fabricusd.appearance.shadow.methods import (
@@ -50,23 +48,19 @@ from fabricusd.appearance.shadow.place_blocks import (
     ANGLE,
     INT_ROWS,
     LIT,
+    OF_SET,
+    OF_THREAD,
     REAL_ROWS,
-    SET,
     S,
     look_up_block,
-)
-from fabricusd.appearance.shadow.place_blocks import (
-    THREAD as THREAD_ROW,
 )
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.lookup import WeaveHit, lookup
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
-from fabricusd.kernels.real import KERNEL, index
+from fabricusd.kernels.real import BLOCK, KERNEL, index
 
 Floats = NDArray[np.float64]
-
-LEVELS = ("far", "weave", "thread")
 
 _CHUNK = 32 * BLOCK
 """Directions that one worker takes at a time."""
@@ -333,7 +327,7 @@ def _weave_chunk(R, cloth, shadow, tables, uv, wi, wo, out, first, last):
         horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
         mean_block(R, shadow, wi, begin, size, ints, reals)
         point_block(
-            R, tables, False, ints[SET:], ints[THREAD_ROW:], reals[ANGLE:], reals[S:], 0,
+            R, tables, False, ints[OF_SET:], ints[OF_THREAD:], reals[ANGLE:], reals[S:], 0,
             wi, wo, out, begin, size, block,
         )  # fmt: skip
         for c in range(3):

@@ -76,7 +76,7 @@ __all__ = [
 Reals = NDArray[Any]
 Floats = NDArray[np.float64]
 
-BLOCK = 4096
+CHUNK = 4096
 """Directions that one worker takes at a time: 150 kB in float32, which stays in its cache."""
 
 
@@ -203,7 +203,7 @@ _HAS_TABLE = tuple(model.looked_up is not None for model in REGISTRY)
 
 
 @njit(**INLINE)
-def _add_directly(R, model, row, ix, iy, iz, ox, oy, oz, r, g, b):
+def _direct_loop(R, model, row, ix, iy, iz, ox, oy, oz, r, g, b):
     for k in range(ix.size):
         cos_i, cos_o, cos_half = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
         surface, volume = factors(R, model, row, ix[k], cos_i, ox[k], cos_o, cos_half)
@@ -215,7 +215,7 @@ def _add_directly(R, model, row, ix, iy, iz, ox, oy, oz, r, g, b):
 
 
 @njit(**INLINE)
-def _add_by_table(R, model, row, through, ix, iy, iz, ox, oy, oz, r, g, b):
+def _table_loop(R, model, row, through, ix, iy, iz, ox, oy, oz, r, g, b):
     for k in range(ix.size):
         cos_i, cos_o, cos_half = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
         surface, volume = factors(R, model, row, ix[k], cos_i, ox[k], cos_o, cos_half)
@@ -226,8 +226,8 @@ def _add_by_table(R, model, row, through, ix, iy, iz, ox, oy, oz, r, g, b):
         b[k] = surface + volume * row[ALBEDO_B]
 
 
-_directly = specialised(_add_directly, [k for k in ALL if not _HAS_TABLE[k]])
-_by_table = specialised(_add_by_table, [k for k in ALL if _HAS_TABLE[k]])
+_directly = specialised(_direct_loop, [k for k in ALL if not _HAS_TABLE[k]])
+_by_table = specialised(_table_loop, [k for k in ALL if _HAS_TABLE[k]])
 
 
 @njit(**KERNEL)
@@ -253,8 +253,8 @@ def _evaluate_soa(R, row, wi, wo, out):
     n = wi.shape[1]
     constants = _constants(row, 0)
     model = int(row[MODEL])
-    for block in prange((n + BLOCK - 1) // BLOCK):
-        s = slice(block * BLOCK, min(n, (block + 1) * BLOCK))
+    for block in prange((n + CHUNK - 1) // CHUNK):
+        s = slice(block * CHUNK, min(n, (block + 1) * CHUNK))
         ix, iy, iz = wi[0, s], wi[1, s], wi[2, s]
         ox, oy, oz = wo[0, s], wo[1, s], wo[2, s]
         r, g, b = out[0, s], out[1, s], out[2, s]

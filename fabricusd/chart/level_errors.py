@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.levels import LEVELS
 from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.appearance.weave.footprint import DEFAULT, LEVELS, Limits, weights
+from fabricusd.appearance.weave.footprint import DEFAULT, Limits, weights
 from fabricusd.chart.cloth_picture import FINE, TURN, View, cloth_spectrum
 from fabricusd.fabric import Fabric
 

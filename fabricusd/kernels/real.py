@@ -67,6 +67,10 @@ _EXACT: dict[str, Any] = {
 }
 _inner = register_jitable(**_EXACT)
 
+BLOCK = 256
+"""Entries that the vectorised loops over directions carry together: what they note of each stays in
+the first-level cache."""
+
 
 @njit(**INLINE)
 def index(begin, k):

@@ -11,11 +11,11 @@ from fabricusd.appearance.conserving.multiple import conserving_point_value, con
 from fabricusd.appearance.conserving.single import ConservingTables
 from fabricusd.appearance.sampling.fit import Singles, fitted_mixture
 from fabricusd.appearance.sampling.mixture import Mixture
-from fabricusd.appearance.sampling.stretches import PSI0, SET, THREAD
+from fabricusd.appearance.sampling.stretches import OF_SET, OF_THREAD, PSI0
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import KERNEL
 
-EVEN = 0.1
+EVEN_SHARE = 0.1
 """Share of even directions: less than published cloth's, since without `1/Q` there are no narrow
 bright places that the lobes miss."""
 
@@ -35,7 +35,8 @@ def conserving_mixture(fabric: Fabric, tables: ConservingTables) -> Mixture:
         _point_values(single, kept, stretch, wi, wo, out)
 
     return fitted_mixture(
-        fabric, tables.threads, even=EVEN, least=LEAST_SHARE, sides=2, opaque=bool(tables.opaque),
+        fabric, tables.threads, even=EVEN_SHARE, least=LEAST_SHARE,
+        sides=2, opaque=bool(tables.opaque),
         cosines=True, far=far, at_point=at_point,
     )  # fmt: skip
 
@@ -66,6 +67,6 @@ def _point_values(R, tables, stretch, wi, wo, out):
     """`conserving_point_value` on a stretch: wi, wo, out (3, n)."""
     for k in range(wi.shape[1]):
         out[0, k], out[1, k], out[2, k] = conserving_point_value(
-            R, tables, int(stretch[SET]), int(stretch[THREAD]), stretch[PSI0],
+            R, tables, int(stretch[OF_SET]), int(stretch[OF_THREAD]), stretch[PSI0],
             wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k],
         )  # fmt: skip

@@ -11,11 +11,7 @@ from numba import njit
 from fabricusd.appearance.frame import WARP
 from fabricusd.appearance.published.segment import along_set, seen_along
 from fabricusd.appearance.published.tables import NODE_COS, NODE_SIN, NODE_WEIGHT
-from fabricusd.kernels.real import INLINE, index
-
-BLOCK = 256
-"""Directions that the vectorised loops carry through the nodes together: their partial sums stay
-in the first-level cache."""
+from fabricusd.kernels.real import BLOCK, INLINE, index
 
 AXIS_I, ACROSS_I, UP_I, SCALE_I = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
 AXIS_O, ACROSS_O, UP_O, SCALE_O = 4 * BLOCK, 5 * BLOCK, 6 * BLOCK, 7 * BLOCK

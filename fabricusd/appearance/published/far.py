@@ -17,7 +17,6 @@ from fabricusd.appearance.published.blocks import (
     ACROSS_O,
     AXIS_I,
     AXIS_O,
-    BLOCK,
     BLUE,
     GREEN,
     NORMALIZATION,
@@ -43,7 +42,7 @@ from fabricusd.appearance.scattering.columns import ALBEDO_B, ALBEDO_G, ALBEDO_R
 from fabricusd.appearance.scattering.models import PUBLISHED_MODELS
 from fabricusd.appearance.scattering.terms import CELL_MODELS
 from fabricusd.kernels.choice import specialised
-from fabricusd.kernels.real import INLINE, KERNEL, PART, index
+from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, index
 
 
 @njit(**INLINE)

@@ -18,7 +18,6 @@ from fabricusd.appearance.published.blocks import (
     ACROSS_O,
     AXIS_I,
     AXIS_O,
-    BLOCK,
     BLUE,
     GREEN,
     NORMALIZATION,
@@ -47,7 +46,7 @@ from fabricusd.appearance.scattering.columns import (
 from fabricusd.appearance.scattering.model import PUBLISHED
 from fabricusd.appearance.scattering.models import PUBLISHED_MODELS
 from fabricusd.kernels.choice import for_each
-from fabricusd.kernels.real import INLINE, KERNEL, PART, cos, index, sin
+from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, cos, index, sin
 from fabricusd.kernels.unrolled import tuple_reader
 
 _WARP = 13 * BLOCK

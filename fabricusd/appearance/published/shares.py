@@ -12,11 +12,11 @@ from fabricusd.appearance.published.levels import point_value
 from fabricusd.appearance.published.tables import SurfaceTables
 from fabricusd.appearance.sampling.fit import Singles, fitted_mixture
 from fabricusd.appearance.sampling.mixture import Mixture
-from fabricusd.appearance.sampling.stretches import PSI0, SET, THREAD
+from fabricusd.appearance.sampling.stretches import OF_SET, OF_THREAD, PSI0
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import KERNEL
 
-EVEN = 0.15
+EVEN_SHARE = 0.15
 """Share of directions that are even over the hemisphere."""
 
 LEAST_SHARE = 0.1
@@ -36,7 +36,8 @@ def published_mixture(fabric: Fabric, tables: SurfaceTables) -> Mixture:
         _point_values(single, kept, stretch, wi, wo, out)
 
     return fitted_mixture(
-        fabric, tables.threads, even=EVEN, least=LEAST_SHARE, sides=1, opaque=True, cosines=False,
+        fabric, tables.threads, even=EVEN_SHARE, least=LEAST_SHARE,
+        sides=1, opaque=True, cosines=False,
         far=far, at_point=at_point,
     )  # fmt: skip
 
@@ -56,6 +57,6 @@ def _point_values(R, tables, stretch, wi, wo, out):
     """`point_value` at level `weave` on a stretch: wi, wo, out (3, n)."""
     for k in range(wi.shape[1]):
         out[0, k], out[1, k], out[2, k] = point_value(
-            R, tables, False, int(stretch[SET]), int(stretch[THREAD]), stretch[PSI0], R(0),
+            R, tables, False, int(stretch[OF_SET]), int(stretch[OF_THREAD]), stretch[PSI0], R(0),
             wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k],
         )  # fmt: skip

@@ -28,8 +28,8 @@ from fabricusd.appearance.sampling.mixture import mixed
 from fabricusd.appearance.sampling.share_fit import AZIMUTHS
 from fabricusd.appearance.sampling.stretches import (
     COS,
+    OF_SET,
     PSI0,
-    SET,
     SIN,
     SURFACE_WIDTH,
     TAN,
@@ -40,10 +40,9 @@ from fabricusd.appearance.sampling.views import share_at, view_corner
 from fabricusd.appearance.scattering import columns
 from fabricusd.appearance.scattering.across import across_deviation
 from fabricusd.appearance.weave.coverage import WARP
-from fabricusd.kernels.real import INLINE, KERNEL, PART, atan2, cos, sin
+from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, atan2, cos, sin
 from fabricusd.kernels.unrolled import tuple_reader
 
-BLOCK = 256
 _EVEN = THREAD_LOBES
 """In place of a lobe: uniform over the hemisphere."""
 
@@ -203,7 +202,7 @@ def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first, n):
                 block[_COS + x] = block[_ON_SURFACE + x] = block[_ON_VOLUME + x] = R(1)
                 continue
             row = stretches[max(k, 0) // THREAD_LOBES]
-            block[_WARP + x] = R(1) if int(row[SET]) == WARP else R(0)
+            block[_WARP + x] = R(1) if int(row[OF_SET]) == WARP else R(0)
             block[_PSI0 + x], block[_COS + x] = row[PSI0], row[COS]
             block[_SIN + x], block[_TAN + x] = row[SIN], row[TAN]
             block[_ON_SURFACE + x], block[_ON_VOLUME + x] = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
@@ -218,7 +217,7 @@ def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first, n):
 @njit(**PART)
 def _add_stretch(R, row, shares, size, block):
     """A stretch's part of both densities."""
-    warp = R(1) if int(row[SET]) == WARP else R(0)
+    warp = R(1) if int(row[OF_SET]) == WARP else R(0)
     psi0, c, s, tangent = row[PSI0], row[COS], row[SIN], row[TAN]
     surface, volume = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
     # To a known place: a distance that the compiler does not know would keep the loop scalar.

@@ -36,19 +36,19 @@ from fabricusd.appearance.sampling.share_fit import (
 )
 from fabricusd.appearance.sampling.stretches import (
     COS,
+    OF_SET,
+    OF_THREAD,
     PSI0,
-    SET,
     SIN,
     STRETCH_COLUMNS,
     SURFACE_WIDTH,
     TAN,
-    THREAD,
     VOLUME_WIDTH,
     stretches_of,
 )
 from fabricusd.appearance.scattering import columns
 from fabricusd.fabric import Fabric
-from fabricusd.kernels.real import INLINE, KERNEL, whole
+from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, whole
 from fabricusd.kernels.unrolled import tuple_writer
 
 Singles = NDArray[np.float32]
@@ -57,7 +57,6 @@ FarValues = Callable[[Singles, Singles, Singles], None]
 PointValues = Callable[[Singles, Singles, Singles, Singles], None]
 """(stretch, wi, wo, out): the same on a thread of a stretch, at level `weave`."""
 
-BLOCK = 256
 LOWEST = 1e-6
 """Height of a direction up to which it counts as on neither side of the cloth."""
 
@@ -105,7 +104,7 @@ def fitted_mixture(
     found = []
     for row in mixture.stretches:
         stretch = row.copy()
-        thread = threads[int(row[THREAD])]
+        thread = threads[int(row[OF_THREAD])]
         stretch[SURFACE_WIDTH] = thread[columns.SURFACE_WIDTH]
         stretch[VOLUME_WIDTH] = thread[columns.VOLUME_WIDTH]
         one = mixture._replace(stretches=stretch[None])
@@ -206,7 +205,7 @@ _store = tuple_writer(THREAD_LOBES, BLOCK)
 
 @njit(**INLINE)
 def _describe_block(R, row, size, block):
-    c, s, psi0, tangent, thread_set = row[COS], row[SIN], row[PSI0], row[TAN], int(row[SET])
+    c, s, psi0, tangent, thread_set = row[COS], row[SIN], row[PSI0], row[TAN], int(row[OF_SET])
     surface, volume = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
     for x in range(size):
         found = stretch_densities(

@@ -33,8 +33,8 @@ from fabricusd.appearance.sampling.lobes import (
 )
 from fabricusd.appearance.sampling.stretches import (
     COS,
+    OF_SET,
     PSI0,
-    SET,
     SIN,
     SURFACE_WIDTH,
     TAN,
@@ -151,7 +151,7 @@ def density(R, mixture, ix, iy, iz, ox, oy, oz):
         row = mixture.stretches[y]
         found = stretch_densities(
             R, row[COS], row[SIN], row[PSI0], row[TAN], row[SURFACE_WIDTH], row[VOLUME_WIDTH],
-            int(row[SET]), ix, iy, iz, ox, oy, oz,
+            int(row[OF_SET]), ix, iy, iz, ox, oy, oz,
         )  # fmt: skip
         first = side * lobes + THREAD_LOBES * y
         p += mixed(_thread_shares(R, mixture.shares, corner, first), found)
@@ -209,7 +209,7 @@ def lobe_direction(R, mixture, k, ox, oy, oz, u1, u2):
     row = mixture.stretches[(k % lobes) // THREAD_LOBES]
     return _stretch_direction(
         R, k % THREAD_LOBES, k >= lobes, row[COS], row[SIN], row[PSI0], row[TAN],
-        row[SURFACE_WIDTH], row[VOLUME_WIDTH], int(row[SET]), ox, oy, oz, u1, u2,
+        row[SURFACE_WIDTH], row[VOLUME_WIDTH], int(row[OF_SET]), ox, oy, oz, u1, u2,
     )  # fmt: skip
 
 

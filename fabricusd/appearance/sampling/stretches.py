@@ -25,7 +25,7 @@ WIDEST_STRETCH = math.radians(15.0)
 """Stretches of sloping curve are at most this long in tangent angle."""
 
 STRETCH_COLUMNS = 8
-SET, THREAD, PSI0, COS, SIN, TAN, SURFACE_WIDTH, VOLUME_WIDTH = range(STRETCH_COLUMNS)
+OF_SET, OF_THREAD, PSI0, COS, SIN, TAN, SURFACE_WIDTH, VOLUME_WIDTH = range(STRETCH_COLUMNS)
 """Columns of `stretches_of`."""
 
 
@@ -87,7 +87,7 @@ def nearest_stretch(R, stretches, thread_set, thread, psi0):
     best, least = 0, R(1e9)
     for y in range(stretches.shape[0]):
         row = stretches[y]
-        if int(row[SET]) == thread_set and int(row[THREAD]) == thread:
+        if int(row[OF_SET]) == thread_set and int(row[OF_THREAD]) == thread:
             distance = abs(row[PSI0] - psi0)
             if distance < least:
                 best, least = y, distance

@@ -9,13 +9,12 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.published.blocks import BLOCK
 from fabricusd.appearance.shadow.horizon_lookup import cell_of_texels, diamond
 from fabricusd.appearance.shadow.place_blocks import (
     FIRST,
     LIT,
+    OF_SET,
     SECOND,
-    SET,
     SHARES,
     TABLE_I,
     TABLE_J,
@@ -24,7 +23,7 @@ from fabricusd.appearance.shadow.place_blocks import (
     Y,
 )
 from fabricusd.appearance.weave.coverage import GAP
-from fabricusd.kernels.real import PART, index
+from fabricusd.kernels.real import BLOCK, PART, index
 
 
 @njit(**PART)
@@ -38,7 +37,7 @@ def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
     picks, slots = table.shape[1], table.shape[2]
     weft_width, warp_width = cloth.width[WEFT], cloth.width[WARP]
     for k in range(size):
-        p, q, top, which = reals[X + k], reals[Y + k], ints[TOP + k], ints[SET + k]
+        p, q, top, which = reals[X + k], reals[Y + k], ints[TOP + k], ints[OF_SET + k]
         # A gap, and what is not a number, reads somewhere; the caller has its answer already.
         sound = p >= R(0) and which != GAP
         warp = top == WARP

@@ -24,7 +24,6 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.published.blocks import BLOCK
 from fabricusd.appearance.shadow.height import crown_of, highest_point, level_is_round, steepest
 from fabricusd.appearance.shadow.horizon import (
     AZIMUTHS,
@@ -46,9 +45,9 @@ from fabricusd.appearance.shadow.place_blocks import (
     FREE,
     INT_ROWS,
     LIT,
+    OF_SET,
     REAL_ROWS,
     SECOND,
-    SET,
     SHARES,
     X,
     look_up_block,
@@ -59,7 +58,7 @@ from fabricusd.appearance.weave.curve import crest, peak
 from fabricusd.appearance.weave.lookup import find, height_on, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
-from fabricusd.kernels.real import INLINE, KERNEL, PART, index
+from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, index
 
 METHODS = ("none", "peak", "horizon", "traced")
 NONE, PEAK, HORIZON, TRACED = range(4)
@@ -341,7 +340,7 @@ def mean_block(R, shadow, wi, begin, size, ints, reals):
     for k in range(size):
         row, column = np.uintp(ints[FIRST + k]), np.uintp(ints[SECOND + k])
         reals[LIT + k] /= _between_means(
-            shadow, ints[SET + k], row, column, reals[SHARES + k], reals[SHARES + BLOCK + k]
+            shadow, ints[OF_SET + k], row, column, reals[SHARES + k], reals[SHARES + BLOCK + k]
         )
 
 

@@ -11,15 +11,14 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.published.blocks import BLOCK
 from fabricusd.appearance.shadow.horizon_lookup import split_table
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.lookup import angle_on, cell_of, place_on, whole_threads, wrap
-from fabricusd.kernels.real import INLINE, PART, index
+from fabricusd.kernels.real import BLOCK, INLINE, PART, index
 
 CELL_I, CELL_J, END, PICK = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
 """Rows of int32: the cell of the grid and the places in the sequences of threads."""
-TOP, SET, THREAD, FREE = 4 * BLOCK, 5 * BLOCK, 6 * BLOCK, 7 * BLOCK
+TOP, OF_SET, OF_THREAD, FREE = 4 * BLOCK, 5 * BLOCK, 6 * BLOCK, 7 * BLOCK
 """The set on top of the cell, the set or GAP and the thread that are seen, and 1 where nothing
 keeps light off: gap or pile."""
 TABLE_I, TABLE_J = 8 * BLOCK, 9 * BLOCK
@@ -49,9 +48,9 @@ def look_up_block(R, cloth, table, uv, begin, size, ints, reals):
     _gather(cloth, size, ints, reals)
     _place(R, cloth, size, ints, reals)
     for k in range(size):
-        thread = np.uintp(ints[THREAD + k])
+        thread = np.uintp(ints[OF_THREAD + k])
         reals[ANGLE + k] = angle_on(R, cloth, thread, reals[S + k])
-        ints[FREE + k] = ints[SET + k] == GAP or cloth.pile[thread] != 0
+        ints[FREE + k] = ints[OF_SET + k] == GAP or cloth.pile[thread] != 0
 
 
 @njit(**INLINE)
@@ -125,6 +124,6 @@ def _place(R, cloth, size, ints, reals):
         warp_thread, weft_thread = ints[_WARP_THREAD + k], ints[_WEFT_THREAD + k]
         thread = warp_thread if which == WARP else weft_thread
         sound = x >= R(0)
-        ints[SET + k] = which if sound else WEFT
-        ints[THREAD + k] = thread if sound and which != GAP else 0
+        ints[OF_SET + k] = which if sound else WEFT
+        ints[OF_THREAD + k] = thread if sound and which != GAP else 0
         reals[S + k] = s if sound else R(np.nan)

@@ -17,15 +17,12 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
+from fabricusd.appearance.levels import FAR, THREAD, WEAVE
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.kernels import real
 from fabricusd.kernels.real import INLINE, KERNEL
-
-LEVELS = ("far", "weave", "thread")
-FAR, WEAVE, THREAD = range(3)
-
 
 _NEVER = 1e30
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance import plain
+from fabricusd.appearance.levels import LEVELS
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.surface import far_all
 from fabricusd.chart.panel import Panel, Row
@@ -29,7 +30,6 @@ SAMPLES = (4, 16, 64, 256)
 QUICK_SAMPLES = (4, 16)
 NOISES = (0.2, 0.1, 0.05)
 QUICK_NOISES = (0.1,)
-LEVELS = ("far", "weave", "thread")
 
 
 def run(quick: bool) -> list[Row]:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from fabricusd.appearance import levels
 from fabricusd.reference.rays.embree import aligned_empty, new_packets
 
 # Rows of `Wave.hits`. FRONT and BACK are where rays leave on the viewer's side and on the other;
@@ -49,7 +50,7 @@ FILM_ROWS = 23
 BEAUTY_ROWS = 7
 """Rows that every picture needs; the rest only where an AOV asks for them."""
 
-FAR_LEVEL, WEAVE_LEVEL, THREAD_LEVEL = 0, 1, 2
+FAR_LEVEL, WEAVE_LEVEL, THREAD_LEVEL = levels.FAR, levels.WEAVE, levels.THREAD
 
 ROW_PADDING = 80
 """Numbers between rows: five cache lines, prime to the number of a cache's sets."""

@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.published.far import far_values
-from fabricusd.appearance.sampling.blocks import BLOCK, sample_far
-from fabricusd.kernels.real import KERNEL, LEAN, as_part
+from fabricusd.appearance.sampling.blocks import sample_far
+from fabricusd.kernels.real import BLOCK, KERNEL, LEAN, as_part
 from fabricusd.reference.rays.wave import CHANCE, F_PDF, GO, GO_PDF, KEEP, THREAD, WEIGHT, WI, WO, F
 
 STRAIGHT = np.float32(-1)
