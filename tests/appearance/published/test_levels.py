@@ -10,14 +10,8 @@ from fabricusd.appearance import plain, surface
 from fabricusd.appearance.conserving.single import NODE_COS as C_COS
 from fabricusd.appearance.conserving.single import NODE_SIN as C_SIN
 from fabricusd.appearance.conserving.single import NODE_WEIGHT as C_WEIGHT
-from fabricusd.appearance.law import (
-    FAR,
-    MIXED,
-    THREAD,
-    WEAVE,
-    law_value,
-    surface_law,
-)
+from fabricusd.appearance.law import MIXED, law_value, surface_law
+from fabricusd.appearance.levels import FAR, THREAD, WEAVE
 from fabricusd.appearance.published.far import far_value, normalization
 from fabricusd.appearance.published.levels import point_value, point_values
 from fabricusd.appearance.published.tables import surface_tables

@@ -9,11 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fabricusd.appearance.levels import FAR, LEVELS, THREAD, WEAVE
 from fabricusd.appearance.weave.footprint import (
-    FAR,
-    LEVELS,
-    THREAD,
-    WEAVE,
     Limits,
     extent_of,
     level_weights,
