@@ -15,10 +15,10 @@ if use_internals():
         # which nearly every index of a kernel is of, would otherwise come after seven kinds of
         # strings and lists. That order is a fifth of all the time it takes to compile.
         import numba.core.typing.arraydecl  # noqa: F401
+    with suppress(ImportError, AttributeError):
+        from fabricusd.kernels.damaged_cache import forgive_damage
 
-from fabricusd.kernels.damaged_cache import forgive_damage
-
-forgive_damage()
+        forgive_damage()
 
 
 def load_without_blas() -> None:
