@@ -14,8 +14,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bake.killed import leave_half_written
-from bake.meshes import write_quad
 
 from fabricusd.bake import bake as module
 from fabricusd.bake.bake import bake, plan
@@ -29,6 +27,8 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
 from fabricusd.images.files import read_mip_level
 from fabricusd.schema import load
+from tests.bake.meshes import write_quad
+from tests.bake.work.killed import leave_half_written
 
 MAPS = ("normal", "thread_id", "lay", "base_color")
 SMALL = Settings(resolution=512, maps=MAPS)

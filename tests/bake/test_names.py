@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bake.meshes import quad_mesh, quad_scene
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,6 +17,7 @@ from fabricusd.cli.main import main
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.images.files import read_mip_level
 from fabricusd.scene.scene import FabricSurface
+from tests.bake.meshes import quad_mesh, quad_scene
 
 CASES = Path(__file__).resolve().parents[1] / "cases" / "hostile"
 

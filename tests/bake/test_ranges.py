@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from bake.meshes import write_quad
 
 from fabricusd.bake import bake as module
 from fabricusd.bake.bake import bake, plan
@@ -15,6 +14,7 @@ from fabricusd.bake.ranges import check_settings
 from fabricusd.bake.texels.light import unit_light
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
+from tests.bake.meshes import write_quad
 
 COMMANDS = [
     (["--light", "nan,nan,1"], "--light nan,nan,1.0 is no direction"),

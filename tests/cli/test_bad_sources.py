@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wif_samples import SMALL
 
 from fabricusd.cli.main import main
 from fabricusd.fabric import Fabric
 from fabricusd.images.files import write_png
 from fabricusd.schema import save
+from tests.wif_samples import SMALL
 
 GOOD = """#usda 1.0
 def Fabric "Cloth"

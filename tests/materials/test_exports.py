@@ -10,7 +10,6 @@ from functools import partial
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from preview.scenes import bake_shirt
 from pxr import Usd, UsdGeom, UsdShade, UsdUtils
 
 from fabricusd.cli.main import main
@@ -21,6 +20,7 @@ from fabricusd.materials.targets.osl import osl_source
 from fabricusd.materials.targets.package import write_usdz
 from fabricusd.materials.targets.u3m import construction, physics, write_u3m
 from fabricusd.schema import load
+from tests.materials.scenes import bake_shirt
 
 
 @pytest.fixture(scope="module")

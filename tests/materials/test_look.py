@@ -6,7 +6,6 @@ import json
 import shutil
 
 import pytest
-from preview.scenes import bake_shirt
 from pxr import Usd, UsdGeom, UsdShade, UsdUtils, UsdValidation
 
 from fabricusd.cli.main import main
@@ -15,6 +14,7 @@ from fabricusd.materials.materials import write_materials
 from fabricusd.materials.recipes import Settings
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.scene import FabricSurface
+from tests.materials.scenes import bake_shirt
 
 PLAIN = Settings(fitted=False)
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from preview.scenes import MAPS
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
 from fabricusd.bake.bake import bake
@@ -20,6 +19,7 @@ from fabricusd.reference.render import render_scene
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.scene import Scene
 from fabricusd.schema import load, write_binding, write_fabric
+from tests.materials.scenes import MAPS
 
 THREADS = 12.0
 """Threads to a unit of UV; the bake has 10.7 texels to each."""

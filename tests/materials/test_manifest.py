@@ -11,10 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fuzz import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from preview.scenes import bake_shirt
 from pxr import Sdf, Usd
 
 from fabricusd.bake.error.relight import BakedSet
@@ -24,6 +22,8 @@ from fabricusd.images.files import write_mip_exr
 from fabricusd.materials.bake_folder import read_bake_folder
 from fabricusd.materials.materials import write_materials
 from fabricusd.materials.recipes import Settings
+from tests.fuzz import examples
+from tests.materials.scenes import bake_shirt
 
 CASES = Path(__file__).resolve().parents[1] / "cases" / "hostile"
 PLAIN = Settings(fitted=False)

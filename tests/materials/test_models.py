@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bake.meshes import quad_scene
 
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.bake.layout.garment import garments
@@ -23,6 +22,7 @@ from fabricusd.materials.fit.texels import KINDS as KINDS_OF_TEXELS
 from fabricusd.materials.fit.texels import NEEDED, _kinds
 from fabricusd.materials.networks.look import Look
 from fabricusd.schema import load, preset_names
+from tests.bake.meshes import quad_scene
 
 
 def white(alpha=(0.3, 0.6), ior=1.5, fuzz=0.0):

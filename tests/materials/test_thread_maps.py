@@ -6,7 +6,6 @@ import json
 
 import numpy as np
 import pytest
-from preview.scenes import write_shirt
 from pxr import Sdf, Usd, UsdShade
 
 from fabricusd.appearance.weave.lookup import NO_THREAD
@@ -18,6 +17,7 @@ from fabricusd.materials.bake_folder import read_bake_folder
 from fabricusd.materials.fit.texels import NEEDED
 from fabricusd.materials.fit.thread_maps import write_thread_maps
 from fabricusd.materials.materials import write_materials
+from tests.materials.scenes import write_shirt
 
 
 @pytest.fixture(scope="module")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference.scenes import looking
 
 from fabricusd.reference.render import render, render_scene
 from fabricusd.scene.scene import Camera, Mesh, PreviewSurface, Scene
+from tests.reference.scenes import looking
 
 
 def _square(eye, at, clipping, *, orthographic=False):

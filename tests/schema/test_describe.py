@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from hypothesis import given
-from strategies import weaves
 
 from fabricusd.schema import load
 from fabricusd.schema.describe import curve_words, in_words, longest_float
+from tests.strategies import weaves
 
 
 def runs_by_walking(line):

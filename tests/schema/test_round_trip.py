@@ -8,7 +8,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pxr import Sdf, Usd, UsdGeom
-from strategies import fabrics
 
 from fabricusd.fabric import Binding, Fabric, Thread
 from fabricusd.schema import (
@@ -22,6 +21,7 @@ from fabricusd.schema import (
 )
 from fabricusd.schema.attributes import DEGREE, unscale
 from fabricusd.schema.names import prim_name
+from tests.strategies import fabrics
 
 
 def assert_same(one: Fabric, other: Fabric) -> None:

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from draft_strategies import drafts
 from hypothesis import given
-from strategies import fabrics
 
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, Thread, ThreadSet, Weave
 from fabricusd.weaves import Draft, from_fabric, losses, to_fabric, with_colors
 from fabricusd.weaves.convert import albedo_scale
+from tests.draft_strategies import drafts
+from tests.strategies import fabrics
 
 PLAIN = Weave(np.eye(2, dtype=bool), "plain")
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)

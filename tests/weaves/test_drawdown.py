@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from draft_strategies import drafts
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import fabrics
 
 from fabricusd.fabric import Fabric, Weave
 from fabricusd.weaves import Draft, draw, parse_weave, read_wif, to_fabric
 from fabricusd.weaves.drawdown import MOST_SHAFTS, draw_draft
 from fabricusd.weaves.loom import thread_loom
+from tests.draft_strategies import drafts
+from tests.strategies import fabrics
 
 HALVES = {" ": (0, 0), "▀": (1, 0), "▄": (0, 1), "█": (1, 1)}
 ESCAPE = re.compile(r"\x1b\[[0-9;]*m")

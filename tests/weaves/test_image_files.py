@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from png import png
 
 from fabricusd.errors import FabricError
 from fabricusd.weaves import read_image
+from tests.png import png
 
 CELLS = np.kron(np.array([[1, 1, 0], [0, 1, 1], [0, 0, 1], [1, 0, 0]], bool), np.ones((8, 8), bool))
 PIXELS = np.where(CELLS.T[::-1], 0, 255).astype(np.uint8)

@@ -13,11 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
-from png import png
 
 from fabricusd.images.files import read_image as read_picture
 from fabricusd.images.files import read_middle, read_mip_level
 from fabricusd.weaves import read_image
+from tests.png import png
 
 CELLS = np.random.default_rng(0).random((20, 16)) < 0.5
 GREY = Image.fromarray(np.where(CELLS, 255, 0).astype(np.uint8))

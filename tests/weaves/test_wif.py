@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wif_samples import TWILL, TWILL_CELLS, changed, slow_cells
 
 from fabricusd.weaves import parse_wif, read_wif, to_fabric, wif_text
 from fabricusd.weaves.color import palette_from_codes
+from tests.wif_samples import TWILL, TWILL_CELLS, changed, slow_cells
 
 
 def test_tie_up_and_treadling_make_the_drawdown() -> None:

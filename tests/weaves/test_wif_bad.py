@@ -6,10 +6,10 @@ import os
 from pathlib import Path
 
 import pytest
-from wif_samples import SMALL
 
 from fabricusd.errors import FabricError
 from fabricusd.weaves import parse_wif, read_wif, write_wif
+from tests.wif_samples import SMALL
 
 # What is replaced, by what, and what the message must hold.
 BAD = {

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wif_samples import TWILL, TWILL_CELLS
 
 from fabricusd.errors import FabricError
 from fabricusd.weaves import parse_wif, read_wif
+from tests.wif_samples import TWILL, TWILL_CELLS
 
 HOSTILE = Path(__file__).parents[1] / "cases" / "hostile"
 

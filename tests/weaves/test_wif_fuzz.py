@@ -9,11 +9,11 @@ import fuzz
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from wif_samples import SMALL, TWILL
 
 from fabricusd.weaves import draw, parse_wif, read_wif, to_fabric, wif_text
 from fabricusd.weaves.draft import LIMIT
 from fabricusd.weaves.wif.lines import KEYS, NUMBERED
+from tests.wif_samples import SMALL, TWILL
 
 
 def test_a_small_file_that_asks_for_the_largest_cloth_gets_it_in_bounded_time() -> None:

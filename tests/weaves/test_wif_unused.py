@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wif_samples import SMALL, TWILL, TWILL_CELLS, changed
 
 from fabricusd.errors import FabricError
 from fabricusd.weaves import parse_wif, read_wif
+from tests.wif_samples import SMALL, TWILL, TWILL_CELLS, changed
 
 CASES = Path(__file__).parents[1] / "cases" / "wif_extra_lines"
 

@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from draft_strategies import drafts
 from hypothesis import given
 from hypothesis import strategies as st
-from wif_samples import TWILL, TWILL_CELLS, changed, plain_ini, slow_cells
 
 from fabricusd.fabric import Weave
 from fabricusd.weaves import (
@@ -23,6 +21,8 @@ from fabricusd.weaves import (
 )
 from fabricusd.weaves.color import palette_from_codes
 from fabricusd.weaves.wif.write import MOST_SHAFTS
+from tests.draft_strategies import drafts
+from tests.wif_samples import TWILL, TWILL_CELLS, changed, plain_ini, slow_cells
 
 
 @pytest.mark.parametrize("name", ["2229", "8452"])

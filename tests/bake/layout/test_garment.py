@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bake.meshes import quad_mesh, quad_scene
 
 from fabricusd.bake.layout.garment import fitted, garments, lay_of, resolution_for, tiles_of
 from fabricusd.bake.layout.overlaps import refuse_overlaps
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.scene.scene import FabricSurface, Scene
+from tests.bake.meshes import quad_mesh, quad_scene
 
 UNIT = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
 

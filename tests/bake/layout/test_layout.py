@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bake.meshes import quad_scene
 from pxr import Usd, UsdGeom
 
 from fabricusd.bake.bake import bake
@@ -18,6 +17,7 @@ from fabricusd.bake.layout.tangents import corner_tangents
 from fabricusd.bake.layout.unwrap import unwrapped
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
+from tests.bake.meshes import quad_scene
 
 UNIT = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bake.meshes import quad_scene
 
 from fabricusd.appearance.shadow.methods import shadowing
 from fabricusd.appearance.surface import evaluate
@@ -32,6 +31,7 @@ from fabricusd.bake.texels.sheet import sheets_of, texel_start, texel_step
 from fabricusd.errors import FabricError
 from fabricusd.quality.colors import delta_e_2000
 from fabricusd.schema import load, preset_names
+from tests.bake.meshes import quad_scene
 
 PUBLISHED = (
     "linen_plain",

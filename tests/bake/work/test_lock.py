@@ -8,14 +8,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from bake.killed import leave_half_written
-from bake.meshes import write_quad
 
 from fabricusd.bake.bake import bake
 from fabricusd.bake.job import Settings
 from fabricusd.bake.work.lock import HOLDER, LOCK, locked, refuse_locked
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
+from tests.bake.meshes import write_quad
+from tests.bake.work.killed import leave_half_written
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -9,8 +9,6 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from bake.meshes import write_quad
-from fuzz import examples
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -24,6 +22,8 @@ from fabricusd.bake.work.scratch import Scratch
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
 from fabricusd.schema import load
+from tests.bake.meshes import write_quad
+from tests.fuzz import examples
 
 SMALL = Settings(resolution=64, maps=("lay", "height"), file_format="png")
 NAME = "square_obj"

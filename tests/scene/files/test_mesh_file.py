@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from reference.mesh_files import CASES, Gltf, bounds, one_square, ply
 
 from fabricusd.errors import FabricError
 from fabricusd.scene.files import mesh_file
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.size import mesh_words
+from tests.scene.files.mesh_files import CASES, Gltf, bounds, one_square, ply
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n"
 METRES = "; .obj has no unit and metres were taken"

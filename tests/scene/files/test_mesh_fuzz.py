@@ -12,16 +12,16 @@ import struct
 from functools import partial
 
 import numpy as np
-from fuzz import examples, mutated, refusal
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from reference.mesh_files import CASES, Gltf, one_square, ply
 
 from fabricusd.scene.files.gltf import read_gltf
 from fabricusd.scene.files.obj import read_obj
 from fabricusd.scene.files.ply import read_ply
 from fabricusd.scene.read import read_scene
 from fabricusd.schema import load
+from tests.fuzz import examples, mutated, refusal
+from tests.scene.files.mesh_files import CASES, Gltf, one_square, ply
 
 CLOTH = load("linen_plain")
 

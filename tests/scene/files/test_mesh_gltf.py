@@ -7,7 +7,11 @@ import struct
 
 import numpy as np
 import pytest
-from reference.mesh_files import (
+
+from fabricusd.errors import FabricError
+from fabricusd.scene.files.gltf import read_gltf
+from fabricusd.scene.read import read_scene
+from tests.scene.files.mesh_files import (
     CASES,
     SQUARE,
     SQUARE_TRIANGLES,
@@ -18,10 +22,6 @@ from reference.mesh_files import (
     one_square,
     uv_area,
 )
-
-from fabricusd.errors import FabricError
-from fabricusd.scene.files.gltf import read_gltf
-from fabricusd.scene.read import read_scene
 
 HALF = np.sqrt(0.5)
 

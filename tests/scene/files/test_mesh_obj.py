@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference.mesh_files import CASES, area, bounds, uv_area
 
 from fabricusd.errors import FabricError
 from fabricusd.scene.files.obj import read_obj
 from fabricusd.scene.read import read_scene
+from tests.scene.files.mesh_files import CASES, area, bounds, uv_area
 
 QUAD = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
 FULL = "f 1/1 2/2 3/3 4/4\n"

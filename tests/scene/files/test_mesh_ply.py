@@ -6,11 +6,11 @@ import struct
 
 import numpy as np
 import pytest
-from reference.mesh_files import area, ply, ply_header, uv_area
 
 from fabricusd.errors import FabricError
 from fabricusd.scene.files.ply import read_ply
 from fabricusd.scene.read import read_scene
+from tests.scene.files.mesh_files import area, ply, ply_header, uv_area
 
 FORMS = ["ascii", "binary_little_endian", "binary_big_endian"]
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]

@@ -6,8 +6,6 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
-from reference.mesh_files import Gltf, ply
-from reference.scenes import looking
 
 from fabricusd.quality.colors import delta_e_2000
 from fabricusd.reference.defaults import default_lights
@@ -15,6 +13,8 @@ from fabricusd.reference.rays.triangles import P0, N, build_tables
 from fabricusd.reference.render import render_scene
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.scene import Camera
+from tests.reference.scenes import looking
+from tests.scene.files.mesh_files import Gltf, ply
 
 AROUND, UP = 64, 32
 ROUND = 2 * np.pi * np.arange(AROUND + 1) / AROUND
