@@ -5,8 +5,8 @@
 `PYTHON` is an interpreter that can `import bpy`; `make blender` makes one. Half a cylinder wrapped
 in the fabric and a draped cloth, under one distant light without bounces, are rendered by fabricusd
 at level far and, from the baked look, by Cycles: as UsdPreviewSurface, which is what Blender
-imports; through the hook of `fabricusd/materials/targets/blender`; with the OSL shader. Prints a table of
-delta E 2000 and writes the pictures side by side.
+imports; through the hook of `fabricusd/materials/targets/blender`; with the OSL shader. Prints a
+table of delta E 2000 and writes the pictures side by side.
 """
 
 from __future__ import annotations

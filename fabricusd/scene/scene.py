@@ -77,6 +77,7 @@ class Mesh:
     smooth : bool - False to render facets where `normals` is None
     uv : (m, 3, 2) float64 or None - at each corner
     material : (m,) int - index into `Scene.materials`
+    origin : str - what the mesh may be a copy of: only meshes of one origin are baked as one
     """
 
     path: str
@@ -86,6 +87,7 @@ class Mesh:
     smooth: bool = True
     uv: NDArray[np.float64] | None = None
     material: NDArray[Any]
+    origin: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -125,3 +126,16 @@ def test_two_primitives_keep_their_names(tmp_path, capsys):
 def test_what_lies_apart_in_the_file_lies_apart_in_the_bake(tmp_path, name):
     given = ["--fabric", "linen_plain", "--resolution", "64", "--maps", "normal", "-q"]
     assert main(["bake", str(CASES / name), *given, "-o", str(tmp_path / "b")]) == 0
+
+
+def test_pieces_of_one_shape_are_baked_each_on_its_own(tmp_path):
+    source, given = CASES / "obj_objects_sharing_material/three.obj", ["--fabric", "linen_plain"]
+    given += ["--resolution", "64", "--maps", "normal", "-q", "-o"]
+    assert main(["bake", str(source), *given, str(tmp_path / "all")]) == 0
+    said = json.loads((tmp_path / "all" / "manifest.json").read_text())
+    assert sorted(said["garments"]) == ["Back", "Front", "Sleeve"]
+    assert (
+        main(["bake", str(source), *given, str(tmp_path / "one"), "--mesh", "three.obj:Back"]) == 0
+    )
+    said = json.loads((tmp_path / "one" / "manifest.json").read_text())
+    assert [one["prims"] for one in said["garments"].values()] == [["three.obj:Back"]]

@@ -29,7 +29,7 @@ def topology(mesh: Mesh) -> str:
             whole = np.ascontiguousarray(array)
             digest.update(f"{whole.dtype} {whole.shape}".encode())
             digest.update(whole.data)
-    digest.update(f"{mesh.smooth} {mesh.normals is None}".encode())
+    digest.update(f"{mesh.smooth} {mesh.normals is None} {mesh.origin}".encode())
     return digest.hexdigest()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,9 @@ from fabricusd.scene.files.ply import read_ply
 from fabricusd.scene.scene import FabricSurface, Material, Mesh, PreviewSurface, Scene
 from fabricusd.scene.size import note_size, unit_length
 from fabricusd.scene.surface.normals import smooth_normals
+
+WITH_INSTANCES = (".glb", ".gltf")
+"""Formats in which one mesh may stand in several places."""
 
 READERS: dict[str, Callable[[Path], MeshFile]] = {
     ".obj": read_obj,
@@ -52,8 +56,11 @@ def read_mesh_file(path: Path, binding: Binding | None, units: str | None = None
         scene.note(_place(path, where), problem)
     pieces = [piece for piece in file.pieces if len(piece.triangles)]
     names = unique_names([_place(path, piece.name) for piece in pieces])
+    # A file without instances names its pieces because each is one of its own.
+    instances = path.suffix.lower() in WITH_INSTANCES
     for name, piece in zip(names, pieces, strict=True):
-        scene.meshes.append(_mesh(scene, name, piece, metres, bound=binding is not None))
+        mesh = _mesh(scene, name, piece, metres, bound=binding is not None)
+        scene.meshes.append(mesh if instances else replace(mesh, origin=name))
     if not scene.meshes:
         raise FabricError(str(path), "holds no triangles")
     note_size(scene, path, units)
