@@ -32,7 +32,7 @@ from fabricusd.reference.start.compile_ahead import FAR, compile_ahead
 from fabricusd.reference.view_transform import view
 from fabricusd.run.workers import Batches, pixels_along_z_curve, worker_count
 from fabricusd.scene.read import read_scene
-from fabricusd.scene.scene import Scene
+from fabricusd.scene.scene import Camera, Scene
 from fabricusd.stop import Stop
 
 BATCH = 1 << 13
@@ -138,19 +138,10 @@ def render(
     paths: tuple[str, ...] = ()
     with Stop() as stop:
         for number, (time_code, target) in enumerate(targets):
-            loaded = (
-                scene
-                if isinstance(scene, Scene)
-                else read_scene(
-                    scene,
-                    fabric=fabric,
-                    camera=camera,
-                    time_code=time_code,
-                    complexity=complexity,
-                    width=width,
-                    units=units,
-                )
-            )
+            loaded = scene if isinstance(scene, Scene) else read_scene(
+                scene, fabric=fabric, camera=camera, time_code=time_code, complexity=complexity,
+                width=width, units=units,
+            )  # fmt: skip
             result = render_scene(
                 loaded, width=width, height=height, spp=spp, noise=noise, max_bounces=max_bounces,
                 level=level, shadow=shadow, limits=limits, aovs=layers, seed=seed, workers=workers,
@@ -292,12 +283,7 @@ def render_scene(
     _require_settings(width, height, spp, noise, max_bounces, seed, workers)
     begun = time.perf_counter()
     most = spp or (MOST_SAMPLES if noise else 64)
-    if not scene.lights:
-        scene.lights = default_lights(scene)
-        scene.note("the scene", "has no light; a sky and a key light are added")
-    if scene.camera is None:
-        scene.note("the scene", "has no camera; one that sees all of it from the front is taken")
-    camera = scene.camera or default_camera(scene, width, height)
+    camera = _furnished(scene, width, height)
     tracer = Tracer(
         scene, max_bounces=max_bounces, level=level, shadow=shadow, limits=limits, seed=seed,
         estimator=estimator, sampler=sampler,
@@ -325,11 +311,7 @@ def render_scene(
     del tracer
     error = film.relative_error()
     metadata = {
-        "Software": f"fabricusd {fabricusd.__version__}",
-        "fabricusd:embree": embree,
-        "fabricusd:python": platform.python_version(),
-        "fabricusd:numpy": np.__version__,
-        "fabricusd:numba": numba.__version__,
+        **_versions(), "fabricusd:embree": embree,
         "fabricusd:estimator": estimator, "fabricusd:sampler": sampler,
         "fabricusd:limits": str(limits),
         "fabricusd:samples": most, "fabricusd:noise": noise or 0.0,
@@ -354,6 +336,26 @@ def render_scene(
         met=met,
         metadata=metadata,
     )
+
+
+def _furnished(scene: Scene, width: int, height: int) -> Camera:
+    """The scene's camera, or one that sees all of it; a scene without lights gets some."""
+    if not scene.lights:
+        scene.lights = default_lights(scene)
+        scene.note("the scene", "has no light; a sky and a key light are added")
+    if scene.camera is None:
+        scene.note("the scene", "has no camera; one that sees all of it from the front is taken")
+    return scene.camera or default_camera(scene, width, height)
+
+
+def _versions() -> dict[str, Any]:
+    """What a picture's metadata say of the programs that made it."""
+    return {
+        "Software": f"fabricusd {fabricusd.__version__}",
+        "fabricusd:python": platform.python_version(),
+        "fabricusd:numpy": np.__version__,
+        "fabricusd:numba": numba.__version__,
+    }
 
 
 def _typical_worst(error: NDArray[np.float32]) -> float:

@@ -96,15 +96,13 @@ def make_frames(count, epsilon, block):
         # As much as rounding may move the point, along the true normal.
         offset = side * (epsilon + R(1e-6) * max(abs(px), max(abs(py), abs(pz))))
         a, b, c = w * side * min(e0, R(0)), u * side * min(e1, R(0)), v * side * min(e2, R(0))
-        _make(
-            block, MADE + FRONT * BLOCK + x,
+        _make(block, MADE + FRONT * BLOCK + x,
             px - a * n0x - b * n1x - c * n2x + offset * gx,
             py - a * n0y - b * n1y - c * n2y + offset * gy,
             pz - a * n0z - b * n1z - c * n2z + offset * gz,
         )  # fmt: skip
         a, b, c = w * side * max(e0, R(0)), u * side * max(e1, R(0)), v * side * max(e2, R(0))
-        _make(
-            block, MADE + BACK * BLOCK + x,
+        _make(block, MADE + BACK * BLOCK + x,
             px - a * n0x - b * n1x - c * n2x - offset * gx,
             py - a * n0y - b * n1y - c * n2y - offset * gy,
             pz - a * n0z - b * n1z - c * n2z - offset * gz,
