@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
+from pathlib import Path
+from typing import Any
 
-from fabricusd.errors import FabricError
-from fabricusd.files import require_writable
+from fabricusd.materials.targets import TARGETS
 
 EPILOG = """example:
   fabricusd material baked
@@ -29,33 +29,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="openpbr, standard_surface, gltf_pbr, hair; USD takes the first",
     )
-    parser.add_argument("--usdz", metavar="FILE", help="also package the look in one file")
-    parser.add_argument(
-        "--osl", action="store_true", help="also each fabric's threads as an OSL shader"
-    )
-    parser.add_argument(
-        "--u3m", metavar="FOLDER", help="also a U3M swatch of each fabric, for garment CAD"
-    )
+    for target in TARGETS:
+        given: dict[str, Any] = {"metavar": target.metavar}
+        given = given if target.metavar else {"action": "store_true"}
+        parser.add_argument(f"--{target.name}", help=target.help, **given)
     parser.add_argument("--no-fit", action="store_true", help="leave the textures as they are")
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
     parser.add_argument("--no-clobber", action="store_true", help="never overwrite a look")
 
 
-def _require_targets(options: argparse.Namespace) -> None:
-    """Refuse before the fits what could not be written after them."""
-    if options.usdz is not None:
-        if not options.usdz.endswith(".usdz"):
-            raise FabricError(f"--usdz '{options.usdz}'", "has another suffix; it must be .usdz")
-        require_writable(options.usdz, clobber=not options.no_clobber)
-    if options.u3m is not None and not os.path.isdir(options.u3m):
-        raise FabricError(f"--u3m '{options.u3m}'", "is no directory; make it first")
+def _targets(options: argparse.Namespace) -> dict[str, Path | None]:
+    """The targets that are asked for, and where; refused before the work where they cannot be."""
+    wanted: dict[str, Path | None] = {}
+    for target in TARGETS:
+        given = getattr(options, target.name)
+        if given is not None and given is not False:
+            wanted[target.name] = Path(given) if target.metavar else None
+            target.functions.check(wanted[target.name], not options.no_clobber)
+    return wanted
 
 
 def run(options: argparse.Namespace) -> int:
     """Write the look; print the names of the files."""
-    from pathlib import Path
-
-    _require_targets(options)
+    targets = _targets(options)
     from fabricusd.materials.materials import write_materials
     from fabricusd.materials.recipes import Settings
 
@@ -64,11 +60,7 @@ def run(options: argparse.Namespace) -> int:
 
     made = write_materials(
         options.bake, options.output,
-        Settings(
-            surfaces=tuple(options.surface), fitted=not options.no_fit, osl=options.osl,
-            usdz=Path(options.usdz) if options.usdz else None,
-            u3m=Path(options.u3m) if options.u3m else None,
-        ),
+        Settings(surfaces=tuple(options.surface), fitted=not options.no_fit, targets=targets),
         scene=options.scene, clobber=not options.no_clobber, dry_run=options.dry_run,
         progress=say if options.verbose else None,
     )  # fmt: skip

@@ -25,7 +25,7 @@ example:
   fabricusd new --preset velvet -o velvet.usda
   fabricusd new --weave "twill 2/2 Z" --warp-color "#1f2a4d" --weft-color "#e8e0d0" -o denim.usda
   fabricusd new --weave "twill 2/2" --warp-color "4*#111" "4*#eee" -o houndstooth.usda
-  fabricusd new --wif 8452.wif --thread linen_plain -o draft.usda"""
+  fabricusd new --from 8452.wif --thread linen_plain -o draft.usda"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,8 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument("--preset", metavar="NAME", help="a fabric that comes with fabricusd")
     source.add_argument("--weave", metavar="WEAVE", help="a named weave or an expression")
-    source.add_argument("--wif", metavar="FILE", help="a WIF draft")
-    source.add_argument("--image", metavar="FILE", help="a drawdown, black where warp is on top")
+    source.add_argument(
+        "--from", dest="source", metavar="FILE", help="a draft or an image, by its suffix"
+    )
+    source.add_argument("--wif", metavar="FILE", help="a WIF draft, whatever its suffix")
+    source.add_argument("--image", metavar="FILE", help="an image, black where warp is on top")
     source.add_argument("--list-presets", action="store_true", help="print their names and stop")
     parser.add_argument(
         "-o",
@@ -118,38 +121,25 @@ def _flag(option: str) -> str:
 
 
 def _draft(options: argparse.Namespace) -> Draft:
-    from fabricusd.weaves import parse_weave, read_wif, with_colors
-
-    if options.invert and options.image is None:
-        raise FabricError("--invert", "goes with --image only")
-    if options.wif is not None:
-        draft = read_wif(options.wif)
-    elif options.image is not None:
-        return _image_draft(options)
-    else:
-        draft = parse_weave(options.weave)
-    if options.warp_color or options.weft_color:
-        warp = _color_order(options.warp_color, "--warp-color")
-        draft = with_colors(draft, warp, _color_order(options.weft_color, "--weft-color"))
-    return draft
-
-
-def _image_draft(options: argparse.Namespace) -> Draft:
-    """Colours given with an image of colours say which of them are whose; else they recolour it."""
-    from fabricusd.weaves import read_image, with_colors
+    from fabricusd.weaves import parse_weave, with_colors
+    from fabricusd.weaves.readers import DraftOptions, read_draft, reader_name, suffixes
 
     warp = _color_order(options.warp_color, "--warp-color")
     weft = _color_order(options.weft_color, "--weft-color")
-    told = bool(warp or weft)
-    try:
-        draft = read_image(options.image, invert=options.invert)
-    except FabricError:
-        if not told:
-            raise
-        return read_image(options.image, warp_colors=warp, weft_colors=weft)
-    if draft.colored and told:
-        return read_image(options.image, warp_colors=warp, weft_colors=weft)
-    return with_colors(draft, warp, weft)
+    if options.weave is not None:
+        if options.invert:
+            raise FabricError("--invert", "goes with images only")
+        draft = parse_weave(options.weave)
+        return with_colors(draft, warp, weft) if warp or weft else draft
+    told = DraftOptions(warp=warp, weft=weft, invert=options.invert)
+    if options.source is None:
+        reader = "wif" if options.wif is not None else "image"
+        return read_draft(getattr(options, reader), told, reader)
+    if not reader_name(options.source):
+        raise FabricError(
+            f"--from '{options.source}'", f"is no draft; it must end in {', '.join(suffixes())}"
+        )
+    return read_draft(options.source, told)
 
 
 def _color_order(items: list[str] | None, where: str) -> list[tuple[float, float, float]]:
@@ -204,7 +194,9 @@ def _changed(fabric: Fabric, options: argparse.Namespace) -> Fabric:
             changes[which] = replace(getattr(fabric, which), density=value * 100)
     name = options.name
     if not name and not options.preset:
-        name = Path(options.output or options.wif or options.image or fabric.name).stem
+        name = Path(
+            options.output or options.source or options.wif or options.image or fabric.name
+        ).stem
     if name:
         from fabricusd.schema.names import prim_name
 

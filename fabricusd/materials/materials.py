@@ -18,12 +18,10 @@ from fabricusd.files import remove_partial_files, write_json
 from fabricusd.materials.bake_folder import BakeFolder, read_bake_folder
 from fabricusd.materials.networks.surfaces import GRAPHS, MAPS
 from fabricusd.materials.recipes import Progress, Settings, Written, recipes
+from fabricusd.materials.targets import Job, chosen
 from fabricusd.materials.targets.layer import write_baked_look, write_scene_look
 from fabricusd.materials.targets.mtlx import write_mtlx
-from fabricusd.materials.targets.osl import write_osl
-from fabricusd.materials.targets.package import write_usdz
 from fabricusd.materials.targets.paths import asset_path
-from fabricusd.materials.targets.u3m import write_u3m
 from fabricusd.materials.wearers import Dressed, find_wearers
 
 
@@ -53,6 +51,8 @@ def write_materials(
     _check_surfaces(folder, settings)
     path = Path(out) if out is not None else folder.path / "look.usda"
     _check_target(path, clobber)
+    for target, where in chosen(settings.targets):
+        target.functions.check(where, clobber)
     _refuse_links(folder.path, path)
     made = Written()
     for name, file in folder.missing:
@@ -95,14 +95,15 @@ def _write(
     write_mtlx(path.with_suffix(".mtlx"), documents)
     write_json(path.with_suffix(".json"), _report(made))
     made.files += [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
-    _write_more(folder, path, settings, made, clobber)
+    job = Job(look=path, fabrics=_fabrics(folder), fitted=settings.fitted, clobber=clobber)
+    for target, where in chosen(settings.targets):
+        made.files += target.functions.write(job, where)
 
 
 def _written_folders(path: Path, settings: Settings) -> list[Path]:
     """Folders that get files of a look, each once, in an order that all runs keep."""
     places = [path.parent]
-    places += [settings.usdz.parent] if settings.usdz is not None else []
-    places += [settings.u3m] if settings.u3m is not None else []
+    places += [target.functions.folder(path, where) for target, where in chosen(settings.targets)]
     return sorted({place.resolve() for place in places if place.is_dir()})
 
 
@@ -140,23 +141,6 @@ def _check_surfaces(folder: BakeFolder, settings: Settings) -> None:
         raise FabricError(
             f"fabric '{nameless[0]}'", "is not in the folder; surface 'hair' needs it, bake again"
         )
-
-
-def _write_more(
-    folder: BakeFolder, path: Path, settings: Settings, made: Written, clobber: bool
-) -> None:
-    """What is written only when asked for."""
-    for name, fabric in _fabrics(folder).items():
-        if settings.osl:
-            shader = path.with_name(f"{path.stem}.{name}.osl")
-            write_osl(fabric, shader)
-            made.files.append(shader)
-        if settings.u3m is not None:
-            swatch = settings.u3m / f"{name}.u3m"
-            made.files += write_u3m(fabric, swatch, fitted=settings.fitted)
-    if settings.usdz is not None:
-        write_usdz(path, settings.usdz, clobber=clobber)
-        made.files.append(settings.usdz)
 
 
 def _fabrics(folder: BakeFolder) -> dict[str, Fabric]:

@@ -26,6 +26,7 @@ from fabricusd.materials.networks.surfaces import (
     parameter_values,
     preview,
 )
+from fabricusd.materials.targets import Wanted
 from fabricusd.materials.targets.layer import MaterialRecipe, Recipes
 from fabricusd.schema.names import prim_name
 
@@ -56,16 +57,12 @@ class Settings:
     surfaces : MaterialX surfaces, names of `surfaces.GRAPHS` or "hair"; USD takes the first, the
         document all
     fitted : whether the parameters are sought; otherwise the textures stand as they are
-    usdz : a package of the look to write as well
-    u3m : a folder for a U3M swatch of each fabric as well
-    osl : whether each fabric is written as an OSL shader beside the look
+    targets : what is written besides, names of `targets.TARGETS`, and where
     """
 
     surfaces: tuple[str, ...] = ("openpbr",)
     fitted: bool = True
-    usdz: Path | None = None
-    osl: bool = False
-    u3m: Path | None = None
+    targets: Wanted = field(default_factory=dict)
 
 
 @dataclass(kw_only=True)

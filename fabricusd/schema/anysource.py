@@ -7,17 +7,12 @@ from pathlib import Path
 
 from fabricusd.errors import reads
 from fabricusd.fabric import Fabric
-
-IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".gif", ".jpg", ".jpeg", ".exr", ".tga", ".webp")
-
-
-DRAFT_SUFFIXES = (".wif", ".dtx", ".wpo", ".twa")
-"""Drafts. Of these only WIF is read; its reader calls the others by their names."""
+from fabricusd.weaves.readers import read_draft, reader_name
 
 
 def is_draft(source: str | os.PathLike[str]) -> bool:
     """Whether `source` is a draft or an image by its suffix, and not USD."""
-    return Path(source).suffix.lower() in (*DRAFT_SUFFIXES, *IMAGE_SUFFIXES)
+    return bool(reader_name(source))
 
 
 @reads("a fabric")
@@ -25,10 +20,9 @@ def load_any(source: str | os.PathLike[str]) -> tuple[Fabric, tuple[str, ...]]:
     """(fabric, what was noticed on the way). FabricError as the reader of that kind raises it."""
     text = os.fspath(source)
     if is_draft(text):
-        from fabricusd.weaves import losses, read_image, read_wif, to_fabric
+        from fabricusd.weaves import losses, to_fabric
 
-        drawn = text.lower().endswith(IMAGE_SUFFIXES)
-        draft = read_image(text) if drawn else read_wif(text)
+        draft = read_draft(text)
         return to_fabric(draft, name=Path(text).stem), (*draft.warnings, *losses(draft))
     from fabricusd.schema.read import load
 

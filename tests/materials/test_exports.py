@@ -27,7 +27,7 @@ from tests.materials.scenes import bake_shirt
 def packed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("packed")
     _, baked = bake_shirt(folder)
-    settings = Settings(fitted=False, usdz=folder / "shirt.usdz", osl=True)
+    settings = Settings(fitted=False, targets={"usdz": folder / "shirt.usdz", "osl": None})
     return write_materials(baked, folder / "look.usda", settings), folder / "shirt.usdz"
 
 
@@ -143,7 +143,7 @@ def test_construction_and_fibre_are_the_formats_words(preset, kind, fibre):
 
 def test_the_command_writes_them_all(packed, tmp_path, capsys, monkeypatch):
     small = partial(write_u3m, resolution=64)
-    monkeypatch.setattr("fabricusd.materials.materials.write_u3m", small)
+    monkeypatch.setattr("fabricusd.materials.targets.u3m.write_u3m", small)
     (tmp_path / "cad").mkdir()
     words = ["material", str(packed[1].with_name("baked")), "-o", str(tmp_path / "look.usda")]
     assert main([*words, "--no-fit", "--u3m", str(tmp_path / "cad")]) == 0

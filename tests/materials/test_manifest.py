@@ -227,7 +227,7 @@ def test_a_mesh_that_names_a_picture_is_refused_before_it_is_packed(folder):
     stage.Save()
     package = folder / "look.usdz"
     with pytest.raises(FabricError, match=r"refers to '\.\./secret\.exr'"):
-        write_materials(folder, None, Settings(fitted=False, usdz=package))
+        write_materials(folder, None, Settings(fitted=False, targets={"usdz": package}))
     assert not package.exists()
 
 

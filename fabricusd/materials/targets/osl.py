@@ -11,8 +11,27 @@ from fabricusd.appearance.weave.quadrature import DEFAULT, curve_nodes
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.files import whole_file
+from fabricusd.materials.targets import Job
 
 SOURCE = Path(__file__).resolve().parent / "blender" / "fabric_thread.osl"
+
+
+def check(where: None, clobber: bool) -> None:
+    """Shaders lie beside the look, which is checked."""
+
+
+def folder(look: Path, where: None) -> Path:
+    """The look's."""
+    return look.parent
+
+
+def write(job: Job, where: None) -> list[Path]:
+    """A shader for each fabric, beside the look."""
+    made = []
+    for name, fabric in job.fabrics.items():
+        made.append(job.look.with_name(f"{job.look.stem}.{name}.osl"))
+        write_osl(fabric, made[-1])
+    return made
 
 
 def write_osl(fabric: Fabric, path: Path) -> None:

@@ -8,7 +8,26 @@ from pathlib import Path
 from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdUtils
 
 from fabricusd.errors import FabricError
-from fabricusd.files import whole_file
+from fabricusd.files import require_writable, whole_file
+from fabricusd.materials.targets import Job
+
+
+def check(where: Path, clobber: bool) -> None:
+    """Another suffix, and what cannot be written."""
+    if where.suffix != ".usdz":
+        raise FabricError(f"--usdz '{where}'", "has another suffix; it must be .usdz")
+    require_writable(where, clobber=clobber)
+
+
+def folder(look: Path, where: Path) -> Path:
+    """The package's."""
+    return where.parent
+
+
+def write(job: Job, where: Path) -> list[Path]:
+    """The package alone."""
+    write_usdz(job.look, where, clobber=job.clobber)
+    return [where]
 
 
 def write_usdz(look: Path, path: Path, *, clobber: bool = True) -> None:

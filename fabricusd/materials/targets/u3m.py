@@ -29,6 +29,7 @@ from fabricusd.materials.bake_folder import MapSet, read_bake_folder
 from fabricusd.materials.fit.fit import fit
 from fabricusd.materials.fit.texels import NEEDED, draw_texels
 from fabricusd.materials.networks.look import Look
+from fabricusd.materials.targets import Job
 from fabricusd.srgb import srgb_encode
 from fabricusd.weaves.recognise import recognise
 
@@ -42,6 +43,25 @@ FIBRES = (
 """Words of the format for fibres that a fabric's or thread's name may hold."""
 
 PILE = "velvet", "velour", "corduroy"
+
+
+def check(where: Path, clobber: bool) -> None:
+    """A folder that is not there."""
+    if not where.is_dir():
+        raise FabricError(f"--u3m '{where}'", "is no directory; make it first")
+
+
+def folder(look: Path, where: Path) -> Path:
+    """The folder itself."""
+    return where
+
+
+def write(job: Job, where: Path) -> list[Path]:
+    """A swatch of each fabric, and its pictures."""
+    made: list[Path] = []
+    for name, fabric in job.fabrics.items():
+        made += write_u3m(fabric, where / f"{name}.u3m", fitted=job.fitted)
+    return made
 
 
 def write_u3m(
