@@ -7,10 +7,10 @@ BIN := $(VENV)/Scripts
 endif
 STAMP := $(VENV)/.installed
 
-.PHONY: help demo test quick lint schema bench docs blender clean
+.PHONY: help demo test test-all quick lint schema bench docs blender clean
 
 help:  ## Say what each target does.
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -32,10 +32,13 @@ test: $(STAMP)  ## Run every test, the linters and the type checker.
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'not exhaustive'
+
+test-all: test  ## Run also the tests that are slow and rarely fail.
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m exhaustive
 
 quick: $(STAMP)  ## Run the tests that take under ten seconds each.
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'not slow'
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'not slow and not exhaustive'
 
 lint: $(STAMP)  ## Format, and mend what the linter can.
 	$(BIN)/ruff format .

@@ -176,7 +176,9 @@ def _buffer_pixels(
     with quietly():
         buffer: Any = oiio.ImageBuf(where, 0, level, config or oiio.ImageSpec())
         if buffer.has_error or level >= max(buffer.nmiplevels, 1):
-            reason = reason_of(buffer) or f"there is no level {level}"
+            reason = reason_of(buffer)
+            if level:
+                reason = f"there is no level {level} ({reason or 'too few'})"
             raise FabricError(where, f"cannot be read as a picture: {reason}")
         spec = buffer.spec()
         if spec.deep or spec.depth > 1:

@@ -154,7 +154,7 @@ def test_another_job_does_not_resume(square, linen, tmp_path):
         bake(square, tmp_path, SMALL, fabric=linen, resume=True)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_killed_at_random_moments_it_ends_bit_identical(whole, square, tmp_path):
     """kill -9 thirty times over the whole of a bake; only whole textures are ever seen."""
     program = (

@@ -137,10 +137,10 @@ def far_texel(fabric):
 def test_a_fit_is_never_worse_than_the_textures_alone(name, kind, monkeypatch):
     # Few steps and directions: it must hold wherever the search ends.
     for constant, few in (
-        ("fit.FIRST", 2),
-        ("fit.MORE", 2),
-        ("judge.VIEWS", 6),
-        ("judge.LIGHTS", 32),
+        ("fit.fit.FIRST", 2),
+        ("fit.fit.MORE", 2),
+        ("fit.judge.VIEWS", 6),
+        ("fit.judge.LIGHTS", 32),
     ):
         monkeypatch.setattr(f"fabricusd.materials.{constant}", few)
     fabric = load(name)

@@ -54,7 +54,7 @@ def job(tmp_path_factory):
 def textures_alone(job, monkeypatch):
     """What is not made of the state is left out or made once, since it takes most of the time."""
     scene, linen, _, _ = job
-    known = module._job(scene, SMALL, linen, None)
+    known = module._job(scene, SMALL, linen, None, None)
     recipes = module._recipes(known.found, SMALL)
     sheets = module._sheets(known.found[0], recipes, known.tiles[0], 64, SMALL.margin)
     for name, value in (

@@ -11,10 +11,9 @@ from pxr import Gf, Sdf, UsdGeom, UsdShade
 from scipy.spatial import cKDTree
 
 from fabricusd.errors import FabricError
-from fabricusd.reference.rays import embree
 from fabricusd.reference.rays.triangles import build_tables
 from fabricusd.reference.render import render
-from fabricusd.scene.surface import subdivision
+from fabricusd.scene.surface import embree_library, subdivision
 from fabricusd.scene.usd import mesh as usd_mesh
 from tests.reference.stages import bind_fabric, new_stage, read
 from tests.scene.surface.cages import (
@@ -466,7 +465,7 @@ def test_loop_surfaces_and_a_missing_library_leave_the_cage(tmp_path, monkeypatc
         "/mesh is a subdivision surface (loop), rendered at its cage"
     ]
     cage(stage, SHEET, THIRDS).CreateSubdivisionSchemeAttr("catmullClark")
-    monkeypatch.setattr(embree, "_LIBRARY", None)
+    monkeypatch.setattr(embree_library, "library", lambda: None)
     scene = read(stage, complexity="high")
     assert len(scene.meshes[0].triangles) == len(THIRDS)
     assert [n.endswith("Embree's own library is not here") for n in scene.notes] == [True]
