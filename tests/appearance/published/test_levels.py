@@ -81,7 +81,7 @@ def cases():
             yield pytest.param(name, model, marks=[pytest.mark.exhaustive] if long else [])
 
 
-@pytest.mark.parametrize(("name", "model"), cases())
+@pytest.mark.parametrize(("name", "model"), list(cases()))
 def test_the_mean_of_weave_over_places_is_far(name, model):
     """With the same `Q` or `G1` on both sides; the default rule's own is 0.2 % off on velvet."""
     fabric = with_model(PRESETS[name], model)
