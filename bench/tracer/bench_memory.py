@@ -15,7 +15,8 @@ import numpy as np
 
 from fabricusd.fabric import Binding
 from fabricusd.reference.render import render_scene
-from fabricusd.scene.scene import DOME, FabricSurface, Light, Mesh, Scene
+from fabricusd.scene.light_kinds import DOME
+from fabricusd.scene.scene import FabricSurface, Light, Mesh, Scene
 from fabricusd.schema import load
 
 POINTS = 708

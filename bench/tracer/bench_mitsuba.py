@@ -38,7 +38,8 @@ from fabricusd.appearance.scattering.columns import (
 )
 from fabricusd.reference.rays.triangles import N, build_tables
 from fabricusd.reference.render import render_scene
-from fabricusd.scene.scene import DOME, FabricSurface, Light, PreviewSurface, Scene
+from fabricusd.scene.light_kinds import DOME
+from fabricusd.scene.scene import FabricSurface, Light, PreviewSurface, Scene
 
 DEPTH = 4
 PICTURES = 9

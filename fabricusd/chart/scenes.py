@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.fabric import Binding, Fabric
-from fabricusd.scene.scene import DISTANT, DOME, Camera, FabricSurface, Light, Mesh, Scene
+from fabricusd.scene.light_kinds import DISTANT, DOME
+from fabricusd.scene.scene import Camera, FabricSurface, Light, Mesh, Scene
 
 RADIUS = 0.05
 """Of a cylinder [m]."""

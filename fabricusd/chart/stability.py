@@ -25,7 +25,8 @@ from fabricusd.chart.scenes import cloth, facing
 from fabricusd.fabric import PILE_ANGLE, Fabric
 from fabricusd.files import whole_file
 from fabricusd.reference.render import render_scene
-from fabricusd.scene.scene import SPHERE, Light, Mesh, Scene
+from fabricusd.scene.light_kinds import SPHERE
+from fabricusd.scene.scene import Light, Mesh, Scene
 from fabricusd.schema import load
 
 Floats = NDArray[np.float64]

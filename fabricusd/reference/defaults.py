@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from fabricusd.scene.scene import DISTANT, DOME, Light, Scene
+from fabricusd.scene.light_kinds import DISTANT, DOME
+from fabricusd.scene.scene import Light, Scene
 
 
 def default_lights(scene: Scene) -> list[Light]:

@@ -14,11 +14,6 @@ from numpy.typing import NDArray
 
 from fabricusd.fabric import Binding
 
-LIGHT_KINDS = ("distant", "dome", "rect", "disk", "sphere", "cylinder")
-"""Kinds of light; `Light.kind` is an index into this."""
-
-DISTANT, DOME, RECT, DISK, SPHERE, CYLINDER = range(len(LIGHT_KINDS))
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Texture:

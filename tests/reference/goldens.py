@@ -18,7 +18,8 @@ import numpy as np
 from fabricusd.images.files import write_exr
 from fabricusd.reference.film import AOVS
 from fabricusd.reference.render import RenderResult
-from fabricusd.scene.scene import DOME, RECT, Camera, Light, Mesh, PreviewSurface
+from fabricusd.scene.light_kinds import DOME, RECT
+from fabricusd.scene.scene import Camera, Light, Mesh, PreviewSurface
 from fabricusd.schema import load
 from tests.reference.scenes import cloth, grid, lambert, looking, picture, sphere
 

@@ -10,15 +10,8 @@ from scipy import stats
 
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.reference.render import RenderResult, render_scene
-from fabricusd.scene.scene import (
-    DISTANT,
-    Camera,
-    FabricSurface,
-    Light,
-    Mesh,
-    PreviewSurface,
-    Scene,
-)
+from fabricusd.scene.light_kinds import DISTANT
+from fabricusd.scene.scene import Camera, FabricSurface, Light, Mesh, PreviewSurface, Scene
 
 
 def looking(eye: Any, at: Any = (0.0, 0.0, 0.0), up: Any = (0.0, 1.0, 0.0)) -> NDArray[np.float64]:

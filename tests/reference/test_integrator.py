@@ -8,17 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fabricusd.scene.scene import (
-    CYLINDER,
-    DISK,
-    DISTANT,
-    DOME,
-    RECT,
-    SPHERE,
-    Camera,
-    Light,
-    PreviewSurface,
-)
+from fabricusd.scene.light_kinds import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE
+from fabricusd.scene.scene import Camera, Light, PreviewSurface
 from fabricusd.schema import load
 from fabricusd.stop import Stop
 from tests.reference.scenes import (

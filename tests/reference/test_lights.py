@@ -8,18 +8,18 @@ import sys
 import pytest
 
 from fabricusd.reference.lights.kinds import KINDS
-from fabricusd.scene.scene import LIGHT_KINDS
+from fabricusd.scene import light_kinds
 
 
 def test_every_kind_of_a_scene_has_its_module():
-    assert list(KINDS) == list(range(len(LIGHT_KINDS)))
-    assert [m.__name__.rpartition(".")[2] for m in KINDS.values()] == list(LIGHT_KINDS)
+    assert list(KINDS) == list(range(len(light_kinds.KINDS)))
+    assert [m.__name__.rpartition(".")[2] for m in KINDS.values()] == list(light_kinds.NUMBERS)
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("scene.LIGHT_KINDS += ('tube',)", "no module for the lights tube"),
+        ("k.KINDS += (k.LightKind(name='tube', usd=('Tube',)),)", "no module for the lights tube"),
         ("import fabricusd.kernels; sys.modules['fabricusd.reference.lights.kinds.rect'] = "
          "types.SimpleNamespace(__name__='rect', KIND=2, fill=1)", "rect has no irradiance"),
         ("sys.modules['fabricusd.reference.lights.kinds.rect'] = types.SimpleNamespace("
@@ -28,7 +28,7 @@ def test_every_kind_of_a_scene_has_its_module():
 )  # fmt: skip
 def test_a_kind_that_is_forgotten_or_half_made_is_an_error_at_import(change, words):
     code = (
-        "import sys, types\nfrom fabricusd.scene import scene\n"
+        "import sys, types\nfrom fabricusd.scene import light_kinds as k\n"
         f"{change}\nimport fabricusd.reference.lights.kinds"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

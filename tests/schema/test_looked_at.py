@@ -109,3 +109,40 @@ def test_stripes_and_grain_of_a_marked_cloth_lie_where_the_file_says(folder):
             assert mean[color == 1].min() > 1.5 * mean[color == 0].max(), kind
         else:
             assert np.ptp(mean) < 1e-3, kind
+
+
+@pytest.fixture
+def shot(tmp_path: Path) -> Path:
+    """The cases, with shot silk beside them."""
+    shutil.copytree(CASES, tmp_path, dirs_exist_ok=True)
+    save(load("silk_shot"), tmp_path / "silk_shot.usda")
+    return tmp_path
+
+
+def green_over_red(scene, **settings):
+    made = render(scene, None, width=48, height=48, spp=32, **settings)
+    color = made.layers["beauty"][8:-8, 8:-8, :3].mean(axis=(0, 1))
+    return float(color[1] / color[0])
+
+
+OF_EACH_SET = "shadows keep the light of each set, not the hue of both: docs/decisions/004"
+
+
+@pytest.mark.xfail(reason=OF_EACH_SET, strict=True)
+@pytest.mark.parametrize("level", ["weave", "thread"])
+def test_shot_silk_has_one_hue_at_every_level_with_shadows(shot, level):
+    scene = shot / "a_silk_shot_4.usda"
+    far = green_over_red(scene, level="far")
+    assert green_over_red(scene, level=level) == pytest.approx(far, rel=0.05)
+
+
+@pytest.mark.xfail(reason=OF_EACH_SET, strict=True)
+def test_shot_silk_keeps_its_hue_as_the_camera_comes_near(shot):
+    hues = [green_over_red(shot / "dolly_silk_shot.usda", frames=(k,)) for k in (1, 3, 5, 8)]
+    assert max(hues) / min(hues) < 1.05
+
+
+def test_shot_silk_has_one_hue_at_every_level_without_shadows(shot):
+    scene = shot / "a_silk_shot_4.usda"
+    hues = [green_over_red(scene, level=k, shadow="none") for k in ("far", "weave", "thread")]
+    assert max(hues) / min(hues) < 1.05

@@ -17,7 +17,8 @@ from fabricusd.kernels.real import LEAN, cos, sin
 from fabricusd.reference.lights.dome import Dome, build_dome, place_of, smooth_radiance
 from fabricusd.reference.lights.kinds import KINDS
 from fabricusd.reference.lights.row import CHANCE, COLUMNS, KIND, RED, VISIBLE, P, axes_of
-from fabricusd.scene.scene import DOME, Light
+from fabricusd.scene.light_kinds import DOME
+from fabricusd.scene.scene import Light
 
 R = np.float32
 _PI = R(math.pi)

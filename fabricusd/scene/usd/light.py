@@ -12,26 +12,12 @@ from pxr import Sdf, Usd, UsdLux
 
 from fabricusd.errors import FabricError
 from fabricusd.images.files import read_image
-from fabricusd.scene.scene import CYLINDER, DISK, DISTANT, DOME, RECT, SPHERE, Light, Scene
+from fabricusd.scene.light_kinds import DISTANT, DOME, KINDS, Size
+from fabricusd.scene.scene import Light, Scene
 from fabricusd.scene.usd.asset import asset_file
 from fabricusd.scene.usd.value import value_of
 
-_KINDS = {
-    "DistantLight": DISTANT,
-    "DomeLight": DOME,
-    "DomeLight_1": DOME,
-    "RectLight": RECT,
-    "DiskLight": DISK,
-    "SphereLight": SPHERE,
-    "CylinderLight": CYLINDER,
-}
-_LENGTHS = {
-    RECT: {"width": 1.0, "height": 1.0},
-    DISK: {"radius": 0.5},
-    SPHERE: {"radius": 0.5},
-    CYLINDER: {"radius": 0.5, "length": 1.0},
-}
-"""The lengths that each kind has, and what they are where nothing is said [scene unit]."""
+_NUMBERS = {name: number for number, kind in enumerate(KINDS) for name in kind.usd}
 
 _SMALLEST = 1e-3
 """Scene units that a normalised light without extent gets: it has power, and needs a surface."""
@@ -105,7 +91,7 @@ def read_light(
     matrix : (4, 4) local to world, in scene units of `metres`
     """
     inputs = _Inputs(prim, time, scene)
-    kind = _KINDS.get(str(prim.GetTypeName()))
+    kind = _NUMBERS.get(str(prim.GetTypeName()))
     if kind is None:
         inputs.note(f"is a light of the unknown type '{prim.GetTypeName()}', left out")
         return None
@@ -131,7 +117,7 @@ def read_light(
         inputs.note("has no angle; its intensity is taken as irradiance")
     frame = matrix.copy()
     frame[:3, 3] *= metres
-    if kind in _LENGTHS and _reach(frame, lengths, metres) > _FARTHEST:
+    if lengths and _reach(frame, lengths, metres) > _FARTHEST:
         inputs.note(f"reaches beyond {_FARTHEST:g} m, left out")
         return None
     _note_left_out(inputs, kind, matrix)
@@ -180,7 +166,7 @@ def _of_black_body(inputs: _Inputs) -> NDArray[np.float64]:
 def _lengths(inputs: _Inputs, kind: int, normalize: bool) -> dict[str, float] | None:
     """The light's lengths by their names, or None with a note where they make no light."""
     found = {}
-    for name, otherwise in _LENGTHS.get(kind, {}).items():
+    for name, otherwise in KINDS[kind].lengths.items():
         length = inputs.number(name, otherwise)
         if not (math.isfinite(length) and length >= 0) or (length == 0 and not normalize):
             inputs.note(f"has {name} {length:g}; it must be above 0, left out")
@@ -207,8 +193,8 @@ def _note_left_out(inputs: _Inputs, kind: int, matrix: NDArray[np.float64]) -> N
         if _is_linked(inputs.prim, name):
             inputs.note(f"has a {name} collection, left out: it lights and shadows everything")
     scales = np.linalg.norm(matrix[:3, :3], axis=0)
-    round_ = {SPHERE: scales, CYLINDER: scales[1:]}.get(kind, scales[:1])
-    if np.ptp(round_) > _UNEVEN * round_.max():
+    first = KINDS[kind].round
+    if first is not None and np.ptp(scales[first:]) > _UNEVEN * scales[first:].max():
         inputs.note("is scaled unevenly; it is rendered round, with its mean radius")
 
 
@@ -239,19 +225,10 @@ def _reach(frame: NDArray[np.float64], lengths: dict[str, float], metres: float)
 
 
 def _size(kind: int, matrix: NDArray[np.float64], lengths: dict[str, float], angle: float) -> float:
-    """What `normalize` divides by: area in square scene units, for a distant light its projected
-    solid angle, beyond half a sphere as UsdLux continues it."""
+    """What `normalize` divides by."""
     x, y, z = (float(np.linalg.norm(matrix[:3, k])) for k in range(3))
     flat = float(np.linalg.norm(np.cross(matrix[:3, 0], matrix[:3, 1])))
-    radius = lengths.get("radius", 0.0)
-    sine2 = math.sin(0.5 * angle) ** 2
-    return {
-        DISTANT: math.pi * (sine2 if angle <= math.pi else 2 - sine2) if angle > 0 else 1.0,
-        RECT: lengths.get("width", 1.0) * lengths.get("height", 1.0) * flat,
-        DISK: math.pi * radius**2 * flat,
-        SPHERE: 4 * math.pi * (radius * (x + y + z) / 3) ** 2,
-        CYLINDER: 2 * math.pi * radius * 0.5 * (y + z) * lengths.get("length", 1.0) * x,
-    }.get(kind, 1.0)
+    return KINDS[kind].size(Size(x, y, z, flat, lengths, angle))
 
 
 def _pole(inputs: _Inputs, frame: NDArray[np.float64]) -> NDArray[np.float64]:

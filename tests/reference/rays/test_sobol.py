@@ -14,7 +14,8 @@ from fabricusd.reference.rays.sobol import (
     reverse_bits,
     sobol_reversed,
 )
-from fabricusd.scene.scene import RECT, Camera, Light
+from fabricusd.scene.light_kinds import RECT
+from fabricusd.scene.scene import Camera, Light
 from tests.reference.scenes import grid, lambert, looking, picture
 
 

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fabricusd.reference.surfaces.normal_map import LEAST_FACING, mapped_frame
-from fabricusd.scene.scene import DOME, RECT, Camera, Light, PreviewSurface, Texture
+from fabricusd.scene.light_kinds import DOME, RECT
+from fabricusd.scene.scene import Camera, Light, PreviewSurface, Texture
 from tests.reference.scenes import (
     above,
     grid,

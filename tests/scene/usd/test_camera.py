@@ -11,7 +11,8 @@ from pxr import Gf, UsdGeom
 from fabricusd.errors import FabricError
 from fabricusd.reference.rays.camera import build_lens
 from fabricusd.reference.render import render_scene
-from fabricusd.scene.scene import DOME, Camera, Light, PreviewSurface, Scene
+from fabricusd.scene.light_kinds import DOME
+from fabricusd.scene.scene import Camera, Light, PreviewSurface, Scene
 from tests.reference.scenes import grid, looking
 from tests.reference.stages import new_stage, read
 

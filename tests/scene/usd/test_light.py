@@ -11,7 +11,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdUtils
 from fabricusd.images.files import write_exr, write_png
 from fabricusd.reference.lights.row import AREA, P, X, Y, Z
 from fabricusd.reference.lights.table import build_lights
-from fabricusd.scene.scene import DOME, Camera, Light
+from fabricusd.scene.light_kinds import DOME
+from fabricusd.scene.scene import Camera, Light
 from tests.reference.scenes import above, grid, lambert, looking, picture
 from tests.reference.stages import new_stage, read, square
 

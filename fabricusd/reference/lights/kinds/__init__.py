@@ -15,7 +15,7 @@ import pkgutil
 from importlib import import_module
 from types import ModuleType
 
-from fabricusd.scene.scene import LIGHT_KINDS
+from fabricusd.scene import light_kinds
 
 _PARTS = ("fill", "irradiance", "sample", "meet")
 
@@ -30,7 +30,7 @@ def _find() -> dict[int, ModuleType]:
         if module.KIND in found:
             raise ImportError(f"{module.__name__} and {found[module.KIND].__name__} are one kind")
         found[module.KIND] = module
-    forgotten = [name for number, name in enumerate(LIGHT_KINDS) if number not in found]
+    forgotten = [kind.name for number, kind in enumerate(light_kinds.KINDS) if number not in found]
     if forgotten:
         raise ImportError(f"{__name__} has no module for the lights {', '.join(forgotten)}")
     return dict(sorted(found.items()))

@@ -13,7 +13,8 @@ from fabricusd.reference.lights.dome import Dome
 from fabricusd.reference.lights.hit_block import U0, U1, keep_point
 from fabricusd.reference.lights.ray_block import D_X, D_Y, D_Z, add_area, towards
 from fabricusd.reference.lights.row import AREA, SIZE, Axes, P, X, Y, Z, mean_irradiance, put_axes
-from fabricusd.scene.scene import CYLINDER, Light
+from fabricusd.scene.light_kinds import CYLINDER
+from fabricusd.scene.scene import Light
 
 KIND = CYLINDER
 R = np.float32

@@ -13,7 +13,8 @@ from fabricusd.reference.lights.dome import Dome
 from fabricusd.reference.lights.hit_block import U0, U1, keep_flat
 from fabricusd.reference.lights.ray_block import meet_flat
 from fabricusd.reference.lights.row import AREA, Axes, mean_irradiance, put_axes
-from fabricusd.scene.scene import DISK, Light
+from fabricusd.scene.light_kinds import DISK
+from fabricusd.scene.scene import Light
 
 KIND = DISK
 R = np.float32

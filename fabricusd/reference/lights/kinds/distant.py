@@ -13,7 +13,8 @@ from fabricusd.reference.lights.dome import Dome
 from fabricusd.reference.lights.hit_block import FAR, U0, U1, in_cone, keep
 from fabricusd.reference.lights.ray_block import D_X, D_Y, D_Z, ENDLESS, REACH, add
 from fabricusd.reference.lights.row import AREA, CHANCE, SIZE, Axes, Z, brightness, put_axes
-from fabricusd.scene.scene import DISTANT, Light
+from fabricusd.scene.light_kinds import DISTANT
+from fabricusd.scene.scene import Light
 
 KIND = DISTANT
 R = np.float32

@@ -44,7 +44,8 @@ from fabricusd.reference.lights.ray_block import (
     weight_of,
 )
 from fabricusd.reference.lights.row import CHANCE, LUMINANCE, VISIBLE, Axes
-from fabricusd.scene.scene import DOME, Light
+from fabricusd.scene.light_kinds import DOME
+from fabricusd.scene.scene import Light
 
 KIND = DOME
 R = np.float32

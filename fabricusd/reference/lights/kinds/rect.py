@@ -11,7 +11,8 @@ from fabricusd.reference.lights.dome import Dome
 from fabricusd.reference.lights.hit_block import U0, U1, keep_flat
 from fabricusd.reference.lights.ray_block import meet_flat
 from fabricusd.reference.lights.row import AREA, Axes, mean_irradiance, put_axes
-from fabricusd.scene.scene import RECT, Light
+from fabricusd.scene.light_kinds import RECT
+from fabricusd.scene.scene import Light
 
 KIND = RECT
 R = np.float32

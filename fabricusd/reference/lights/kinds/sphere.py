@@ -21,7 +21,8 @@ from fabricusd.reference.lights.row import (
     mean_irradiance,
     put_axes,
 )
-from fabricusd.scene.scene import SPHERE, Light
+from fabricusd.scene.light_kinds import SPHERE
+from fabricusd.scene.scene import Light
 
 KIND = SPHERE
 R = np.float32
