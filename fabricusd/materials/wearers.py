@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
+from fabricusd.bake.layout.copies import are_alike
 from fabricusd.bake.layout.garment import Garment, fitted, garments
 from fabricusd.errors import FabricError
 from fabricusd.materials.bake_folder import MapSet
@@ -78,7 +79,7 @@ def find_wearers(scene: Path, sets: tuple[MapSet, ...]) -> Dressed:
             if not prim:
                 notes.append(f"{path} is not in {scene.name} any more; it gets no look")
                 continue
-            _compare(maps, now.get(path), path, notes)
+            _compare(maps, now.get(path), [now[k] for k in maps.prims if k in now], path, notes)
             wearers += _of(prim, maps, notes)
             name = _uv_name(prim)
             if path in now and not (maps.own_uv and name == "st"):
@@ -103,14 +104,20 @@ def _garments(scene: Path, sets: tuple[MapSet, ...]) -> dict[str, Garment]:
     return found
 
 
-def _compare(maps: MapSet, now: Garment | None, path: str, notes: list[str]) -> None:
+def _compare(
+    maps: MapSet, now: Garment | None, sharing: list[Garment], path: str, notes: list[str]
+) -> None:
+    """Say what has changed; sharing : the garments of all prims that have these textures."""
     if now is None:
         notes.append(f"{path} wears no fabric any more; its textures are bound all the same")
         return
-    if now.fingerprint == maps.fingerprint:
-        return
-    if not maps.own_uv and fitted(now).fingerprint == maps.fingerprint:
-        return
+    # The fingerprint is that of one of the copies, which lie in different places.
+    for one in sharing:
+        same = one.fingerprint == maps.fingerprint or (
+            not maps.own_uv and fitted(one).fingerprint == maps.fingerprint
+        )
+        if same and (one is now or are_alike(one, now)):
+            return
     notes.append(f"{path} has changed since it was baked; bake it again if its UVs or fabric did")
 
 

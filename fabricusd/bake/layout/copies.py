@@ -7,11 +7,15 @@ its cloth has another number of threads.
 from __future__ import annotations
 
 import hashlib
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.scene.scene import Mesh
+
+if TYPE_CHECKING:
+    from fabricusd.bake.layout.garment import Garment
 
 SAME = 1e-6
 """Distance, over a mesh's extent, within which two points are one: single precision moves a point
@@ -38,19 +42,44 @@ def are_copies(a: Mesh, b: Mesh, *, turned: bool = True) -> bool:
 
     turned : whether a turned mesh is a copy as well, or one that was moved alone
     """
+    turn = _turn(a, b, turned=turned)
+    if turn is None or a.normals is None or b.normals is None:
+        return turn is not None
+    return bool(np.abs(np.asarray(a.normals) @ turn - b.normals).max(initial=0.0) <= SAME_NORMAL)
+
+
+class Shape(Protocol):
+    """Triangles in space, as meshes and garments have them."""
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(n, 3) [m]."""
+
+    @property
+    def triangles(self) -> NDArray[Any]:
+        """(m, 3) int."""
+
+
+def are_alike(a: Garment, b: Garment) -> bool:
+    """Whether two garments are one that was moved and turned, in the same UVs."""
+    same_uv = a.uv.shape == b.uv.shape and np.array_equal(a.uv, b.uv)
+    same = same_uv and np.array_equal(a.triangles, b.triangles) and np.array_equal(a.lay, b.lay)
+    return bool(same) and _turn(a, b, turned=True) is not None
+
+
+def _turn(a: Shape, b: Shape, *, turned: bool) -> NDArray[np.float64] | None:
+    """(3, 3) rotation that brings the points of `a` to those of `b`; None where none does."""
     # Points that no triangle has do not show.
     used = np.unique(a.triangles)
-    p, q = (np.asarray(mesh.points, np.float64)[used] for mesh in (a, b))
+    if used.max(initial=-1) >= len(b.points):
+        return None
+    p, q = (np.asarray(shape.points, np.float64)[used] for shape in (a, b))
     if not (np.isfinite(p).all() and np.isfinite(q).all()):
-        return False
+        return None
     p, q = p - p.mean(axis=0), q - q.mean(axis=0)
     extent = float(np.ptp(p, axis=0).max(initial=0.0))
     turn = _rotation(p / max(extent, 1e-300), q / max(extent, 1e-300)) if turned else np.eye(3)
-    if not np.abs(p @ turn - q).max(initial=0.0) <= SAME * extent:
-        return False
-    if a.normals is None or b.normals is None:
-        return True
-    return bool(np.abs(np.asarray(a.normals) @ turn - b.normals).max(initial=0.0) <= SAME_NORMAL)
+    return turn if np.abs(p @ turn - q).max(initial=0.0) <= SAME * extent else None
 
 
 def _rotation(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
