@@ -110,7 +110,8 @@ def test_a_terminal_that_is_closed_does_not_cost_the_picture(tmp_path):
         os.chdir(tmp_path)
         os.execve(sys.executable, [sys.executable, "-c", RENDER, *LONG], environment())
     seen = b""
-    while b"sampling" not in seen:
+    # With its line end: until that is out the process is still printing.
+    while b"sampling\r\n" not in seen:
         seen += os.read(terminal, 4096)
     os.close(terminal)
     deadline = time.monotonic() + 60
