@@ -7,6 +7,7 @@ it each test tries a few, so that the suite stays short.
 from __future__ import annotations
 
 import faulthandler
+import gc
 import os
 import random
 import signal
@@ -55,6 +56,9 @@ def no_hang(seconds: float = SECONDS) -> Iterator[None]:
         raise Hang(late[0])
 
     before = signal.signal(signal.SIGPROF, stop)
+    # Looking through what hypothesis keeps of a long run takes a second by itself.
+    collecting = gc.isenabled()
+    gc.disable()
     faulthandler.dump_traceback_later(STUCK, exit=True, file=sys.__stderr__)
     signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
@@ -63,6 +67,8 @@ def no_hang(seconds: float = SECONDS) -> Iterator[None]:
         signal.setitimer(signal.ITIMER_PROF, 0)
         faulthandler.cancel_dump_traceback_later()
         signal.signal(signal.SIGPROF, before)
+        if collecting:
+            gc.enable()
     if late:
         raise Hang(late[0])
 

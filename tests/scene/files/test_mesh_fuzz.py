@@ -173,7 +173,8 @@ def gltfs(draw):
         elif kind == 1 and isinstance(holder, list):
             holder += [copy.deepcopy(holder[way[-1]])] * draw(st.integers(1, 9))
         else:
-            holder[way[-1]] = draw(_VALUE)
+            # A copy: the strategy hands out its own lists, which later changes would change.
+            holder[way[-1]] = copy.deepcopy(draw(_VALUE))
         if not root:
             break
     made = Gltf()
