@@ -6,11 +6,11 @@ import signal
 import sys
 import time
 
-import fuzz
 import pytest
 from hypothesis import given
 
 from fabricusd.errors import FabricError
+from tests import fuzz
 
 
 def busy(seconds: float) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import fuzz
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fabricusd.cli.new import _color_order
 from fabricusd.errors import FabricError
+from tests import fuzz
 
 
 def test_counts_repeat_the_colour_that_follows() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fuzz
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,6 +9,7 @@ from hypothesis import strategies as st
 
 from fabricusd.errors import FabricError
 from fabricusd.weaves import parse_weave
+from tests import fuzz
 
 
 def slow_cells(expression: str, ends: int, picks: int) -> np.ndarray:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import fuzz
 import numpy as np
 import OpenImageIO as oiio
 import pytest
@@ -15,6 +14,7 @@ from fabricusd.errors import FabricError
 from fabricusd.weaves import parse_color, parse_weave, read_image
 from fabricusd.weaves.color import palette_from_codes
 from fabricusd.weaves.image.threads import find_threads
+from tests import fuzz
 
 RED, BLUE, GREEN, YELLOW, DARK = (
     (200, 0, 0), (0, 0, 200), (0, 160, 0), (250, 240, 0), (20, 20, 30),

@@ -6,7 +6,6 @@ import io
 import struct
 from pathlib import Path
 
-import fuzz
 import numpy as np
 import OpenImageIO as oiio
 import pytest
@@ -17,6 +16,7 @@ from PIL import Image
 from fabricusd.images.files import read_image as read_picture
 from fabricusd.images.files import read_middle, read_mip_level
 from fabricusd.weaves import read_image
+from tests import fuzz
 from tests.png import png
 
 CELLS = np.random.default_rng(0).random((20, 16)) < 0.5

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import fuzz
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,6 +13,7 @@ from fabricusd.errors import FabricError
 from fabricusd.weaves import parse_color, parse_weave
 from fabricusd.weaves.named import DARK, LIGHT, WEAVES
 from fabricusd.weaves.recognise import recognise, shortest_repeat
+from tests import fuzz
 
 
 def picture(text: str) -> list[str]:

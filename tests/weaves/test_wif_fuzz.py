@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import fuzz
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,6 +12,7 @@ from hypothesis import strategies as st
 from fabricusd.weaves import draw, parse_wif, read_wif, to_fabric, wif_text
 from fabricusd.weaves.draft import LIMIT
 from fabricusd.weaves.wif.lines import KEYS, NUMBERED
+from tests import fuzz
 from tests.wif_samples import SMALL, TWILL
 
 

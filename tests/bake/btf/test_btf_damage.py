@@ -9,7 +9,6 @@ import zipfile
 from pathlib import Path
 from types import SimpleNamespace
 
-import fuzz
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -26,6 +25,7 @@ from fabricusd.bake.btf.matrix import ring_directions
 from fabricusd.bake.btf.ubo import read_ubo, write_ubo
 from fabricusd.errors import FabricError
 from fabricusd.images.files import read_exr_layers
+from tests import fuzz
 
 HOSTILE = Path(__file__).parents[2] / "cases" / "hostile"
 
