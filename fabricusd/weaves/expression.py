@@ -40,6 +40,9 @@ DEEPEST = 50
 MOST_TERMS = 32
 """Most comparisons and calls; each costs one pass over the repeat."""
 
+MOST_WORK = 16 * LARGEST * LARGEST
+"""Most comparisons and calls, each times the crossings of the repeat: half a second."""
+
 LARGEST_NUMBER = 10**6
 """Largest constant; products with a thread number then stay far inside 64 bits."""
 
@@ -94,12 +97,20 @@ def parse_expression(text: str) -> Draft:
     if len(text) > LONGEST:
         raise FabricError(where, f"is {len(text)} characters long; it must be at most {LONGEST}")
     try:
-        term = _term(_tree(text))
+        tree, terms = _tree(text)
+        term = _term(tree)
         if not term.truth:
             raise FabricError("", f"is a number; it must be compared, {FORM}")
         if max(term.ends, term.picks) > LARGEST:
             raise FabricError(
                 "", f"repeats after {term.ends} x {term.picks}; it must be at most {LARGEST}"
+            )
+        crossings = term.ends * term.picks
+        if terms * crossings > MOST_WORK:
+            raise FabricError(
+                "",
+                f"has {terms} comparisons and calls over a repeat of {term.ends} x {term.picks}; "
+                f"it must have at most {MOST_WORK // crossings} of them there",
             )
     except FabricError as error:
         raise error.inside(where) from None
@@ -135,7 +146,8 @@ def _not_a_satin(text: str, name: str) -> tuple[str, ...]:
     return ()
 
 
-def _tree(text: str) -> ast.expr:
+def _tree(text: str) -> tuple[ast.expr, int]:
+    """The syntax of an expression, and how many comparisons and calls it has."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SyntaxWarning)
@@ -158,7 +170,7 @@ def _tree(text: str) -> ast.expr:
         raise FabricError(
             "", f"has {terms} comparisons and calls; it must have at most {MOST_TERMS}"
         )
-    return tree
+    return tree, terms
 
 
 def _term(node: ast.expr) -> _Term:

@@ -49,7 +49,8 @@ def _draft(lines: Iterable[str], file: str) -> Draft:
     picks = _count(wif, "WEFT", ("TREADLING", "LIFTPLAN", "WEFT COLORS"))
     cells = drawdown(wif, ends, picks)
     about = wif.section("TEXT")
-    title = about.text("title") or Path(file).stem
+    # Blanks of other kinds would not survive being written.
+    title = " ".join(about.text("title").split()) or Path(file).stem
     table = color_table(wif)
     fields: dict[str, Any] = {}
     for label, count in (("warp", ends), ("weft", picks)):
@@ -65,7 +66,7 @@ def _draft(lines: Iterable[str], file: str) -> Draft:
     return Draft(
         weave=Weave(cells, title),
         title=title,
-        author=about.text("author"),
+        author=" ".join(about.text("author").split()),
         notes=_notes(wif),
         source=Path(file).name,
         warnings=tuple(wif.warnings),
