@@ -115,7 +115,9 @@ def read_ubo(path: str | os.PathLike[str]) -> UboFile:
     if not joint and not head.startswith(PER_CHANNEL):
         raise FabricError(str(path), "is no .btf file of FMF or DFMF factors")
     reader = _Reader(str(path), data, len(JOINT if joint else PER_CHANNEL))
-    one = _parse(reader, joint)
+    # A signalling NaN warns wherever it is copied; what is not finite is counted and refused.
+    with np.errstate(invalid="ignore"):
+        one = _parse(reader, joint)
     require_whole(str(path), one.directions, one.factors, one.size)
     return one
 

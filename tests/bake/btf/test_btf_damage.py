@@ -303,3 +303,13 @@ def test_a_mutated_picture_of_layers_is_read_or_refused(
         fuzz.refusal(read_exr_layers, path)
 
     try_one()
+
+
+def test_a_signalling_nan_at_any_place_is_counted_as_any_other(
+    tmp_path: Path, seeds: dict[str, bytes]
+) -> None:
+    path, data, said = tmp_path / "a.btf", seeds["channels"], []
+    for place in range(6, len(data) - 4, 3):
+        path.write_bytes(data[:place] + b"\x01\x00\xa0\x7f" + data[place + 4 :])
+        said.append(fuzz.refusal(read_ubo, path) or "")
+    assert sum("angles" in line for line in said) > 1, set(said)
