@@ -10,9 +10,9 @@ from fabricusd.schema.rules.rules import RULES
 
 HERE = Path(__file__).resolve().parent
 TYPES = (
-    ("Fabric", "A prim type."),
-    ("FabricThread", "A prim type; a child of its Fabric, or anywhere by relationship."),
-    ("FabricBindingAPI", "A single-apply API schema, on a Mesh or a GeomSubset."),
+    ("WovenFabric", "A prim type."),
+    ("WovenThread", "A prim type; a child of its Fabric, or anywhere by relationship."),
+    ("WovenBindingAPI", "A single-apply API schema, on a Mesh or a GeomSubset."),
 )
 
 

@@ -22,7 +22,7 @@ example:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """A fabric, and the form to print it in."""
     parser.add_argument("file", metavar="FILE", help="USD file, FILE:/PRIM, draft or preset")
-    parser.add_argument("prim", metavar="PRIM", nargs="?", help="path of the Fabric prim")
+    parser.add_argument("prim", metavar="PRIM", nargs="?", help="path of the WovenFabric prim")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="everything as JSON, in SI and degrees")
     form.add_argument("--flatten", action="store_true", help="the composed stage as USD text")

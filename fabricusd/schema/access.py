@@ -2,7 +2,7 @@
 
 USD builds its table of prim definitions once, when the first one is asked for. In a program that
 used a stage before it imported fabricusd, the schema comes too late for that table: USD then leaves
-FabricBindingAPI out of a prim's applied schemas, and attributes have no fallbacks. Everything here
+WovenBindingAPI out of a prim's applied schemas, and attributes have no fallbacks. Everything here
 reads the authored opinions and the schema's own layer instead, so both orders give one answer.
 """
 
@@ -16,8 +16,8 @@ from pxr import Pcp, Sdf, Usd
 
 from fabricusd.schema.plugin import FOLDER
 
-BINDING_API = "FabricBindingAPI"
-TYPES = ("Fabric", "FabricThread")
+BINDING_API = "WovenBindingAPI"
+TYPES = ("WovenFabric", "WovenThread")
 
 
 @cache
@@ -27,7 +27,7 @@ def _schema() -> Sdf.Layer:
 
 @cache
 def definition(name: str) -> dict[str, Sdf.PropertySpec]:
-    """The properties of "Fabric", "FabricThread" or "FabricBindingAPI" by name."""
+    """The properties of "WovenFabric", "WovenThread" or "WovenBindingAPI" by name."""
     return {spec.name: spec for spec in _schema().GetPrimAtPath(f"/{name}").properties}
 
 
@@ -41,7 +41,7 @@ def definitions(prim: Usd.Prim) -> Iterator[dict[str, Sdf.PropertySpec]]:
 
 
 def applies_binding(prim: Usd.Prim) -> bool:
-    """Whether FabricBindingAPI is applied to a prim."""
+    """Whether WovenBindingAPI is applied to a prim."""
     authored = prim.GetMetadata("apiSchemas")
     if authored is not None and BINDING_API in authored.GetAppliedItems():
         return True

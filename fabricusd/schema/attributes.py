@@ -58,10 +58,10 @@ THREAD = (
     Attribute("thread:thickness", "double", Thread, "thickness", MILLIMETRE, "mm"),
     Attribute("thread:color", "color3d", Thread, "color"),
 )
-"""Numbers of a FabricThread; its curve and its model are read apart."""
+"""Numbers of a WovenThread; its curve and its model are read apart."""
 
 FABRIC = (Attribute("fabric:maskingWidth", "double", Fabric, "masking_width", DEGREE, "degrees"),)
-"""Numbers of a Fabric; the sets, the weave, tokens and relationships are read apart."""
+"""Numbers of a WovenFabric; the sets, the weave, tokens and relationships are read apart."""
 
 
 def thread_set(which: str) -> tuple[Attribute, Attribute]:
@@ -82,7 +82,7 @@ BINDING = (
     Attribute("fabric:binding:rotation", "double", Binding, "rotation", DEGREE, "degrees"),
     Attribute("fabric:binding:offset", "double2", Binding, "offset"),
 )
-"""Numbers of a FabricBindingAPI."""
+"""Numbers of a WovenBindingAPI."""
 
 
 def to_si(value: Any, attribute: Attribute) -> Any:

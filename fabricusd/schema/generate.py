@@ -24,8 +24,8 @@ def _name_models(layer: Any) -> None:
     """Write the thread models' names, and what each is, into the properties that choose one."""
     from fabricusd.appearance.scattering.models import named
 
-    fabric = layer.GetAttributeAtPath("/Fabric.fabric:model")
-    thread = layer.GetAttributeAtPath("/FabricThread.thread:model")
+    fabric = layer.GetAttributeAtPath("/WovenFabric.fabric:model")
+    thread = layer.GetAttributeAtPath("/WovenThread.thread:model")
     fabric.allowedTokens, thread.allowedTokens = MODELS, ("inherit", *MODELS)
     meaning = " ".join(f"{name}: {named(name).summary}." for name in MODELS)
     fabric.documentation = fabric.documentation.replace("Unit:", f"{meaning} Unit:")

@@ -47,7 +47,7 @@ def load(source: str | os.PathLike[str]) -> Fabric:
 
 
 def read_fabric(prim: Usd.Prim, note: Note | None = None) -> Fabric:
-    """A Fabric prim -> Fabric, with its back.
+    """A WovenFabric prim -> Fabric, with its back.
 
     note : gets a line where the back cannot be read, and the front is returned without it; where
         it is None, that raises FabricError as well
@@ -80,7 +80,7 @@ def _read_back(prim: Usd.Prim, faults: list[Finding]) -> Fabric | None:
 
 
 def read_side(prim: Usd.Prim) -> Fabric:
-    """A Fabric prim without its back."""
+    """A WovenFabric prim without its back."""
     return _read_side(prim, [f for f in check_prim(prim, fatal=True) if f.property != _BACK])
 
 
@@ -124,7 +124,7 @@ def _read_set(prim: Usd.Prim, which: str) -> ThreadSet:
 
 
 def read_thread(prim: Usd.Prim) -> Thread:
-    """A FabricThread prim without faults -> Thread."""
+    """A WovenThread prim without faults -> Thread."""
     angles = (a * DEGREE for a in value(prim, "thread:curve:angles"))
     curve = TangentCurve(
         positions=tuple(value(prim, "thread:curve:positions")),
@@ -140,7 +140,7 @@ def read_thread(prim: Usd.Prim) -> Thread:
 
 
 def read_binding(prim: Usd.Prim, note: Note | None = None) -> Binding:
-    """A mesh or subset with FabricBindingAPI -> Binding; `note` as in `read_fabric`.
+    """A mesh or subset with WovenBindingAPI -> Binding; `note` as in `read_fabric`.
 
     It also gets a line about a fabric below an `over`, which is read all the same.
     """

@@ -147,26 +147,26 @@ def find_prim(stage: Usd.Stage, file: str, prim_path: str) -> Usd.Prim:
 
 
 def find_fabric(stage: Usd.Stage, file: str, prim_path: str = "") -> Usd.Prim:
-    """The Fabric prim at `prim_path`; without one the default prim, or the only one there is."""
+    """The WovenFabric prim at `prim_path`; by default the default prim, or the only one."""
     if prim_path:
         prim = find_prim(stage, file, prim_path)
-        if prim.GetTypeName() != "Fabric":
+        if prim.GetTypeName() != "WovenFabric":
             kind = prim.GetTypeName() or "an untyped prim"
-            raise FabricError(f"{file}:{prim_path}", f"is {kind}; it must be a Fabric")
+            raise FabricError(f"{file}:{prim_path}", f"is {kind}; it must be a WovenFabric")
         return prim
     default = stage.GetDefaultPrim()
-    if default and default.GetTypeName() == "Fabric":
+    if default and default.GetTypeName() == "WovenFabric":
         return default
     every = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
     found = []
     walk = iter(every)
     for prim in walk:
-        if prim.GetTypeName() == "Fabric":
+        if prim.GetTypeName() == "WovenFabric":
             found.append(prim)
             # A fabric below is its back.
             walk.PruneChildren()
     if not found:
-        raise FabricError(file, "holds no Fabric prim")
+        raise FabricError(file, "holds no WovenFabric prim")
     if len(found) > 1:
         names = ", ".join(f"{file}:{prim.GetPath()}" for prim in found[:8])
         raise FabricError(file, f"holds {len(found)} fabrics; name one of {names}")

@@ -66,13 +66,13 @@ def _layer(fabrics: Sequence[Fabric]) -> Sdf.Layer:
 
 
 def write_fabric(stage: Usd.Stage, path: Sdf.Path | str, fabric: Fabric) -> Usd.Prim:
-    """Define a Fabric prim with its threads and its back as children, which a reference brings.
+    """Define a WovenFabric prim; its threads and its back are children, which a reference brings.
 
     A name that is no prim's becomes the nearest; threads of one name, and a back that is called
     as a thread, have a number put after theirs.
     """
     path = Sdf.Path(path)
-    prim = stage.DefinePrim(path, "Fabric")
+    prim = stage.DefinePrim(path, "WovenFabric")
     _document(prim, fabric.documentation)
     names = _unique_names(list(fabric.threads))
     for name, thread in zip(names, fabric.threads.values(), strict=True):
@@ -99,8 +99,8 @@ def write_fabric(stage: Usd.Stage, path: Sdf.Path | str, fabric: Fabric) -> Usd.
 
 
 def write_thread(stage: Usd.Stage, path: Sdf.Path | str, thread: Thread) -> Usd.Prim:
-    """Define a FabricThread prim."""
-    prim = stage.DefinePrim(Sdf.Path(path), "FabricThread")
+    """Define a WovenThread prim."""
+    prim = stage.DefinePrim(Sdf.Path(path), "WovenThread")
     _document(prim, thread.documentation)
     _set_numbers(prim, attributes.THREAD, thread)
     _set(prim, "thread:model", "token", thread.model or "inherit", uniform=True)
@@ -111,7 +111,7 @@ def write_thread(stage: Usd.Stage, path: Sdf.Path | str, thread: Thread) -> Usd.
 
 
 def write_binding(prim: Usd.Prim, fabric_path: Sdf.Path | str, binding: Binding) -> None:
-    """Apply FabricBindingAPI to a mesh or subset, bound to the Fabric prim at `fabric_path`."""
+    """Apply WovenBindingAPI to a mesh or subset, bound to the WovenFabric prim at `fabric_path`."""
     # Not `ApplyAPI`, which asks for a schema that USD knows.
     prim.AddAppliedSchema(BINDING_API)
     prim.CreateRelationship("fabric:binding", custom=False).SetTargets([Sdf.Path(fabric_path)])

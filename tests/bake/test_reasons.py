@@ -48,7 +48,7 @@ def mistyped_uvs(stage):
 def no_api(stage):
     mesh = square(stage)
     bind_fabric(stage, mesh.GetPrim())
-    mesh.GetPrim().RemoveAPI("FabricBindingAPI")
+    mesh.GetPrim().RemoveAPI("WovenBindingAPI")
 
 
 def broken_fabric(stage):
@@ -88,7 +88,7 @@ CAUSES = {
     # name: (the stage, words of the reason)
     "a UV set that is not there": (other_name, "uvSet"),
     "UVs that are no numbers": (mistyped_uvs, "has a UV set 'st' that does not fit its faces"),
-    "the API is missing": (no_api, "has fabric:binding but not FabricBindingAPI applied"),
+    "the API is missing": (no_api, "has fabric:binding but not WovenBindingAPI applied"),
     "a fabric with a fault": (broken_fabric, "rendered without a fabric"),
     "a fabric on a group": (fabric_on_a_group, "/group binds a fabric, left out"),
     "points beyond the world": (far_points, "1 points beyond 1e+09 m"),

@@ -16,14 +16,14 @@ from fabricusd.schema import save
 from tests.wif_samples import SMALL
 
 GOOD = """#usda 1.0
-def Fabric "Cloth"
+def WovenFabric "Cloth"
 {
     rel fabric:threads = </Cloth/Warp>
     double fabric:warp:density = 20
     int[] fabric:warp:threads = [0]
     string[] fabric:weave:rows = ["10", "01"]
     uniform token fabric:model = "thesis"
-    def FabricThread "Warp"
+    def WovenThread "Warp"
     {
         double thread:ior = 1.5
     }

@@ -229,7 +229,8 @@ def test_a_layer_is_printed_as_utf_8_whatever_the_output_is(tmp_path):
 
 def test_check_of_a_prim_looks_at_nothing_above_it(capsys, tmp_path):
     (tmp_path / "two.usda").write_text(
-        '#usda 1.0\ndef Fabric "A"\n{\ndef FabricThread "T"\n{\n}\n}\ndef Fabric "B"\n{\n}\n'
+        '#usda 1.0\ndef WovenFabric "A"\n{\ndef WovenThread "T"\n{\n}\n}\n'
+        'def WovenFabric "B"\n{\n}\n'
     )
     assert run(capsys, "check", f"{tmp_path}/two.usda:/A")[0] == 0
     assert run(capsys, "check", f"{tmp_path}/two.usda:/B")[0] == 1
@@ -247,8 +248,8 @@ def test_a_prim_is_named_with_its_slash_or_without(capsys):
 
 def test_check_tells_findings_by_status(capsys, tmp_path):
     path = tmp_path / "a.usda"
-    path.write_text('#usda 1.0\ndef Fabric "A"\n{\ndouble fabric:warp:densty = 2\n'
-                    'def FabricThread "T"\n{\n}\n}\n')  # fmt: skip
+    path.write_text('#usda 1.0\ndef WovenFabric "A"\n{\ndouble fabric:warp:densty = 2\n'
+                    'def WovenThread "T"\n{\n}\n}\n')  # fmt: skip
     assert run(capsys, "check", "velvet")[0] == 0
     assert run(capsys, "check", str(path))[0] == 0
     assert run(capsys, "check", str(path), "--strict")[0] == 1

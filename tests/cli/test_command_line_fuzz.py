@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from fabricusd.cli.main import COMMANDS, INTERNAL, build_parser, main
 from tests.fuzz import examples
 
-LAYER = '#usda 1.0\ndef Fabric "A"\n{\n    def FabricThread "T"\n    {\n    }\n}\n'
+LAYER = '#usda 1.0\ndef WovenFabric "A"\n{\n    def WovenThread "T"\n    {\n    }\n}\n'
 OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n"
 
 WORDS = [

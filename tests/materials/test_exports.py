@@ -36,7 +36,7 @@ def test_a_package_holds_the_baked_variant_and_its_textures_alone(packed):
     assert not UsdUtils.ComputeAllDependencies(str(packed[1]))[2]
     names = {p.GetName() for p in stage.Traverse() if p.IsA(UsdShade.Material)}
     assert names == {"Body_0", "Body_1"}
-    assert not [p for p in stage.Traverse() if p.GetTypeName() == "Fabric"]
+    assert not [p for p in stage.Traverse() if p.GetTypeName() == "WovenFabric"]
     for prim in stage.Traverse():
         if prim.IsA(UsdGeom.Subset):
             assert UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]

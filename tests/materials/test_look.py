@@ -49,7 +49,7 @@ def bound(stage, variant):
             material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
             found[prim.GetName()] = (
                 material.GetPath().name if material else None,
-                "FabricBindingAPI" in prim.GetAppliedSchemas(),
+                "WovenBindingAPI" in prim.GetAppliedSchemas(),
             )
     return found
 

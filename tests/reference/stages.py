@@ -41,7 +41,7 @@ def square(stage: Usd.Stage, path: str = "/square", *, uv: bool = True) -> UsdGe
 def bind_fabric(stage: Usd.Stage, prim: Usd.Prim, preset: str = "linen_plain") -> None:
     fabric = stage.DefinePrim("/Looks/Cloth")
     fabric.GetReferences().AddReference(str(PRESETS / f"{preset}.usda"))
-    prim.ApplyAPI("FabricBindingAPI")
+    prim.ApplyAPI("WovenBindingAPI")
     prim.GetRelationship("fabric:binding").SetTargets([fabric.GetPath()])
 
 

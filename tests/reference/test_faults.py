@@ -42,12 +42,12 @@ def subdivision(stage):
 
 def fabric_to_nowhere(stage):
     prim = square(stage, "/bad").GetPrim()
-    prim.ApplyAPI("FabricBindingAPI")
+    prim.ApplyAPI("WovenBindingAPI")
     prim.GetRelationship("fabric:binding").SetTargets(["/nowhere"])
 
 
 def fabric_without_target(stage):
-    square(stage, "/bad").GetPrim().ApplyAPI("FabricBindingAPI")
+    square(stage, "/bad").GetPrim().ApplyAPI("WovenBindingAPI")
 
 
 def unknown_light(stage):

@@ -20,7 +20,7 @@ SHEET = """#usda 1.0
     metersPerUnit = 1
 )
 def Mesh "Sheet" (
-    prepend apiSchemas = ["FabricBindingAPI"]
+    prepend apiSchemas = ["WovenBindingAPI"]
 )
 {
     rel fabric:binding = </Looks/Satin>
@@ -38,17 +38,17 @@ SIBLINGS = """#usda 1.0
 (
     defaultPrim = "Front"
 )
-def Fabric "Front"
+def WovenFabric "Front"
 {
     rel fabric:back = </Back>
-    def FabricThread "Silk"
+    def WovenThread "Silk"
     {
     }
 }
-def Fabric "Back"
+def WovenFabric "Back"
 {
     bool fabric:opaque = true
-    def FabricThread "Silk"
+    def WovenThread "Silk"
     {
     }
 }
@@ -116,7 +116,7 @@ LOST = {
         "RelationshipAcyclic", "/Looks/Satin fabric:back targets /Looks/Satin, its own prim"),
     "a fabric with a fault": (
         'def "Satin" (references = @siblings.usda@)\n'
-        '{\n    rel fabric:back = </Looks/Satin/Back>\n    def Fabric "Back"\n    {\n    }\n}',
+        '{\n    rel fabric:back = </Looks/Satin/Back>\n    def WovenFabric "Back"\n    {\n    }\n}',
         "ThreadsExist", "/Looks/Satin/Back fabric:threads names no thread"),
 }  # fmt: skip
 
@@ -158,20 +158,20 @@ def test_a_thread_that_is_lost_is_an_error_since_indices_would_move(tmp_path):
 (
     defaultPrim = "Cloth"
 )
-def FabricThread "Gold"
+def WovenThread "Gold"
 {
 }
-def Fabric "Cloth"
+def WovenFabric "Cloth"
 {
     rel fabric:threads = [</Gold>, </Cloth/Silk>]
-    def FabricThread "Silk"
+    def WovenThread "Silk"
     {
     }
 }
 """
     )
     (tmp_path / "shop.usda").write_text(
-        '#usda 1.0\ndef Fabric "Cloth" (\n    references = @two.usda@\n)\n{\n}\n'
+        '#usda 1.0\ndef WovenFabric "Cloth" (\n    references = @two.usda@\n)\n{\n}\n'
     )
     with pytest.raises(FabricError, match=r"fabric:threads loses its target /Gold of two\.usda"):
         load(tmp_path / "shop.usda")
@@ -193,20 +193,20 @@ def test_a_file_of_one_fabric_and_its_back_holds_one_fabric(tmp_path):
 
 OVER = """over "Looks"
 {
-    def Fabric "Satin"
+    def WovenFabric "Satin"
     {
         rel fabric:back = </Looks/Satin/Back>
-        def FabricThread "Silk"
+        def WovenThread "Silk"
         {
         }
-        def Fabric "Back"
+        def WovenFabric "Back"
         {
-            def FabricThread "Silk"
+            def WovenThread "Silk"
             {
             }
         }
     }
-    def FabricThread "Of_a_library"
+    def WovenThread "Of_a_library"
     {
     }
 }

@@ -16,7 +16,7 @@ USE_A_STAGE_FIRST = """
 from pxr import Usd
 stage = Usd.Stage.CreateInMemory()
 stage.DefinePrim("/X", "Scope").HasAPI("CollectionAPI")
-assert Usd.SchemaRegistry().FindConcretePrimDefinition("Fabric") is None
+assert Usd.SchemaRegistry().FindConcretePrimDefinition("WovenFabric") is None
 """
 
 
@@ -65,14 +65,14 @@ WORN = """#usda 1.0
 (
     metersPerUnit = 1
 )
-def Fabric "Cloth"
+def WovenFabric "Cloth"
 {
-    def FabricThread "Silk"
+    def WovenThread "Silk"
     {
     }
 }
 class "Dressed" (
-    prepend apiSchemas = ["FabricBindingAPI"]
+    prepend apiSchemas = ["WovenBindingAPI"]
 )
 {
     rel fabric:binding = </Cloth>
@@ -89,7 +89,7 @@ class "Sheet"
 }
 def Mesh "Applied" (
     inherits = </Sheet>
-    prepend apiSchemas = ["MaterialBindingAPI", "FabricBindingAPI"]
+    prepend apiSchemas = ["MaterialBindingAPI", "WovenBindingAPI"]
 )
 {
     rel fabric:binding = </Cloth>
@@ -116,7 +116,7 @@ def Mesh "Varied" (
 }
 def Mesh "Taken_off" (
     inherits = [</Sheet>, </Dressed>]
-    delete apiSchemas = ["FabricBindingAPI"]
+    delete apiSchemas = ["WovenBindingAPI"]
 )
 {
 }
@@ -148,7 +148,7 @@ def test_a_mesh_wears_its_fabric_where_the_api_is_applied_and_has_a_note_where_n
         "/Taken_off": "grey",
         "/Not_applied": "grey",
     }
-    left_out = "has fabric:binding but not FabricBindingAPI applied, left out"
+    left_out = "has fabric:binding but not WovenBindingAPI applied, left out"
     assert notes == [f"/Taken_off {left_out}", f"/Not_applied {left_out}"]
 
 
@@ -167,4 +167,4 @@ print(json.dumps(stage.GetRootLayer().ExportToString()))
 
 
 def test_a_binding_is_written_the_same():
-    assert 'prepend apiSchemas = ["FabricBindingAPI"]' in in_both_orders(BIND)
+    assert 'prepend apiSchemas = ["WovenBindingAPI"]' in in_both_orders(BIND)

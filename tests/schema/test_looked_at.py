@@ -55,7 +55,7 @@ SQUARE = """#usda 1.0
     subLayers = [@marked.usda@]
 )
 def Mesh "Square" (
-    prepend apiSchemas = ["FabricBindingAPI"]
+    prepend apiSchemas = ["WovenBindingAPI"]
 )
 {
     rel fabric:binding = </marked>

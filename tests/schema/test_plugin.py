@@ -17,8 +17,8 @@ from fabricusd.schema import PLUGIN_PATH, attributes, load, save
 from fabricusd.schema.generate import generate
 from fabricusd.schema.plugin import VALIDATORS
 
-TYPES = ("Fabric", "FabricThread")
-DEFINITIONS = [*TYPES, "FabricBindingAPI"]
+TYPES = ("WovenFabric", "WovenThread")
+DEFINITIONS = [*TYPES, "WovenBindingAPI"]
 
 
 def definition(name: str) -> Usd.PrimDefinition:
@@ -60,9 +60,9 @@ stage = Usd.Stage.Open(sys.argv[1])
 prim = stage.GetDefaultPrim()
 thread = prim.GetChildren()[0]
 fallback = Usd.Stage.CreateInMemory()
-fallback = fallback.DefinePrim("/A", "Fabric").GetAttribute("fabric:warp:density").Get()
+fallback = fallback.DefinePrim("/A", "WovenFabric").GetAttribute("fabric:warp:density").Get()
 print(json.dumps({
-    "defined": Usd.SchemaRegistry().FindConcretePrimDefinition("Fabric") is not None,
+    "defined": Usd.SchemaRegistry().FindConcretePrimDefinition("WovenFabric") is not None,
     "names": [str(p.GetTypeName()) for p in (prim, thread)],
     "typed": [p.IsA(Usd.Typed) for p in (prim, thread)],
     "fallback": fallback,
@@ -75,7 +75,7 @@ def test_a_stage_authored_here_opens_in_plain_usd_with_typed_prims(tmp_path):
     save(load("velvet"), tmp_path / "velvet.usda")
     seen = plain_usd(LOOK, str(tmp_path / "velvet.usda"), plugin=True)
     assert seen["defined"]
-    assert seen["names"] == ["Fabric", "FabricThread"]
+    assert seen["names"] == ["WovenFabric", "WovenThread"]
     assert seen["typed"] == [True, True]
     assert seen["fallback"] == 20.0
 
@@ -84,7 +84,7 @@ def test_without_the_plugin_it_still_opens_and_nothing_is_lost(tmp_path):
     save(load("velvet"), tmp_path / "velvet.usda")
     seen = plain_usd(LOOK, str(tmp_path / "velvet.usda"), plugin=False)
     assert not seen["defined"]
-    assert seen["names"] == ["Fabric", "FabricThread"]
+    assert seen["names"] == ["WovenFabric", "WovenThread"]
     assert seen["typed"] == [False, False]
     again = tmp_path / "again.usda"
     again.write_text(seen["authored"])
@@ -133,7 +133,7 @@ def test_every_attribute_has_a_fallback_and_every_token_its_allowed_values(owner
     assert attribute.GetFallbackValue() is not None
     if attribute.GetTypeName() == "token" and prop != "fabric:binding:uvSet":
         allowed = list(attribute.GetMetadata("allowedTokens"))
-        assert allowed == (["inherit"] if owner == "FabricThread" else []) + list(MODELS)
+        assert allowed == (["inherit"] if owner == "WovenThread" else []) + list(MODELS)
 
 
 @pytest.mark.parametrize(
@@ -144,9 +144,9 @@ def test_every_attribute_has_a_fallback_and_every_token_its_allowed_values(owner
 )  # fmt: skip
 def test_fallbacks_and_types_agree_with_the_dataclasses(entry):
     owner = (
-        "FabricBindingAPI"
+        "WovenBindingAPI"
         if entry.owner is Binding
-        else ("FabricThread" if entry.owner is Thread else "Fabric")
+        else ("WovenThread" if entry.owner is Thread else "WovenFabric")
     )
     attribute = definition(owner).GetAttributeDefinition(entry.name)
     assert attribute.GetTypeName() == entry.type_name

@@ -27,7 +27,7 @@ def test_a_garment_wears_a_preset_by_reference(tmp_path, monkeypatch):
     text = README.read_text()
     command = re.search(r"fabricusd (new --preset (\w+) -o silk\.usda)", text)
     blocks = re.findall(r"```usda\n(.*?)```", text, re.DOTALL)
-    (block,) = [b for b in blocks if "FabricBindingAPI" in b]
+    (block,) = [b for b in blocks if "WovenBindingAPI" in b]
     monkeypatch.chdir(tmp_path)
     assert main(command[1].split()) == 0
     scene = tmp_path / "scene.usda"

@@ -107,7 +107,7 @@ def test_referenced_threads_with_overrides_are_read_as_composed(tmp_path):
     save(load("linen_plain"), tmp_path / "linen.usda")
     (tmp_path / "shop.usda").write_text(
         """#usda 1.0
-def Fabric "Dyed" (references = @linen.usda@)
+def WovenFabric "Dyed" (references = @linen.usda@)
 {
     over "Linen"
     {
@@ -124,11 +124,11 @@ def Fabric "Dyed" (references = @linen.usda@)
 def test_a_fabric_may_take_its_threads_from_elsewhere_in_the_stage(tmp_path):
     (tmp_path / "library.usda").write_text(
         """#usda 1.0
-def FabricThread "Silk"
+def WovenThread "Silk"
 {
     double thread:ior = 1.345
 }
-def Fabric "Cloth"
+def WovenFabric "Cloth"
 {
     rel fabric:threads = </Silk>
 }
@@ -140,16 +140,16 @@ def Fabric "Cloth"
 TWO_LIBRARIES = """#usda 1.0
 def Scope "Library"
 {
-    def FabricThread "Silk"
+    def WovenThread "Silk"
     {
         double thread:ior = 1.345
     }
 }
-def Fabric "Cloth"
+def WovenFabric "Cloth"
 {
     rel fabric:threads = [</Cloth/Silk>, </Library/Silk>]
     int[] fabric:weft:threads = [1]
-    def FabricThread "Silk"
+    def WovenThread "Silk"
     {
     }
 }
@@ -167,12 +167,13 @@ def test_threads_of_one_name_from_two_places_are_told_apart(tmp_path):
     assert_same(load(tmp_path / "again.usda"), fabric)
 
 
-@pytest.mark.parametrize("where", ["Fabric", "Scope"])
+@pytest.mark.parametrize("where", ["WovenFabric", "Scope"])
 def test_an_instanceable_fabric_is_read(where, tmp_path):
     save(load("velvet"), tmp_path / "velvet.usda")
-    inside = 'def Fabric "velvet" (references = @velvet.usda@)\n{\n}'
+    inside = 'def WovenFabric "velvet" (references = @velvet.usda@)\n{\n}'
     library = f'def Scope "Library"\n{{\n{inside}\n}}'
-    target, name = ("</Library/velvet>", "velvet") if where == "Fabric" else ("</Library>", "Shop")
+    inner = where == "WovenFabric"
+    target, name = ("</Library/velvet>", "velvet") if inner else ("</Library>", "Shop")
     (tmp_path / "shop.usda").write_text(
         f"""#usda 1.0
 (
@@ -246,7 +247,7 @@ def test_sublayers_payloads_and_variants_are_read_as_composed(tmp_path):
 (
     defaultPrim = "Cloth"
 )
-def Fabric "Cloth" (
+def WovenFabric "Cloth" (
     payload = @velvet.usdc@
     variants = { string dye = "red" }
     prepend variantSets = "dye"

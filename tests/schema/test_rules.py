@@ -18,7 +18,7 @@ NAMES = [rule.function.__name__ for rule in RULES]
 OF_FABRICS = [
     rule
     for rule in RULES
-    if rule.severity == "error" and rule.schema_types != ("FabricusdBindingAPI",)
+    if rule.severity == "error" and rule.schema_types != ("FabricusdWovenBindingAPI",)
 ]
 
 
@@ -92,8 +92,8 @@ def test_reading_a_fabric_with_an_error_raises_the_same_words(rule):
 )
 def test_a_thread_value_out_of_range_is_named_with_its_place(attribute, text, tmp_path):
     path = tmp_path / "cloth.usda"
-    body = f'def FabricThread "Warp"\n{{\n{attribute} = {text}\n}}'
-    path.write_text(f'#usda 1.0\ndef Fabric "Cloth"\n{{\n{body}\n}}\n')
+    body = f'def WovenThread "Warp"\n{{\n{attribute} = {text}\n}}'
+    path.write_text(f'#usda 1.0\ndef WovenFabric "Cloth"\n{{\n{body}\n}}\n')
     name = attribute.split()[1]
     with pytest.raises(FabricError, match=rf"/Cloth/Warp .*{name}.*must"):
         load(path)
@@ -126,8 +126,8 @@ def test_a_thread_value_out_of_range_is_named_with_its_place(attribute, text, tm
 )
 def test_a_fabric_value_out_of_range_is_named_with_its_place(attribute, text, tmp_path):
     path = tmp_path / "cloth.usda"
-    body = f'{attribute} = {text}\ndef FabricThread "Warp" {{ }}'
-    path.write_text(f'#usda 1.0\ndef Fabric "Cloth"\n{{\n{body}\n}}\n')
+    body = f'{attribute} = {text}\ndef WovenThread "Warp" {{ }}'
+    path.write_text(f'#usda 1.0\ndef WovenFabric "Cloth"\n{{\n{body}\n}}\n')
     name = attribute.split()[-1].partition(".")[0]
     with pytest.raises(FabricError, match=rf"/Cloth {name}.*must"):
         load(path)
@@ -143,14 +143,14 @@ def test_every_problem_says_what_would_be_accepted():
 @pytest.mark.parametrize("written", ["mystery thread:ior = 3", "float thread:curve:positions = 3"])
 def test_a_value_of_a_wrong_type_is_a_finding_of_every_rule(written, tmp_path):
     path = tmp_path / "cloth.usda"
-    thread = f'def FabricThread "Warp"\n{{\n{written}\n}}'
-    path.write_text(f'#usda 1.0\ndef Fabric "Cloth"\n{{\n{thread}\n}}\n')
+    thread = f'def WovenThread "Warp"\n{{\n{written}\n}}'
+    path.write_text(f'#usda 1.0\ndef WovenFabric "Cloth"\n{{\n{thread}\n}}\n')
     assert "PropertyTypeMatches" in {finding.rule for finding in check(str(path))}
 
 
 def test_bounds_are_told_in_the_unit_of_the_file(tmp_path):
     path = tmp_path / "cloth.usda"
-    thread = 'def FabricThread "Warp"\n{\ndouble thread:gammaSurface = 200\n}'
-    path.write_text(f'#usda 1.0\ndef Fabric "Cloth"\n{{\n{thread}\n}}\n')
+    thread = 'def WovenThread "Warp"\n{\ndouble thread:gammaSurface = 200\n}'
+    path.write_text(f'#usda 1.0\ndef WovenFabric "Cloth"\n{{\n{thread}\n}}\n')
     with pytest.raises(FabricError, match=r"is 200; it must be at most 180 and above 0 degrees"):
         load(path)

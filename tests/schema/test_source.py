@@ -12,13 +12,13 @@ from fabricusd.schema import check, load, save
 from fabricusd.schema.source import split_source
 
 TWO = """#usda 1.0
-def Fabric "A"
+def WovenFabric "A"
 {
-    def FabricThread "T"
+    def WovenThread "T"
     {
     }
 }
-def Fabric "B" (references = </A>)
+def WovenFabric "B" (references = </A>)
 {
 }
 def Xform "C"
@@ -38,28 +38,28 @@ CASES = {
     "a missing file": (None, "nowhere.usda", "nowhere.usda is no file"),
     "an empty file": (("e.usda", b""), "{}", "is empty"),
     "a text that is no USD": (("t.usda", "hello"), "{}", "cannot be parsed as USD"),
-    "a truncated USD text": (("t.usda", '#usda 1.0\ndef Fabric "A" {'), "{}", r"t.usda:2"),
+    "a truncated USD text": (("t.usda", '#usda 1.0\ndef WovenFabric "A" {'), "{}", r"t.usda:2"),
     "a truncated binary": (("t.usdc", b"PXR-USDC\0\0"), "{}", "cannot be parsed as USD"),
     "a text that is not UTF-8": (
-        ("t.usda", b'#usda 1.0\ndef Fabric "A"\n{\n\xff\n}\n'), "{}", "byte 0xff in line 4"),
+        ("t.usda", b'#usda 1.0\ndef WovenFabric "A"\n{\n\xff\n}\n'), "{}", "byte 0xff in line 4"),
     "documentation that is not UTF-8": (
-        ("t.usda", b'#usda 1.0\ndef Fabric "A" (doc = "\xe9")\n{\ndef FabricThread "T" {\n}\n}'),
+        ("t.usda", b'#usda 1.0\ndef WovenFabric "A" (doc = "\xe9")\n{\ndef WovenThread "T" {\n}}'),
         "{}", "byte 0xe9 in line 2; .* UTF-8"),
     "a text that is a parser's riddle": (
-        ("t.usda", '#usda 1.0\ndef Fabric "A"\n{\ndouble a.spline = { 1: 5; 2: 8}\n}\n'), "{}",
+        ("t.usda", '#usda 1.0\ndef WovenFabric "A"\n{\ndouble a.spline = { 1: 5; 2: 8}\n}\n'), "{}",
         "t.usda:4.* does not parse at"),
     "another kind of file": (("t.txt", "hello"), "{}", "is not USD; it must be .usda"),
     "a stage without a fabric": (("x.usda", '#usda 1.0\ndef Xform "X"\n{\n}\n'), "{}",
-                                 "holds no Fabric prim"),
+                                 "holds no WovenFabric prim"),
     "two fabrics and none named": (("two.usda", TWO), "{}", "holds 2 fabrics; name one of .*:/A"),
     "a prim path of nothing": (("two.usda", TWO), "{}:/Nowhere", ":/Nowhere is no prim"),
-    "a prim of another type": (("two.usda", TWO), "{}:/C", ":/C is Xform; it must be a Fabric"),
+    "a prim of another type": (("two.usda", TWO), "{}:/C", ":/C is Xform; .* be a WovenFabric"),
     "no prim path at all": (("two.usda", TWO), "{}:/a b", "is no prim path"),
     "a reference to nowhere": (
-        ("r.usda", '#usda 1.0\ndef Fabric "A" (references = @gone.usda@)\n{\n}\n'), "{}",
+        ("r.usda", '#usda 1.0\ndef WovenFabric "A" (references = @gone.usda@)\n{\n}\n'), "{}",
         "does not compose: .*gone.usda"),
     "a layer that includes itself": (
-        ("s.usda", '#usda 1.0\n(\nsubLayers = [@s.usda@]\n)\ndef Fabric "A"\n{\n}\n'), "{}",
+        ("s.usda", '#usda 1.0\n(\nsubLayers = [@s.usda@]\n)\ndef WovenFabric "A"\n{\n}\n'), "{}",
         "does not compose"),
 }  # fmt: skip
 

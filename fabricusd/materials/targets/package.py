@@ -71,6 +71,6 @@ def _unused(stage: Usd.Stage) -> list[Sdf.Path]:
     return [
         prim.GetPath()
         for prim in stage.Traverse()
-        if prim.GetTypeName() == "Fabric"
+        if prim.GetTypeName() == "WovenFabric"
         or (prim.IsA(UsdShade.Material) and prim.GetPath() not in bound)
     ]

@@ -1,4 +1,4 @@
-"""Which surface a face has: a fabric by FabricBindingAPI, a UsdPreviewSurface, or a grey."""
+"""Which surface a face has: a fabric by WovenBindingAPI, a UsdPreviewSurface, or a grey."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Materials:
         if not applies_binding(prim):
             if targets(prim, "fabric:binding"):
                 self.scene.note(
-                    where, "has fabric:binding but not FabricBindingAPI applied, left out"
+                    where, "has fabric:binding but not WovenBindingAPI applied, left out"
                 )
             return None
         try:

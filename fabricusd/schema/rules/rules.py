@@ -110,7 +110,7 @@ def targets_kept(prim: Usd.Prim) -> Iterator[Fault]:
 def below_defs_alone(prim: Usd.Prim) -> Iterator[Fault]:
     """A fabric, a thread of a library and what wears a fabric lie below no `over`."""
     above = prim.GetParent()
-    while above and above.GetTypeName() != "Fabric":
+    while above and above.GetTypeName() != "WovenFabric":
         above = above.GetParent()
     over = over_above(prim)
     # The threads and the back of a fabric are told with it.
@@ -119,9 +119,9 @@ def below_defs_alone(prim: Usd.Prim) -> Iterator[Fault]:
 
 
 def _numbers(prim: Usd.Prim) -> tuple[Attribute, ...]:
-    if prim.GetTypeName() == "FabricThread":
+    if prim.GetTypeName() == "WovenThread":
         return attributes.THREAD
-    if prim.GetTypeName() == "Fabric":
+    if prim.GetTypeName() == "WovenFabric":
         sets = (attributes.thread_set("warp"), attributes.thread_set("weft"))
         return (*attributes.FABRIC, *sets[0], *sets[1])
     return attributes.BINDING
@@ -147,7 +147,7 @@ def number_in_range(prim: Usd.Prim) -> Iterator[Fault]:
 @rule(FABRIC, THREAD)
 def model_allowed(prim: Usd.Prim) -> Iterator[Fault]:
     """The scattering model is an allowed token."""
-    name = "fabric:model" if prim.GetTypeName() == "Fabric" else "thread:model"
+    name = "fabric:model" if prim.GetTypeName() == "WovenFabric" else "thread:model"
     # USD stores any token; the allowed ones are advice to user interfaces.
     allowed, token = allowed_tokens(prim, name), value(prim, name)
     if token not in allowed:
@@ -164,7 +164,7 @@ def thread_prims(prim: Usd.Prim) -> list[Usd.Prim]:
         return [prim.GetStage().GetPrimAtPath(path) for path in targets(prim, "fabric:threads")]
     # An instance shows its children to those who ask for them alone; below an over none is defined.
     children = prim.GetFilteredChildren(Usd.TraverseInstanceProxies(PRESENT))
-    return [c for c in children if c.HasDefiningSpecifier() and c.GetTypeName() == "FabricThread"]
+    return [c for c in children if c.HasDefiningSpecifier() and c.GetTypeName() == "WovenThread"]
 
 
 def _forwarding_cycle(relationship: Usd.Relationship) -> list[str]:
@@ -202,16 +202,16 @@ def relationship_acyclic(prim: Usd.Prim) -> Iterator[Fault]:
 
 @rule(FABRIC)
 def threads_exist(prim: Usd.Prim) -> Iterator[Fault]:
-    """A fabric has at least one thread, and every target of its thread list is a FabricThread."""
+    """A fabric has at least one thread, and every target of its thread list is a WovenThread."""
     if not thread_prims(prim) and not lost_targets(prim, "fabric:threads"):
-        yield "fabric:threads", "names no thread; it must name at least one FabricThread prim"
+        yield "fabric:threads", "names no thread; it must name at least one WovenThread prim"
     for path in targets(prim, "fabric:threads"):
         target = prim.GetStage().GetPrimAtPath(path)
         if not target:
             yield "fabric:threads", f"targets {path}, which is no prim; it must be one"
-        elif target.GetTypeName() != "FabricThread" and target != prim:
+        elif target.GetTypeName() != "WovenThread" and target != prim:
             kind = target.GetTypeName() or "an untyped prim"
-            yield "fabric:threads", f"targets {path}, {kind}; it must be a FabricThread"
+            yield "fabric:threads", f"targets {path}, {kind}; it must be a WovenThread"
 
 
 @rule(FABRIC)
@@ -252,17 +252,17 @@ def weave_is_a_grid(prim: Usd.Prim) -> Iterator[Fault]:
 
 @rule(FABRIC)
 def back_is_a_fabric(prim: Usd.Prim) -> Iterator[Fault]:
-    """The back, where there is one, is one Fabric prim."""
+    """The back, where there is one, is one WovenFabric prim."""
     found = targets(prim, "fabric:back")
     if len(found) > 1:
         yield "fabric:back", f"has {len(found)} targets; it must have at most 1"
     for path in found[:1]:
         target = prim.GetStage().GetPrimAtPath(path)
         if not target:
-            yield "fabric:back", f"targets {path}, which is no prim; it must be a Fabric"
-        elif target.GetTypeName() != "Fabric":
+            yield "fabric:back", f"targets {path}, which is no prim; it must be a WovenFabric"
+        elif target.GetTypeName() != "WovenFabric":
             kind = target.GetTypeName() or "an untyped prim"
-            yield "fabric:back", f"targets {path}, {kind}; it must be a Fabric"
+            yield "fabric:back", f"targets {path}, {kind}; it must be a WovenFabric"
 
 
 @rule(FABRIC, severity="warning")
@@ -305,7 +305,7 @@ def albedo_is_safe(prim: Usd.Prim) -> Iterator[Fault]:
             )
 
 
-# ---- FabricThread -------------------------------------------------------------------------------
+# ---- WovenThread -------------------------------------------------------------------------------
 
 
 @rule(THREAD)
@@ -349,25 +349,25 @@ def curve_angles_in_range(prim: Usd.Prim) -> Iterator[Fault]:
             return
 
 
-# ---- FabricBindingAPI ---------------------------------------------------------------------------
+# ---- WovenBindingAPI ---------------------------------------------------------------------------
 
 
 @rule(BINDING)
 def binding_names_a_fabric(prim: Usd.Prim) -> Iterator[Fault]:
-    """A binding targets exactly one prim, a Fabric."""
+    """A binding targets exactly one prim, a WovenFabric."""
     name = "fabric:binding"
     found = targets(prim, name)
     if not found and lost_targets(prim, name):
         return  # another rule tells why
     if len(found) != 1:
-        yield name, f"has {len(found)} targets; it must have 1, a Fabric prim"
+        yield name, f"has {len(found)} targets; it must have 1, a WovenFabric prim"
         return
     target = prim.GetStage().GetPrimAtPath(found[0])
     if not target:
-        yield name, f"targets {found[0]}, which is no prim; it must be a Fabric"
-    elif target.GetTypeName() != "Fabric":
+        yield name, f"targets {found[0]}, which is no prim; it must be a WovenFabric"
+    elif target.GetTypeName() != "WovenFabric":
         kind = target.GetTypeName() or "an untyped prim"
-        yield name, f"targets {found[0]}, {kind}; it must be a Fabric"
+        yield name, f"targets {found[0]}, {kind}; it must be a WovenFabric"
 
 
 @rule(BINDING, fatal=False)
@@ -420,7 +420,7 @@ def threads_per_unit_both(prim: Usd.Prim) -> Iterator[Fault]:
 
 @rule(severity="warning")
 def binding_api_applied(prim: Usd.Prim) -> Iterator[Fault]:
-    """A prim with a fabric:binding relationship has FabricBindingAPI applied."""
+    """A prim with a fabric:binding relationship has WovenBindingAPI applied."""
     if not prim.HasRelationship("fabric:binding"):
         return
     relationship = prim.GetRelationship("fabric:binding")
@@ -428,4 +428,4 @@ def binding_api_applied(prim: Usd.Prim) -> Iterator[Fault]:
     name = "fabric:binding"
     bound = targets(prim, name) or not relationship.HasAuthoredTargets()
     if bound and not applies_binding(prim):
-        yield "fabric:binding", "is authored, but FabricBindingAPI is not in the prim's apiSchemas"
+        yield "fabric:binding", "is authored, but WovenBindingAPI is not in the prim's apiSchemas"

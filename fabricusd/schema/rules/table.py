@@ -13,7 +13,7 @@ from fabricusd.schema.access import applies_binding
 Fault = tuple[str, str]
 RuleFunction = Callable[[Usd.Prim], Iterable[Fault]]
 
-FABRIC, THREAD, BINDING = "FabricusdFabric", "FabricusdFabricThread", "FabricusdBindingAPI"
+FABRIC, THREAD, BINDING = "FabricusdWovenFabric", "FabricusdWovenThread", "FabricusdWovenBindingAPI"
 
 
 @dataclass(frozen=True)

@@ -41,8 +41,8 @@ TYPES = st.sampled_from(
 )  # fmt: skip
 KINDS = st.sampled_from(
     ["Mesh", "Xform", "Scope", "Camera", "PointInstancer", "GeomSubset", "SphereLight", "DomeLight",
-     "Skeleton", "SkelRoot", "SkelAnimation", "BlendShape", "Fabric", "FabricThread", "Material",
-     "Shader", "Cube", "Volume", "MeshLight", ""]
+     "Skeleton", "SkelRoot", "SkelAnimation", "BlendShape", "WovenFabric", "WovenThread",
+     "Material", "Shader", "Cube", "Volume", "MeshLight", ""]
 )  # fmt: skip
 
 

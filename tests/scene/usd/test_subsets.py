@@ -43,7 +43,7 @@ def dressed(stage: Usd.Stage, mesh: UsdGeom.Mesh, name: str = "part", **kind) ->
     subset.CreateElementTypeAttr(kind.get("element", "face"))
     subset.CreateFamilyNameAttr(kind.get("family", "materialBind"))
     subset.CreateIndicesAttr([1])
-    subset.GetPrim().ApplyAPI("FabricBindingAPI")
+    subset.GetPrim().ApplyAPI("WovenBindingAPI")
     subset.GetPrim().GetRelationship("fabric:binding").SetTargets([fabric.GetPath()])
     return subset
 
