@@ -16,8 +16,8 @@ from fabricusd.kernels.real import INLINE
 def tuple_reader(count: int, stride: int = 1) -> Any:
     """A kernel `read(numbers, first)`: a tuple of `count` entries from `first` on, `stride` apart.
 
-    Use it for constants that a loop reads: if the loop loaded them from an array, LLVM would have to
-    assume that every store into another array may change them.
+    Use it for constants that a loop reads. If the loop loaded them from an array, LLVM would have
+    to assume that every store into another array may change them.
     """
     entries = (f"numbers[first + {k * stride}]" for k in range(count))
     return _kernel("numbers, first", f"({', '.join(entries)},)")
