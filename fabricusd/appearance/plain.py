@@ -175,7 +175,7 @@ def point(
     width: Array | None = None,
     per_segment: int = 64,
 ) -> Array:
-    """(n, 3) value at level `weave`, or `thread` if `width` is given; psi0 : tangent angle [rad]."""
+    """(n, 3) value at level `weave`, or `thread` given a `width`; psi0 : tangent angle [rad]."""
     value = segment(fabric, share, psi0, wi, wo, width)
     return _published(value, normalization(fabric, wi, wo, per_segment), wi, wo)
 
