@@ -42,7 +42,7 @@ def conserving_mixture(fabric: Fabric, tables: ConservingTables) -> Mixture:
 
 
 def _in_single_precision(tables: ConservingTables) -> ConservingTables:
-    """The tables in float32, which suffices for the shares; one kernel then serves all precisions."""
+    """The tables in float32, which suffices for the shares: one kernel serves both precisions."""
     return tables._replace(
         threads=tables.threads.astype(np.float32),
         nodes=tables.nodes.astype(np.float32),

@@ -336,7 +336,7 @@ def _draw_across(R, size, block):
 
 @njit(**PART)
 def _narrow(R, size, block):
-    """What the place across the thread makes of both surface densities."""
+    """Compute the factors of the position across the thread on both surface densities."""
     for x in range(size):
         warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
         _, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
