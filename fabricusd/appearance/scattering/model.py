@@ -3,7 +3,7 @@
 `f_s = surface + volume A` per channel in every model, in 1/sr, without a cosine; it is what curves
 scatter, so `L_o = integral f_s L_i cos(theta_i) dwi` with the *inclination's* cosine. Each of the
 two terms is a factor times a lobe in the inclinations: the law of published cloth averages the
-lobes over a stretch of curve and leaves the factors. Neither term is ever negative.
+lobes over a stretch of curve and leaves the factors. A table may scale the volume and add to it. Neither term is ever negative.
 """
 
 from __future__ import annotations
@@ -52,8 +52,10 @@ class ThreadModel:
     cell_lobes : (R, row, half, sin_i, cos_i, cos_phi_i, sin_o, cos_o, cos_phi_o) -> `lobes`,
         averaged over tangent angles `half` [rad] to each side; None where no closed form is known:
         curves are then integrated by points alone
-    looked_up : (R, row, cos_i, cos_o) -> a factor of the volume, read from a table; None for 1
+    looked_up : (R, row, cos_i, cos_o) -> (factor, addend) of the volume, read from tables; None
+        for (1, 0)
     transmission : thread -> T for the columns from TRANSMISSION on; None without that table
+    completion : thread -> (x for the columns from COMPLETION on, X); None without that table
     widths : gs, gv -> the deviations of theta_i [rad] that samplers give the surface and the volume
         lobe around the mirror inclination
     most_albedo : `A` is clamped to this; 1 where it is an albedo
@@ -69,5 +71,6 @@ class ThreadModel:
     cell_lobes: Kernel = None
     looked_up: Kernel = None
     transmission: Callable[[Thread], Floats] | None = None
+    completion: Callable[[Thread], tuple[Floats, float]] | None = None
     widths: Callable[[float, float], tuple[float, float]] = mirror_widths
     most_albedo: float = math.inf
