@@ -1,1 +1,1 @@
-"""The appearance of thread and weave: pure mathematics, no USD, no Embree, no files."""
+"""The appearance models of threads and cloth: pure mathematics, without USD, Embree or files."""

@@ -1,4 +1,4 @@
-"""The cheapest quadrature of level `far` that meets a bound on its error, found by measuring it."""
+"""Choose the cheapest quadrature of level `far` whose measured error meets a bound."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from fabricusd.kernels.real import KERNEL
 Floats = NDArray[np.float64]
 
 PAIRS = 4096
-"""Pairs of directions that an error is measured on."""
+"""Number of pairs of directions over which an error is measured."""
 
 MARGIN = 1.5
-"""How far below the bound a measured error must be: with so many pairs, half of the error of the
-narrowest lobes may sit in places that none of the pairs meets."""
+"""Factor by which a measured error must stay below the bound. With PAIRS pairs, half of the error
+of the narrowest lobes may lie in directions that no pair samples."""
 
 
 class Accuracy(NamedTuple):
-    """A rule, the mean error measured with it, and what an evaluation costs in nodes."""
+    """A rule, its measured mean error, and the cost of an evaluation in nodes."""
 
     rule: Rule
     error: float
@@ -45,8 +45,9 @@ class Accuracy(NamedTuple):
 
 
 def spread_pairs(count: int) -> tuple[Floats, Floats]:
-    """Two (3, count) sets of directions over the upper hemisphere, evenly in four dimensions."""
-    # Kronecker sequence of the generalised golden ratio in four dimensions.
+    """Two (3, count) sets of directions in the upper hemisphere, whose pairs fill the four
+    dimensions evenly."""
+    # The Kronecker sequence of the generalised golden ratio in four dimensions.
     root = 1.1673039782614187
     points = (0.5 + np.arange(1, count + 1)[:, None] * root ** -np.arange(1.0, 5.0)) % 1.0
 
@@ -60,7 +61,8 @@ def spread_pairs(count: int) -> tuple[Floats, Floats]:
 def measure_rule(fabric: Fabric, rule: Rule, pairs: int = PAIRS) -> Accuracy:
     """Mean absolute error of `rule` over pairs of directions, relative to the mean value.
 
-    Measured in float64, all models of the fabric together, against a much finer quadrature.
+    The error is measured in float64 against a much finer quadrature, over all models of the fabric
+    together.
     """
     reference = _reference(fabric, pairs)
     found = _far(fabric, rule, pairs)
@@ -73,7 +75,7 @@ def measure_rule(fabric: Fabric, rule: Rule, pairs: int = PAIRS) -> Accuracy:
 def choose_rule(fabric: Fabric, max_error: float) -> Rule:
     """The cheapest candidate whose mean error on `fabric` is at most `max_error`.
 
-    Raises `FabricError` for a bound that no candidate meets.
+    Raises `FabricError` if no candidate meets the bound.
     """
     if not max_error > 0:
         raise FabricError("max_error", f"is {max_error}; it must be above 0")
@@ -96,7 +98,7 @@ def _points_only(fabric: Fabric) -> bool:
 
 
 def _candidates(fabric: Fabric) -> list[Rule]:
-    """Those that all of the fabric's models know: not all have a mean over a cell."""
+    """The rules that all models of the fabric support: not every model has a mean over a cell."""
     points_only = _points_only(fabric)
     return [r for r in CANDIDATES if r.form == POINTS or not points_only]
 

@@ -1,8 +1,9 @@
-"""How much of the light a fabric sends back, and how bright its threads may be.
+"""Compute a fabric's directional albedo, and how bright its threads may be without gaining energy.
 
-The published models do not conserve energy: their `A` is no albedo, and cloth can send back more
-than it gets. The share is linear in `A`, so one quadrature of surface and volume terms with a white
-thread answers for every colour. Plain NumPy, so that checking a fabric compiles nothing.
+The published models do not conserve energy: their `A` is not an albedo, and the cloth can reflect
+more light than it receives. The directional albedo is linear in `A`, so a single quadrature of the
+surface and volume terms with white threads covers every colour. The module uses plain NumPy, so
+that checking a fabric compiles no kernels.
 """
 
 from __future__ import annotations
@@ -31,21 +32,21 @@ from fabricusd.fabric import PILE_ANGLE, Fabric
 Floats = NDArray[np.float64]
 
 WORST_VIEWS = (0.0, 40.0, 70.0, 80.0, 85.0, 88.0, 89.5)
-"""Polar angles [degrees] at which `safe_albedo` looks; the worst view of the published fabrics
-lies at 70 degrees or beyond."""
+"""Polar angles [degrees] that `safe_albedo` tests. The worst view of each published fabric is at 70
+degrees or beyond."""
 
 FINEST = math.radians(1.0)
-"""Spacing of the table of mean `P`, whose narrowest feature is 20 degrees wide."""
+"""Spacing [rad] of the table of the mean of `P`, whose narrowest feature is 20 degrees wide."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How finely to integrate.
+    """The resolution of the integration.
 
-    azimuths : views around the normal, over a full turn
-    curve_step : tangent angles between curve nodes, in widths of the surface lobe
-    least_nodes, most_nodes : bounds on the nodes of a linear piece of the curve
-    inclinations : Gauss-Legendre points in each of the pieces that follow the lobes
+    azimuths : number of views around the normal, over a full turn
+    curve_step : difference of tangent angle between curve nodes, in widths of the surface lobe
+    least_nodes, most_nodes : bounds on the number of nodes of a linear piece of the curve
+    inclinations : Gauss-Legendre points in each of the intervals that follow the lobes
     around : Gauss-Legendre points on each side of the viewer's azimuth
     """
 
@@ -64,12 +65,14 @@ FINE = Effort(azimuths=16, curve_step=1.0, least_nodes=6, most_nodes=16, inclina
 def directional_albedo(
     fabric: Fabric, theta: Floats | list[float], effort: Effort = FINE
 ) -> tuple[Floats, Floats]:
-    """What reaches a viewer of a white sky of radiance 1, by group of threads: (surface, volume).
+    """Radiance that a viewer receives under a white sky of radiance 1: (surface, volume) per group.
 
     theta : (n,) polar angles of the viewer [rad]
-    Returns two (n, azimuths, groups) arrays, the volume's for a white thread, `A = 1`; groups are
-    those of `groups`. The fabric's own value is the sum over groups of surface + A volume.
-    Published models only: threads of the conserving law count as black.
+
+    Returns two (n, azimuths, groups) arrays; the volume term is that of white threads, `A = 1`. The
+    groups are those of `groups`. The value of the fabric is the sum over groups of
+    surface + A volume. Only the published models are evaluated: threads of the conserving law count
+    as black.
     """
     angles = np.asarray(theta, np.float64)
     around = np.arange(effort.azimuths) * (2 * math.pi / effort.azimuths)
@@ -89,9 +92,9 @@ def directional_albedo(
 
 
 def groups(fabric: Fabric) -> list[tuple[Share, Floats]]:
-    """Threads that differ in colour alone, as one share of the cloth: (share, mean `A` (3,)).
+    """Merge threads that differ in colour only into one share of the cloth: (share, mean `A` (3,)).
 
-    A jacquard of sixty colours costs no more than one of two.
+    With this, a jacquard of sixty colours costs no more than one of two.
     """
     found: dict[tuple[object, ...], list[Share]] = {}
     for share in shares(fabric):
@@ -108,16 +111,17 @@ def groups(fabric: Fabric) -> list[tuple[Share, Floats]]:
 
 
 def albedo_by_view(fabric: Fabric, theta: Floats | list[float], effort: Effort = FINE) -> Floats:
-    """(n, azimuths, 3) share of a white sky that `fabric` sends to viewers at `theta` [rad]."""
+    """(n, azimuths, 3) fraction of a white sky's radiance that reaches viewers at `theta` [rad]."""
     surface, volume = directional_albedo(fabric, theta, effort)
     colors = np.array([color for _, color in groups(fabric)])
     return np.asarray(surface.sum(axis=2)[..., None] + volume @ colors)
 
 
 def safe_albedo(fabric: Fabric, effort: Effort = FINE) -> float:
-    """The largest `A` at which white threads send back no more than they get, in the worst view.
+    """The largest `A` at which white threads reflect no more than they receive, in the worst view.
 
-    0 where the surface terms alone are too bright; infinite where no thread scatters inside.
+    The result is 0 if the surface terms alone are too bright, and infinite if no thread has a
+    volume term.
     """
     surface, volume = directional_albedo(fabric, np.radians(WORST_VIEWS), effort)
     left, white = 1.0 - surface.sum(axis=2), volume.sum(axis=2)
@@ -125,7 +129,7 @@ def safe_albedo(fabric: Fabric, effort: Effort = FINE) -> float:
 
 
 def _nodes(part: Share, effort: Effort) -> tuple[Floats, Floats]:
-    """(psi0, weight) along the curve, by the lobe's width."""
+    """(psi0, weight) along the curve, spaced by the width of the surface lobe."""
     curve = part.thread.curve
     steepest = max(abs(np.diff(curve.angles)), default=0.0)
     step = effort.curve_step * part.thread.gamma_surface
@@ -134,10 +138,11 @@ def _nodes(part: Share, effort: Effort) -> tuple[Floats, Floats]:
 
 
 def _mean_p(part: Share, width: float, i: Floats, o: Floats, effort: Effort) -> Floats:
-    """`P` of tilts i and o [rad] in the untilted frame, averaged over the curve.
+    """`P` of the longitudes i and o [rad] in the untilted frame, averaged over the curve.
 
-    A tilt of the thread shifts both angles, so two numbers stand for both directions. From a table,
-    except on pile: there `Q` nearly vanishes, and has to vanish exactly where its terms do.
+    Tilting the thread shifts both angles by the same amount, so two numbers describe both
+    directions. The mean is read from a table, except on pile: there `Q` nearly vanishes, and it has
+    to vanish exactly where its terms do.
     """
     if part.thread.curve.steepest > PILE_ANGLE:
         mean = np.zeros(np.broadcast_shapes(i.shape, o.shape))
@@ -151,7 +156,7 @@ def _mean_p(part: Share, width: float, i: Floats, o: Floats, effort: Effort) -> 
 
 @lru_cache(maxsize=32)
 def _p_table(part: Share, width: float, effort: Effort) -> Floats:
-    """The mean `P` on a grid of `FINEST` in both tilts."""
+    """The mean of `P` on a grid with the spacing `FINEST` in both longitudes."""
     psi = np.arange(-math.pi / 2, math.pi / 2 + FINEST / 2, FINEST)
     i, o = np.meshgrid(psi, psi, indexing="ij")
     table = np.zeros_like(i)
@@ -173,7 +178,7 @@ def _node(
     views: Floats,
     effort: Effort,
 ) -> tuple[Floats, Floats]:
-    """(views,) integrals over the sky of surface and volume term on thread at `psi0`."""
+    """(views,) integrals over the sky of the surface and the volume term of thread at `psi0`."""
     c, s = math.cos(psi0), math.sin(psi0)
     along = views[:, 1] if part.is_warp else views[:, 0]
     across = -views[:, 0] if part.is_warp else views[:, 1]
@@ -204,7 +209,7 @@ def _node(
 
 
 def _inclinations(theta_o: Floats, part: Share, effort: Effort) -> tuple[Floats, Floats]:
-    """(views, n) inclinations and weights, in pieces that follow both lobes about -theta_o."""
+    """(views, n) inclinations and weights, in intervals that follow both lobes about -theta_o."""
     widths = np.array([2 * part.thread.gamma_surface, 2 * part.thread.gamma_volume])
     offsets = np.sort(np.concatenate([k * widths for k in (-4, -1.5, 0, 1.5, 4)]))
     edges = np.clip(-theta_o[:, None] + offsets, -math.pi / 2, math.pi / 2)
@@ -213,7 +218,7 @@ def _inclinations(theta_o: Floats, part: Share, effort: Effort) -> tuple[Floats,
 
 
 def _around(phi_o: Floats, effort: Effort) -> tuple[Floats, Floats]:
-    """(views, n) azimuths and weights on the thread's lit half, split where `M` has its kink."""
+    """(views, n) azimuths and weights on the thread's lit half, split at the kink of `M`."""
     half = math.pi / 2
     middle = np.clip(phi_o, -half, half)[:, None]
     ends = np.full((len(phi_o), 1), half)
@@ -221,7 +226,7 @@ def _around(phi_o: Floats, effort: Effort) -> tuple[Floats, Floats]:
 
 
 def _gauss(edges: Floats, count: int) -> tuple[Floats, Floats]:
-    """Gauss-Legendre nodes and weights in every piece between (views, k) edges."""
+    """Gauss-Legendre nodes and weights in every interval between (views, k) edges."""
     x, weight = np.polynomial.legendre.leggauss(count)
     middle, half = (edges[:, 1:] + edges[:, :-1]) / 2, (edges[:, 1:] - edges[:, :-1]) / 2
     nodes = middle[..., None] + half[..., None] * x

@@ -1,10 +1,10 @@
-"""The one place where directions, frames and angles are defined.
+"""Definitions of the directions, frames and angles that the whole package uses.
 
-Surface frame: x = U (the weft runs along it), y = V (the warp), z = N, the side that the viewer is
-on. `wo` points to the viewer and is given; `wi` points to the light and is sampled.
+In the surface frame x = U (along the weft), y = V (along the warp), z = N, which points to the
+viewer's side. `wo` points to the viewer and is given; `wi` points to the light and is sampled.
 
-Thread frame, right-handed: x = t along the thread, y = b across it, z = n_t its normal. A thread
-along the axis `a` (V for warp, U for weft) with the tangent angle `psi0` has
+The thread frame is right-handed: x = t along the thread, y = b across it, z = n_t, its normal. A
+thread along the axis `a` (V for warp, U for weft) with the tangent angle `psi0` has
 
     t = cos psi0 a - sin psi0 N,    n_t = sin psi0 a + cos psi0 N,    b = n_t x t
 
@@ -13,14 +13,15 @@ so a positive angle leans the normal forward along the axis.
 Angles of a direction w in the thread frame:
 
 - inclination `theta = asin(w.t)`, measured from the thread's normal plane and *not* from a pole,
-  with one sign for both directions: the mirror cone of a thread is `theta_o = -theta_i`;
-- azimuth `phi = atan2(w.b, w.n_t)` and longitude `psi = atan2(w.t, w.n_t)`, both 0 along n_t and
-  where they are undefined;
-- `theta_h = (theta_i + theta_o)/2` and `theta_d = (theta_i - theta_o)/2`. Here `theta_h` is 0 in
-  the mirror direction: it is how far a pair is from the mirror cone. Microfacet models use the
-  name for the polar angle of the half vector, which is another thing.
+  with the same sign convention for both directions: the mirror cone is `theta_o = -theta_i`;
+- azimuth `phi = atan2(w.b, w.n_t)` and longitude `psi = atan2(w.t, w.n_t)`; both are 0 along n_t
+  and where they are undefined;
+- `theta_h = (theta_i + theta_o)/2` and `theta_d = (theta_i - theta_o)/2`. In this project `theta_h`
+  is 0 in the mirror direction and measures the distance of a pair from the mirror cone. Microfacet
+  models use the same name for a different angle, the polar angle of the half vector.
 
-The kernels take and return numbers, precision `R` first. Source: MODEL section 1, [Bisker2011].
+The kernels take and return numbers, with the precision `R` first. Source: MODEL section 1,
+[Bisker2011].
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from numba import njit
 from fabricusd.kernels.real import INLINE, atan2
 
 WEFT, WARP = 0, 1
-"""Index of a thread set; also the value of a grid cell where that set lies on top."""
+"""Indices of the thread sets; also the values of a grid cell in which that set is on top."""
 
 
 @njit(**INLINE)
@@ -56,13 +57,13 @@ def from_thread(R, thread_set, cos_psi0, sin_psi0, t, b, n):
 
 @njit(**INLINE)
 def cos_inclination(R, y, z):
-    """cos(theta), from the components across the thread, so that it keeps its precision at 90."""
+    """cos(theta) from the components across the thread, which keep it precise near 90 degrees."""
     return math.sqrt(y * y + z * z)
 
 
 @njit(**INLINE)
 def unit_azimuth(R, y, z, cos_theta):
-    """(sin phi, cos phi) of a direction; (0, 1) along the thread."""
+    """(sin phi, cos phi) of a direction; (0, 1) for directions along the thread."""
     along = cos_theta <= R(1e-30)
     scale = R(1) / max(cos_theta, R(1e-30))
     return R(0) if along else y * scale, R(1) if along else z * scale
@@ -70,11 +71,11 @@ def unit_azimuth(R, y, z, cos_theta):
 
 @njit(**INLINE)
 def half_inclination_legs(R, sin_i, cos_i, sin_o, cos_o):
-    """(y, x) with theta_h = atan2(y, x), x >= 0, of any length above 1.
+    """(y, x) with theta_h = atan2(y, x) and x >= 0; the length of (y, x) is above 1.
 
-    The sum of the unit vectors at the angles theta_i and theta_o points along theta_h. Near
-    opposite directions along the thread that sum vanishes; there the two vectors' difference,
-    at a right angle to it, tells the same angle without cancellation.
+    The sum of the unit vectors at the angles theta_i and theta_o points along theta_h. For nearly
+    opposite directions along the thread the sum vanishes. There the difference of the two vectors,
+    which is perpendicular to the sum, gives the same angle without cancellation.
     """
     d = sin_i - sin_o
     s = sin_i + sin_o

@@ -1,8 +1,9 @@
-"""The surface law of a fabric as one value: what the path tracer and the public functions call.
+"""Evaluate and sample the surface law of a fabric, for the path tracer and the public functions.
 
-A cloth may mix published and `conserving` threads. Then each kind scatters by its own law, with
-all threads masking and shadowing, the values add up, and directions are drawn from both samplers
-alike. Scalar kernels, precision `R` first. A value is radiance per unit `L_i dwi`, cosine included.
+A cloth may mix published and `conserving` threads. Each kind then scatters by its own law, masked
+and shadowed by all threads; the values add up, and directions are drawn from both samplers with
+equal probability. The kernels are scalar and take the precision `R` first. A value is the radiance
+per unit `L_i dwi`, cosine included.
 """
 
 from __future__ import annotations
@@ -47,9 +48,10 @@ PUBLISHED_ONLY, CONSERVING_ONLY, MIXED = 0, 1, 2
 class SurfaceLaw(NamedTuple):
     """All tables of one fabric's surface law, in one precision.
 
-    kind : int - PUBLISHED_ONLY, CONSERVING_ONLY or MIXED; tables that it does not ask for are empty
-    published, lobes : of the threads with a published model, and their sampler
-    conserving, conserving_lobes : of the `conserving` threads, and their sampler
+    kind : int - PUBLISHED_ONLY, CONSERVING_ONLY or MIXED; tables that this kind does not use are
+        empty
+    published, lobes : tables of the threads with a published model, and their sampler
+    conserving, conserving_lobes : tables of the `conserving` threads, and their sampler
     """
 
     kind: int
@@ -68,8 +70,9 @@ def surface_law(
 ) -> SurfaceLaw:
     """The law of `fabric` in `precision`, np.float32 or np.float64.
 
-    rule : quadrature over the curves; None takes each model's default
-    multiple : whether `conserving` cloth scatters light more than once; its table takes a second
+    rule : quadrature over the curves; None takes the default of each model
+    multiple : whether `conserving` cloth scatters light more than once; its table takes a second to
+        compute
     """
     kind = PUBLISHED_ONLY
     if any_conserving(fabric):
@@ -89,9 +92,9 @@ def surface_law(
 
 @njit(**PART)
 def law_value(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """(r, g, b) at a level.
+    """(r, g, b) of the surface law at a level.
 
-    thread_set, thread, psi0, w : what `weave.find` gave under the point; not read at level FAR
+    thread_set, thread, psi0, w : what `weave.find` returns at the point; not read at level FAR
     """
     red, green, blue = R(0), R(0), R(0)
     if law.kind != CONSERVING_ONLY:
@@ -117,7 +120,7 @@ def law_value(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz
 
 @njit(**PART)
 def law_density(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """pdf(wi) [1/sr] of `law_direction`; 0 where it never goes."""
+    """pdf(wi) [1/sr] of `law_direction`; 0 for directions that it never draws."""
     p, q = R(0), R(0)
     if law.kind != CONSERVING_ONLY:
         if level == FAR:
@@ -135,7 +138,8 @@ def law_density(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, 
                 R, law.conserving.threads, law.conserving_lobes, level == THREAD, thread_set,
                 thread, psi0, w, ix, iy, iz, ox, oy, oz,
             )  # fmt: skip
-    # A viewer below the cloth sees no published model: all directions are the other's.
+    # The published models are 0 for a viewer below the cloth: the conserving sampler draws all
+    # directions there.
     if law.kind == MIXED and oz > R(0):
         return R(0.5) * (p + q)
     return q if law.kind != PUBLISHED_ONLY else p
@@ -143,7 +147,10 @@ def law_density(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, 
 
 @njit(**PART)
 def law_direction(R, law, level, thread_set, thread, psi0, w, ox, oy, oz, u0, u1, u2):  # type: ignore[no-untyped-def]
-    """wi (x, y, z) for a viewer and three numbers in [0, 1); check `law_density` of it above 0."""
+    """wi (x, y, z) for a viewer and three numbers in [0, 1).
+
+    Callers must reject a direction whose `law_density` is 0.
+    """
     published = law.kind == PUBLISHED_ONLY
     if law.kind == MIXED and oz > R(0):
         published = u0 < R(0.5)

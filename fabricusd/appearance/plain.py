@@ -1,8 +1,9 @@
-"""The appearance model as it is written down: slow, plain float64 NumPy, shared with no kernel.
+"""The reference implementation of the appearance model, against which the kernels are tested.
 
-What the compiled kernels are tested against; a thread's formula is in the module of its model,
-beside the kernels. Directions are (n, 3) unit vectors; every function broadcasts over n. Source:
-MODEL sections 1, 2 and 4 (`docs/model.md`).
+It follows the formulas of `docs/model.md` in slow, plain float64 NumPy and shares no code with the
+kernels. The formula of a thread is in the module of its model, beside the kernels. Directions are
+(n, 3) unit vectors; every function broadcasts over n. Source: MODEL sections 1, 2 and 4
+(`docs/model.md`).
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage
 from fabricusd.fabric import PILE_ANGLE, Fabric, TangentCurve, Thread
 
 NOTHING = 1e-12
-"""`Q` at or below which the published surface law is 0."""
+"""The published surface law is 0 where `Q` is at or below this."""
 
 
 def to_thread(w: Array, is_warp: bool, psi0: float | Array) -> Array:
-    """(n, 3) from the surface frame (U, V, N) to the frame of a thread at tangent angle `psi0`.
+    """(n, 3) directions of the surface frame (U, V, N) in the frame of a thread at `psi0` [rad].
 
     Warp runs along V, weft along U; `t = cos psi0 a - sin psi0 N`, `b = n_t x t`.
     """
@@ -36,30 +37,30 @@ def to_thread(w: Array, is_warp: bool, psi0: float | Array) -> Array:
 
 
 def thread_terms(thread: Thread, model: str, i: Angles, o: Angles) -> tuple[Array, Array]:
-    """Surface and volume term of `f_s` [1/sr], each (n,), the volume's without `A`. Section 2."""
+    """Surface and volume term of `f_s` [1/sr], each (n,), the latter without `A`. Section 2."""
     return named(model).plain(thread, i, o)
 
 
 def thread_value(thread: Thread, model: str, wi: Array, wo: Array) -> Array:
-    """(n, 3) `f_s` [1/sr] without cosine, directions in the thread frame."""
+    """(n, 3) `f_s` [1/sr] without the cosine; directions are in the thread frame."""
     surface, volume = thread_terms(thread, model, angles(wi), angles(wo))
     return surface[..., None] + volume[..., None] * albedo_of(thread, model)
 
 
 def albedo_of(thread: Thread, model: str) -> Array:
-    """(3,) `A`, clamped to 1 where it is an albedo."""
+    """(3,) `A`, clamped to 1 for models in which it is an albedo."""
     return np.minimum(thread.albedo, named(model).most_albedo)
 
 
 def masked(x: Array, y: Array, width: float) -> Array:
-    """`M` of azimuths phi, `P` of azimuths psi [rad]: the share seen and lit. Section 4."""
+    """The fraction seen and lit: `M` of azimuths phi, `P` of longitudes psi [rad]. Section 4."""
     mx, my = np.maximum(np.cos(x), 0), np.maximum(np.cos(y), 0)
     u = np.exp(-(wrap(x - y) ** 2) / (2 * width**2))
     return (1 - u) * mx * my + u * np.minimum(mx, my)
 
 
 def curve_points(curve: TangentCurve, per_segment: int = 64) -> tuple[Array, Array]:
-    """(psi0, weight), each (k,): midpoints by length; weights sum to 1. Jumps weigh nothing."""
+    """(psi0, weight), each (k,): midpoints by length. Weights sum to 1; jumps have no weight."""
     p, a = np.array(curve.positions), np.array(curve.angles)
     middle = (np.arange(per_segment) + 0.5) / per_segment
     psi0 = [a[k] + (a[k + 1] - a[k]) * middle for k in range(len(p) - 1) if p[k + 1] > p[k]]
@@ -69,7 +70,7 @@ def curve_points(curve: TangentCurve, per_segment: int = 64) -> tuple[Array, Arr
 
 @dataclass(frozen=True, kw_only=True)
 class Share:
-    """Part of the cloth: one type of thread in one set, and how much area it covers."""
+    """A part of the cloth: one type of thread in one set, and the share of the area it covers."""
 
     thread: Thread
     model: str
@@ -78,7 +79,7 @@ class Share:
 
 
 def shares(fabric: Fabric) -> tuple[Share, ...]:
-    """Who covers how much of the cloth, for everyone that covers anything. Section 3."""
+    """The share of the cloth that each type of thread covers in each set, if any. Section 3."""
     area = coverage(fabric).type_area
     return tuple(
         Share(
@@ -101,7 +102,7 @@ def _nodes(fabric: Fabric, per_segment: int) -> Iterator[tuple[Share, float, flo
 
 
 def gap(fabric: Fabric) -> float:
-    """Share of the cloth that no thread covers."""
+    """The share of the cloth that no thread covers."""
     return 1.0 - sum(share.area for share in shares(fabric))
 
 
@@ -123,9 +124,9 @@ def segment(
     wo: Array,
     width: Array | None = None,
 ) -> Array:
-    """(n, 3) `f_s M P cos theta_i` of a bit of thread at `psi0`, before the division by `Q`.
+    """(n, 3) `f_s M P cos theta_i` of a segment of thread at `psi0`, before the division by `Q`.
 
-    width : (n,) or None - `w` in [-1, 1] across the thread (level `thread`), None for the mean
+    width : (n,) or None - `w` in [-1, 1] across the thread (level `thread`); None for the mean
     """
     i = angles(to_thread(wi, share.is_warp, psi0))
     o = angles(to_thread(wo, share.is_warp, psi0))
@@ -141,7 +142,8 @@ def segment(
 
 
 def across(thread: Thread, i: Angles, o: Angles, w: Array) -> tuple[Array, Array]:
-    """Factors (n,) on surface and volume term at `w` across the thread; each averages to 1."""
+    """Factors (n,) of the surface and the volume term at `w` across the thread; the mean of each
+    over w is 1."""
     half = o.phi + 0.5 * wrap(i.phi - o.phi)
     h = np.where(np.abs(half) > math.pi / 2, np.sign(half), np.sin(half))
     beta = max(thread.gamma_surface, 0.1)
@@ -151,13 +153,13 @@ def across(thread: Thread, i: Angles, o: Angles, w: Array) -> tuple[Array, Array
 
 
 def _published(value: Array, q: Array, wi: Array, wo: Array) -> Array:
-    """`value / Q`, 0 at or below the cloth and where `Q` is nothing."""
+    """`value / Q`; 0 for directions at or below the cloth and where `Q` is at most NOTHING."""
     lit = (np.asarray(wi)[..., 2] > 0) & (np.asarray(wo)[..., 2] > 0) & (q > NOTHING)
     return np.where(lit[..., None], value / np.where(lit, q, 1.0)[..., None], 0.0)
 
 
 def far(fabric: Fabric, wi: Array, wo: Array, per_segment: int = 64) -> Array:
-    """(n, 3) level `far` of the published models: radiance per unit `L_i dwi`."""
+    """(n, 3) radiance per unit `L_i dwi` of the published models at level `far`."""
     value = np.zeros((*np.shape(wi)[:-1], 3))
     for share, psi0, area in _nodes(fabric, per_segment):
         value = value + area * segment(fabric, share, psi0, wi, wo)
@@ -173,7 +175,7 @@ def point(
     width: Array | None = None,
     per_segment: int = 64,
 ) -> Array:
-    """(n, 3) level `weave` (`thread` with a `width`) on thread `share` at tangent angle `psi0`."""
+    """(n, 3) value at level `weave`, or `thread` given a `width`; psi0 : tangent angle [rad]."""
     value = segment(fabric, share, psi0, wi, wo, width)
     return _published(value, normalization(fabric, wi, wo, per_segment), wi, wo)
 

@@ -1,16 +1,17 @@
-"""The cloth's surface law: evaluate, sample, pdf, at every level and with every shadowing.
+"""Evaluate and sample cloth: the public functions, for every level and shadowing method.
 
-Directions are unit vectors in the surface frame: x = U (the weft runs along it), y = V (the warp),
-z = N on the viewer's side. `wo` points to the viewer and is given, `wi` to the light. A value is
-radiance per unit `L_i dwi`: the cosine is in it. The published models are 0 where either direction
-is at or below the cloth.
+Directions are unit vectors in the surface frame: x = U (along the weft), y = V (along the warp),
+z = N on the viewer's side. `wo` points to the viewer and is given; `wi` points to the light. A
+value is the radiance per unit `L_i dwi`, cosine included. The published models are 0 if either
+direction is at or below the cloth.
 
-    far     the whole repeat at once; no place, no shadowing
+    far     the mean over the repeat; it has no place and no shadowing
     weave   the thread under a point of the weave
-    thread  the same, and the place across the thread
+    thread  the same, and the position across the thread
 
-Arrays are float64 and exact to rounding; the kernels behind them take float32 as well and are what
-the path tracer calls: `far`, `levels`, `mixture`. Source: `docs/model.md` sections 4-6.
+Arrays are float64, and results are exact to rounding. The kernels behind these functions also take
+float32 and are what the path tracer calls: `far`, `levels`, `mixture`. Source: `docs/model.md`
+sections 4-6.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ from fabricusd.kernels.real import BLOCK, KERNEL, index
 Floats = NDArray[np.float64]
 
 _CHUNK = 32 * BLOCK
-"""Directions that one worker takes at a time."""
+"""Number of directions that a worker takes at a time."""
 
 
 class Sample(NamedTuple):
@@ -71,7 +72,7 @@ class Sample(NamedTuple):
 
     wi : (n, 3) float - unit vectors in the surface frame
     f : (n, 3) float - radiance per unit `L_i dwi`, cosine included
-    pdf : (n,) float - density of wi [1/sr]; 0 with f = 0 where nothing can be drawn
+    pdf : (n,) float - density of wi [1/sr]; 0, with f = 0, if no direction can be drawn
     """
 
     wi: Floats
@@ -93,17 +94,17 @@ def evaluate(
     """(n, 3) radiance per unit `L_i dwi` towards wo, cosine included.
 
     wi, wo : (n, 3) unit vectors in the surface frame, or one (3,) for all
-    uv : (n, 2) weave coordinates in threads (ends along U, picks along V), or (2,) for all; asked
-        for at levels `weave` and `thread`
+    uv : (n, 2) weave coordinates in threads (ends along U, picks along V), or (2,) for all;
+        required at levels `weave` and `thread`
     level : one of LEVELS
-    shadow : one of `shadow.METHODS`; level `far` has no place that could be shadowed and takes
-        none of them
+    shadow : one of `shadow.METHODS`; ignored at level `far`, which has no place to be shadowed
     max_error : bound on the mean relative error of the quadrature over the curves, see
         `accuracy.choose_rule`; None takes `quadrature.default_rule`
     multiple : whether `conserving` cloth scatters light more than once
 
-    Raises FabricError for directions that are not finite unit vectors, an unknown level or
-    shadowing, a place that is missing or not finite, a bound that cannot be met.
+    Raises FabricError for directions that are not finite unit vectors, for an unknown level or
+    shadowing method, for coordinates that are missing or not finite, and for a bound that cannot be
+    met.
     """
     i, o = _pairs(wi, wo, uv if level != "far" else None)
     hit, places = _places(fabric, uv, level, i.shape[1])
@@ -122,9 +123,9 @@ def pdf(
     level: str = "far",
     shadow: str = "none",
 ) -> Floats:
-    """(n,) density [1/sr] with which `sample` draws wi for the viewer wo, whatever the shadowing.
+    """(n,) density [1/sr] with which `sample` draws wi for the viewer wo.
 
-    Arguments and errors as for `evaluate`.
+    The density does not depend on the shadowing. Arguments and errors are those of `evaluate`.
     """
     i, o = _pairs(wi, wo, uv if level != "far" else None)
     hit, _ = _places(fabric, uv, level, i.shape[1])
@@ -140,12 +141,12 @@ def sample(
     level: str = "far",
     shadow: str = "none",
 ) -> Sample:
-    """Directions towards the light for the viewers wo, `f/pdf` as even as the lobes allow.
+    """Directions towards the light for the viewers wo, with `f/pdf` as even as the lobes allow.
 
     wo : (n, 3) unit vectors in the surface frame, or (3,) for all
     u : (n, 3) numbers in [0, 1): lobe, inclination, azimuth
 
-    The rest, and errors, as for `evaluate`.
+    The other arguments and the errors are those of `evaluate`.
     """
     numbers = np.atleast_2d(np.asarray(u, np.float64))
     if numbers.ndim != 2 or numbers.shape[1] != 3:
@@ -196,7 +197,7 @@ def _shadowed(fabric: Fabric, method: str, level: str) -> tuple[CompiledFabric, 
 
 
 def _lit(fabric: Fabric, method: str, level: str, uv: Floats, wi: Floats) -> Floats:
-    """(n,) what `shadow.shade` multiplies by at each place, for light from wi (3, n)."""
+    """(n,) factor of `shadow.shade` at each place, for light from wi (3, n)."""
     cloth, shadow = _shadowed(fabric, method, level)
     out = np.empty(len(uv))
     real: Any = np.float64
@@ -212,14 +213,14 @@ def _check_shadow(method: str) -> None:
 def _places(
     fabric: Fabric, uv: ArrayLike | None, level: str, count: int
 ) -> tuple[WeaveHit, Floats]:
-    """What lies under each of `count` places, and the places, (count, 2); for `far` any one."""
+    """The hit at each of `count` places, and the places (count, 2); a single dummy for `far`."""
     if level not in LEVELS:
         raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
     if level == "far":
         anywhere = np.zeros((1, 2))
         return lookup(_cloth(fabric), anywhere), anywhere
     if uv is None:
-        raise FabricError("uv", f"is missing; level {level} asks for weave coordinates, (n, 2)")
+        raise FabricError("uv", f"is missing; level {level} requires weave coordinates, (n, 2)")
     places = np.atleast_2d(np.asarray(uv, np.float64))
     if places.ndim != 2 or places.shape[1] != 2 or len(places) not in (1, count):
         raise FabricError("uv", f"has shape {places.shape}; it must be ({count}, 2) or (2,)")
@@ -233,7 +234,7 @@ def _cloth(fabric: Fabric) -> CompiledFabric:
 
 
 def _directions(name: str, w: ArrayLike) -> Floats:
-    """(3, n) unit vectors to rounding, from (n, 3) or (3,)."""
+    """(3, n) vectors, normalised to rounding, from (n, 3) or (3,)."""
     rows = np.atleast_2d(np.asarray(w, np.float64))
     if rows.ndim != 2 or rows.shape[1] != 3:
         raise FabricError(name, f"has shape {rows.shape}; it must be (n, 3)")
@@ -256,12 +257,13 @@ def _repeated(w: Floats, count: int, name: str) -> Floats:
     if w.shape[1] == count:
         return w
     if w.shape[1] != 1:
-        raise FabricError(name, f"has {w.shape[1]} directions; it must have {count}, or 1")
+        raise FabricError(name, f"has {w.shape[1]} directions; it must have {count} or 1")
     return np.repeat(w, count, axis=1)
 
 
 def _pairs(wi: ArrayLike, wo: ArrayLike, uv: ArrayLike | None) -> tuple[Floats, Floats]:
-    """Both directions as (3, n), a single one repeated for all of the other's or of the places."""
+    """Both arguments as (3, n); a single direction is repeated to match the others or the
+    places."""
     i, o = _directions("wi", wi), _directions("wo", wo)
     places = 1 if uv is None else len(np.atleast_2d(np.asarray(uv)))
     n = next((k for k in (i.shape[1], o.shape[1], places) if k != 1), 1)
@@ -269,7 +271,7 @@ def _pairs(wi: ArrayLike, wo: ArrayLike, uv: ArrayLike | None) -> tuple[Floats, 
 
 
 def _evaluate(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats) -> Floats:
-    """(3, n) values; the published models by the vectorised loops, the rest one by one."""
+    """(3, n) values, of the published models by the vectorised loops, of the others one by one."""
     real: Any = np.float64
     out = np.zeros_like(wi)
     if law.kind != CONSERVING_ONLY:
@@ -290,7 +292,7 @@ def _evaluate(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats
 
 @njit(**KERNEL, parallel=True)
 def far_all(R, tables, wi, wo, out):  # type: ignore[no-untyped-def]
-    """Level `far` of all pairs, on all workers: wi, wo, out (3, n) of precision R."""
+    """Level `far` of all pairs, on all workers: wi, wo, out are (3, n) of precision R."""
     n = wi.shape[1]
     for chunk in prange((n + _CHUNK - 1) // _CHUNK):
         far_values(R, tables, wi, wo, out, chunk * _CHUNK, min(n, (chunk + 1) * _CHUNK))
@@ -307,9 +309,10 @@ def points_all(R, tables, across_too, sets, threads, psi0, w, wi, wo, out):  # t
 
 @njit(**KERNEL, parallel=True)
 def weave_all(R, cloth, shadow, tables, uv, wi, wo, out):
-    """Level `weave` by the `horizon` table at places uv (n, 2) float64, each looked up once.
+    """Level `weave` shadowed by the `horizon` table, at places that are each looked up once.
 
-    cloth, shadow, tables : compiled for precision R, the shadow by "horizon"; wi, wo, out : (3, n)
+    cloth, shadow, tables : compiled for precision R, the shadow by "horizon"
+    uv : (n, 2) float64 weave coordinates; wi, wo, out : (3, n) of precision R
     """
     n = uv.shape[0]
     for chunk in prange((n + _CHUNK - 1) // _CHUNK):
@@ -353,7 +356,7 @@ def _add_conserving(R, tables, level, sets, threads, psi0, w, wi, wo, out):  # t
         out[2, k] += b
 
 
-# A parallel loop does not take a tuple of tuples: the law travels in parts.
+# numba's parallel loops cannot take a tuple of tuples, so the law is passed in parts.
 
 
 @njit(**KERNEL, parallel=True)

@@ -1,12 +1,12 @@
-"""One thread by itself: evaluate, sample, pdf; and the columns and kernels that other tools read.
+"""Evaluate and sample a single thread; also the columns and kernels that other tools use.
 
-Directions are unit vectors in the thread frame, x along the thread's tangent, z along its normal
-(`frame`). `f_s` is per steradian and carries no cosine; a light's share of the radiance is
-`f_s L_i cos(theta_i)` with the inclination's cosine `sqrt(1 - x^2)`. A thread scatters over the
+Directions are unit vectors in the thread frame: x along the thread's tangent, z along its normal
+(`frame`). `f_s` is per steradian and carries no cosine; a light contributes `f_s L_i cos(theta_i)`
+to the radiance, with the cosine of the inclination, `sqrt(1 - x^2)`. A thread scatters over the
 whole sphere.
 
-    evaluate, sample, pdf        (n, 3) float64 arrays of directions: exact to rounding
-    evaluate_soa                 (3, n) arrays of either precision: the fast loop
+    evaluate, sample, pdf        (n, 3) float64 arrays of directions; exact to rounding
+    evaluate_soa                 (3, n) arrays of either precision; the fast loop
     terms, density, ...          scalar kernels on a row of `pack_threads`
 """
 
@@ -77,14 +77,14 @@ Reals = NDArray[Any]
 Floats = NDArray[np.float64]
 
 CHUNK = 4096
-"""Directions that one worker takes at a time: 150 kB in float32, which stays in its cache."""
+"""Number of directions that a worker takes at a time: 150 kB in float32, which fit in its cache."""
 
 
 class Sample(NamedTuple):
     """Directions drawn for given viewers.
 
     wi : (n, 3) float - unit vectors in the thread frame
-    f : (n, 3) float - `f_s(wi, wo)` [1/sr], without cosine
+    f : (n, 3) float - `f_s(wi, wo)` [1/sr], without the cosine
     pdf : (n,) float - density of wi [1/sr], above 0
     """
 
@@ -94,12 +94,13 @@ class Sample(NamedTuple):
 
 
 def evaluate(thread: Thread, wi: ArrayLike, wo: ArrayLike, model: str | None = None) -> Floats:
-    """(n, 3) `f_s(wi, wo)` [1/sr] per channel, without cosine; never negative, always finite.
+    """(n, 3) `f_s(wi, wo)` [1/sr] per channel, without the cosine; never negative, always finite.
 
     wi, wo : (n, 3) unit vectors in the thread frame, or (3,) for all
-    model : one of `fabric.MODELS`; None takes the thread's, or else the default
+    model : one of `fabric.MODELS`; None takes the thread's model, or the default if it has none
 
-    Raises FabricError for directions that are not finite or not of length 1, and unknown models.
+    Raises FabricError for directions that are not finite or not of length 1, and for unknown
+    models.
     """
     i, o = _pairs(wi, wo)
     out = np.empty_like(i)
@@ -108,9 +109,9 @@ def evaluate(thread: Thread, wi: ArrayLike, wo: ArrayLike, model: str | None = N
 
 
 def pdf(thread: Thread, wi: ArrayLike, wo: ArrayLike, model: str | None = None) -> Floats:
-    """(n,) density [1/sr] with which `sample` draws wi for the viewer wo; integrates to 1.
+    """(n,) density [1/sr] with which `sample` draws wi for the viewer wo; it integrates to 1.
 
-    Arguments and errors as for `evaluate`.
+    Arguments and errors are those of `evaluate`.
     """
     i, o = _pairs(wi, wo)
     out = np.empty(i.shape[1])
@@ -119,12 +120,12 @@ def pdf(thread: Thread, wi: ArrayLike, wo: ArrayLike, model: str | None = None) 
 
 
 def sample(thread: Thread, wo: ArrayLike, u: ArrayLike, model: str | None = None) -> Sample:
-    """Directions towards the light for the viewers wo, `f cos(theta_i)/pdf` nearly even.
+    """Directions towards the light for the viewers wo, with `f cos(theta_i)/pdf` nearly even.
 
     wo : (n, 3) unit vectors in the thread frame, or (3,) for all
     u : (n, 3) numbers in [0, 1): lobe, inclination, azimuth
 
-    Errors as for `evaluate`, and for numbers outside [0, 1].
+    Raises FabricError as `evaluate` does, and for numbers outside [0, 1].
     """
     numbers = np.atleast_2d(np.asarray(u, np.float64))
     if numbers.ndim != 2 or numbers.shape[1] != 3:
@@ -146,10 +147,11 @@ def sample(thread: Thread, wo: ArrayLike, u: ArrayLike, model: str | None = None
 
 
 def evaluate_soa(row: Reals, wi: Reals, wo: Reals, out: Reals | None = None) -> Reals:
-    """`evaluate` for those who hold structures of arrays: no checks, no copies, all workers.
+    """`evaluate` on structures of arrays, on all workers, without checks or copies.
 
     row : one row of `pack_threads`; wi, wo, out : (3, n) C-contiguous, all of the row's precision
-    Returns out, made if not given: (3, n) `f_s` [1/sr].
+
+    Returns `out`, which is allocated if not given: (3, n) `f_s` [1/sr].
     """
     if out is None:
         out = np.empty_like(wi)
@@ -165,7 +167,7 @@ def _model_of(thread: Thread, model: str | None) -> str:
 
 
 def _directions(name: str, w: ArrayLike) -> Floats:
-    """(3, n) unit vectors to rounding, from (n, 3) or (3,)."""
+    """(3, n) vectors, normalised to rounding, from (n, 3) or (3,)."""
     rows = np.atleast_2d(np.asarray(w, np.float64))
     if rows.ndim != 2 or rows.shape[1] != 3:
         raise FabricError(name, f"has shape {rows.shape}; it must be (n, 3)")
@@ -181,7 +183,7 @@ def _directions(name: str, w: ArrayLike) -> Floats:
 
 
 def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Floats, Floats]:
-    """Both directions as (3, n), one of them repeated if it is single."""
+    """Both arguments as (3, n); a single direction is repeated to match the other argument."""
     i, o = _directions("wi", wi), _directions("wo", wo)
     n = max(i.shape[1], o.shape[1])
     if i.shape[1] == 1:
@@ -193,8 +195,8 @@ def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Floats, Floats]:
     return i, o
 
 
-# The loops below read a row's constants from a tuple: as loads from an array, LLVM would have to
-# assume that every store into `out` changes them, and would not vectorise.
+# The loops below read the row's constants from a tuple. If they loaded them from an array, LLVM
+# would have to assume that every store into `out` may change them, and would not vectorise.
 
 
 _constants = tuple_reader(CONSTANTS)
@@ -242,7 +244,8 @@ def _table_block(R, model, row, scale, added, ix, iy, iz, ox, oy, oz, r, g, b):
 
 @njit(**KERNEL)
 def _looked_up_block(R, model, row, iy, iz, oy, oz, scale, added):
-    """What models read from tables: by itself, which keeps the loop above from gathering."""
+    """The values that models look up in tables, in a loop of their own: the loops above then
+    contain no gathers."""
     for k in range(scale.size):
         cos_i, cos_o, _ = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
         scale[k], added[k] = looked_up(R, model, row, cos_i, cos_o)

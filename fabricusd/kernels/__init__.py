@@ -1,6 +1,6 @@
-"""What every compiled kernel rests on: elementary functions, parts of kernels, the cache."""
+"""The foundation of every compiled kernel: elementary functions, compiler settings, the cache."""
 
 from fabricusd.kernels.cache import use_cache
 
-# Before the first kernel is defined: that is when numba chooses the folder it caches in.
+# This has to run before the first kernel is defined, because numba chooses its cache folder then.
 use_cache()

@@ -1,9 +1,10 @@
-"""Where numba keeps compiled kernels: a folder for each state of all the sources.
+"""Choose the folder in which numba caches compiled kernels: one for each state of the sources.
 
-numba looks at a kernel's own file alone to tell whether its machine code is still right. A kernel
-holds what it calls, inlined, and constants of other modules, so a change in another file would
-leave it stale. Here the folder is named by a digest of every source that kernels may read: nothing
-stale is ever found, nothing has to be deleted, and two versions can run side by side.
+numba decides whether cached machine code is still valid by looking at the kernel's own file. But a
+kernel also contains the functions it inlines and constants of other modules, so a change to another
+file would leave it stale. This module therefore names the folder by a digest of every source that
+kernels may read. Stale kernels cannot be loaded, nothing has to be deleted, and two versions of the
+package can run side by side.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ from fabricusd.kernels.internals import use_internals
 
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = ("kernels", "appearance", "scene", "run", "reference", "bake")
-"""Folders of the package whose modules hold kernels, or constants that kernels read."""
+"""Folders of the package whose modules contain kernels, or constants that kernels read."""
 
 
 def sources(package: Path = PACKAGE) -> list[Path]:
-    """Every source that may end up in a kernel, in order."""
+    """Every source file that may end up in a kernel, sorted by path."""
     found = list(package.glob("*.py"))
     for name in FOLDERS:
         found += (package / name).rglob("*.py")
@@ -31,7 +32,8 @@ def sources(package: Path = PACKAGE) -> list[Path]:
 
 
 def fingerprint(package: Path = PACKAGE) -> str:
-    """A digest of the sources' names and contents, of numba's version, and of how it is used."""
+    """A digest of the sources' names and contents, numba's version, and whether its internals are
+    used."""
     compiler = f"{numba.__version__} {use_internals()}"
     digest = hashlib.blake2b(compiler.encode(), digest_size=10)
     for path in sources(package):
@@ -41,6 +43,6 @@ def fingerprint(package: Path = PACKAGE) -> str:
 
 
 def use_cache() -> None:
-    """Let numba keep kernels in the user's cache. A folder that NUMBA_CACHE_DIR names stays."""
+    """Make numba cache kernels in the user's cache, unless NUMBA_CACHE_DIR names a folder."""
     if "NUMBA_CACHE_DIR" not in os.environ:
         numba.config.CACHE_DIR = str(cache_folder(KERNELS, fingerprint()))

@@ -1,9 +1,9 @@
-"""One kernel of several, chosen by a number: chains of comparisons that cost nothing in a loop.
+"""Select one of several kernels by a number, with comparisons that cost nothing inside a loop.
 
-numba calls through a table of functions slowly, and does not compile such a call into its caller.
-A chain of functions compiled in place is as good as `if`s written by hand: where the number is a
-constant LLVM folds the comparisons, elsewhere they are well predicted. The functions made here are
-parts of kernels (`real.INLINE`), which are kept on disk with the kernels around them.
+Calls through a table of functions are slow in numba and are not inlined into the caller. A chain of
+inlined functions is as fast as hand-written `if`s: where the number is a constant, LLVM folds the
+comparisons; elsewhere the processor predicts them well. The functions made here are parts of
+kernels (`real.INLINE`) and are cached on disk together with the kernels that call them.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from fabricusd.kernels.real import INLINE
 def by_number(functions: Mapping[int, Any]) -> Any:
     """A kernel `chosen(R, number, *rest)` that returns `functions[number](R, *rest)`.
 
-    All functions take and return the same types. A function that has several numbers is compiled
-    once, the one that has the most without a comparison: no number may be asked for that is not
-    among `functions`.
+    All functions take and return the same types. A function with several numbers is compiled once.
+    The function with the most numbers comes last and is reached without a comparison, so `number`
+    must be one of the keys of `functions`.
     """
     numbers: dict[Any, list[int]] = {}
     for number, function in functions.items():
@@ -35,15 +35,17 @@ def by_number(functions: Mapping[int, Any]) -> Any:
 
 
 def specialised(body: Any, numbers: Iterable[int]) -> Any:
-    """A kernel `chosen(R, number, *rest)`: `body(R, number, *rest)` with `number` constant.
+    """A kernel `chosen(R, number, *rest)` that calls `body` with `number` as a constant.
 
-    For a body with a loop: each number gets a loop of its own, in which nothing asks for it.
+    Use it for a body with a loop: each number gets a loop of its own, without a test of the number
+    inside.
     """
     return by_number({number: _bound(body, number) for number in numbers})
 
 
 def for_each(body: Any, numbers: Iterable[int]) -> Any:
-    """A kernel `run(R, *rest)`: `body(R, number, *rest)` for all numbers in turn, each constant."""
+    """A kernel `run(R, *rest)` that calls `body(R, number, *rest)` for each number in turn, as a
+    constant."""
     chain = _nothing
     for number in reversed(tuple(numbers)):
         chain = _then(_bound(body, number), chain)

@@ -1,9 +1,9 @@
-"""Kernels on disk that cannot be read: deleted and compiled again, instead of ending every run.
+"""Recover from a damaged kernel cache: delete unreadable kernels and compile them again.
 
-A process that was killed, a full disk or a failing one leaves files that numba trips over, or that
-hold machine code with a wrong byte. So a checksum follows the content of each file, after the end
-of what numba reads of it, and whatever goes wrong in loading a kernel means that it was not on
-disk.
+A killed process, a full disk or a failing disk can leave cache files that make numba raise in every
+later run, or that contain machine code with a wrong byte. This module appends a checksum to each
+file, behind the part that numba reads, and treats any error while loading a kernel as if the kernel
+had not been cached.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ _SIZE = len(_MARK) + hashlib.sha256().digest_size
 
 
 def forgive_damage() -> None:
-    """Let numba's caches, this process's alone, do as this module says; as often as you like."""
+    """Install the recovery in numba's cache classes, in this process only; repeated calls do
+    nothing."""
     if Cache._load_overload is _load_or_compile:
         return
     IndexDataCacheFile._save_data, IndexDataCacheFile._load_data = _save_code, _load_code
@@ -30,24 +31,24 @@ def forgive_damage() -> None:
     Cache._save_overload = _save_if_possible
 
 
-# As numba has them.
+# numba's own methods.
 _load_overload, _save_overload = Cache._load_overload, Cache._save_overload
 _load_index = IndexDataCacheFile._load_index
 
 
 def _load_or_compile(cache: Cache, signature: Any, context: Any) -> Any:
-    """What is on disk; None, which makes numba compile, where that cannot be loaded."""
+    """The cached kernel, or None, which makes numba compile it, if it cannot be loaded."""
     try:
         return _load_overload(cache, signature, context)
     except Exception:
-        # Its file may be another user's.
+        # The file may belong to another user.
         with suppress(OSError):
             _forget(cache._cache_file)
         return None
 
 
 def _forget(file: IndexDataCacheFile) -> None:
-    """Delete the index of a kernel, and its code for every signature."""
+    """Delete a kernel's index and its machine code for every signature."""
     index = Path(file._index_path)
     index.unlink(missing_ok=True)
     for code in index.parent.glob(f"{index.stem}.*.nbc"):
@@ -55,7 +56,7 @@ def _forget(file: IndexDataCacheFile) -> None:
 
 
 def _save_if_possible(cache: Cache, signature: Any, data: Any) -> None:
-    """Save a kernel; a disk that is full or read-only is no reason not to run it."""
+    """Save a kernel. If the disk is full or read-only, the kernel runs without being cached."""
     with suppress(OSError):
         _save_overload(cache, signature, data)
 
@@ -90,7 +91,7 @@ def _write_sealed(file: IndexDataCacheFile, path: str, content: bytes) -> None:
 
 
 def _require_whole(path: Path, content: bytes) -> None:
-    """ValueError where the checksum differs; files that numba alone has written have none."""
+    """Raise ValueError if the checksum differs; files written by plain numba have no checksum."""
     end = content[-_SIZE:]
     if end.startswith(_MARK) and end[len(_MARK) :] != hashlib.sha256(content[:-_SIZE]).digest():
         raise ValueError(f"{path} is damaged")

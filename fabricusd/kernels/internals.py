@@ -1,7 +1,7 @@
-"""Whether numba's internals are used, which makes the first picture a third faster to compile.
+"""Decide whether to use numba's internals, which compile the first picture a third faster.
 
-Nothing depends on them. In a version of numba where they have not been tried, or where one is
-missing, and with FABRICUSD_PLAIN_NUMBA set, kernels are compiled by numba as it is.
+Nothing depends on them. Plain numba compiles the kernels if the installed version has not been
+tried, if an internal is missing, or if FABRICUSD_PLAIN_NUMBA is set.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numba
 VARIABLE = "FABRICUSD_PLAIN_NUMBA"
 
 TRIED = ("0.68.",)
-"""Beginnings of the versions in which `parts` and `start` have been tried."""
+"""Prefixes of the numba versions with which `parts` and `start` have been tried."""
 
 
 def use_internals() -> bool:

@@ -1,10 +1,10 @@
-"""Functions that only kernels call, compiled as parts of those.
+"""Compile functions that only kernels call as parts of those kernels.
 
-numba optimises each function by itself, makes machine code of it and wraps it for Python; then its
-caller gets a copy and optimises that again. Of a function that Python never calls, only the copy is
-ever run. With `PartCompiler` as its `pipeline_class`, a function that is compiled because another
-one calls it is typed and lowered as ever, but goes into its caller as it is: of the time that a
-first picture's kernels take to compile, a quarter.
+numba optimises each function by itself, generates machine code for it and wraps it for Python; its
+caller then gets a copy and optimises that copy again. If Python never calls the function, only the
+copy ever runs. With `PartCompiler` as its `pipeline_class`, a function that is compiled because
+another function calls it is typed and lowered as usual, but is linked into its caller unoptimised.
+This saves a quarter of the time that the kernels of a first picture take to compile.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ import fabricusd.kernels.start  # noqa: F401
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """Code that is only ever linked into that of callers, neither optimised nor generated."""
+    """A library that is only linked into its callers: it is not optimised and emits no machine
+    code."""
 
     def finalize(self) -> None:
         self._raise_if_finalized()
@@ -35,12 +36,12 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _PartLowering(NativeLowering):  # type: ignore[misc]
-    """numba's lowering, into a `_PartLibrary` where another function is waiting for this one."""
+    """numba's lowering, into a `_PartLibrary` if another function is waiting for this one."""
 
     _name = "part_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        # The stack holds the options of every function being compiled, this one's on top.
+        # The stack holds the options of every function being compiled, with this one's on top.
         if len(ConfigStack()) < 2:
             return bool(super().run_pass(state))
         state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
@@ -56,10 +57,10 @@ class _PartLowering(NativeLowering):  # type: ignore[misc]
 
 
 class PartCompiler(Compiler):  # type: ignore[misc]
-    """numba's compiler, for a function that usually is part of a kernel."""
+    """numba's compiler, for functions that are usually parts of a kernel."""
 
     def define_pipelines(self) -> list[PassManager]:
-        """numba's steps, with `_PartLowering` in place of its lowering."""
+        """numba's passes, with `_PartLowering` in place of its own lowering."""
         manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
         manager.passes = [
             (_PartLowering if step is NativeLowering else step, words)
@@ -70,9 +71,10 @@ class PartCompiler(Compiler):  # type: ignore[misc]
 
 
 def _entry_for_python(function: Any, lowered: Any) -> Any:
-    """What a part answers where Python calls it after all, as tests do: one compiled by itself.
+    """The entry point of a part that Python calls after all, as tests do.
 
-    numba wants a builtin function there, and one of its own for every part.
+    The first call compiles the function by itself. numba requires a builtin function here, and a
+    separate one for every part.
     """
     alone: list[Any] = []
 

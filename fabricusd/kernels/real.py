@@ -1,10 +1,10 @@
 """Elementary functions for kernels, in the working precision `R` (`numpy.float32` or `float64`).
 
-Each takes `R` first and an argument that already is of that type. For float64 they are `math`'s,
-or a series summed to rounding; for float32 they are polynomials without a call, so that LLVM can
-vectorise the loop around them (the wheels' numba comes without a vector libm). The polynomials are
-minimax fits made for this file; the bounds in the docstrings are for float32 over the stated range
-and are tested against float64. NaN goes in and comes out.
+Each function takes `R` first and an argument that is already of that type. The float64 versions
+call `math` or sum a series to rounding. The float32 versions are polynomials without a function
+call, so that LLVM can vectorise the loop around them (numba's wheels come without a vector libm).
+The polynomials are minimax fits made for this file. The error bounds in the docstrings are for
+float32 over the stated range, and are tested against float64. NaN is passed through.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from fabricusd.kernels.internals import use_internals
 
 
 def _compiler() -> Any:
-    """What compiles functions that only kernels call."""
+    """The compiler for functions that only kernels call."""
     if use_internals():
         with suppress(ImportError, AttributeError):
             from fabricusd.kernels.parts import PartCompiler
@@ -34,8 +34,8 @@ def _compiler() -> Any:
 
 PartCompiler = _compiler()
 
-# NaN and infinity must stay what they are, since callers count them; the rest may be reordered.
-# numpy's error model: a division by zero is an infinity, not an exception that stops vectorising.
+# Callers count NaN and infinity, so these must be preserved; other arithmetic may be reordered. In
+# numpy's error model a division by zero gives infinity; an exception would prevent vectorisation.
 KERNEL: dict[str, Any] = {
     "cache": True,
     "nogil": True,
@@ -43,22 +43,24 @@ KERNEL: dict[str, Any] = {
     "fastmath": {"contract", "reassoc", "arcp", "nsz"},
     "no_cfunc_wrapper": True,
 }
-# For kernels that allocate no array: numba then does not count references. In a function that hands
-# a compiled fabric on to another, counting its arrays cost five times the work itself.
+# For kernels that allocate no array: numba then counts no references. In a function that passes a
+# compiled fabric to another one, counting references to its arrays took five times as long as the
+# work itself.
 LEAN: dict[str, Any] = {**KERNEL, "_nrt": False}
-# For functions that only kernels call, and for those of them that are to be compiled in place.
+# PART is for functions that only kernels call, INLINE for those of them that are always inlined.
 PART: dict[str, Any] = {**LEAN, "cache": False, "pipeline_class": PartCompiler}
 INLINE: dict[str, Any] = {**PART, "forceinline": True}
 
 
 def as_part(kernel: Any) -> Any:
-    """`kernel` once more, for other kernels to call."""
+    """A second version of `kernel`, for other kernels to call."""
     return jit(**{**kernel.targetoptions, "cache": False, "pipeline_class": PartCompiler})(
         kernel.py_func
     )
 
 
-# Only fused multiply-add here: reordering would undo the two-part reductions below.
+# These functions allow fused multiply-add only: reordering would undo the two-part range reductions
+# below.
 _EXACT: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"contract"},
@@ -68,26 +70,26 @@ _EXACT: dict[str, Any] = {
 _inner = register_jitable(**_EXACT)
 
 BLOCK = 256
-"""Entries that the vectorised loops over directions carry together: what they note of each stays in
-the first-level cache."""
+"""Entries that the vectorised loops over directions process at a time: their intermediate results
+stay in the first-level cache."""
 
 
 @njit(**INLINE)
 def index(begin, k):
-    """`begin + k` for an array's index, both at least 0.
+    """`begin + k` as an array index; both must be at least 0.
 
-    Of a signed sum numba asks whether it counts from the array's end, at every step, and LLVM then
-    does not vectorise the loop.
+    For a signed index numba tests at every step whether it counts from the array's end, and LLVM
+    then does not vectorise the loop.
     """
     return np.uintp(begin) + np.uintp(k)
 
 
 @njit(**INLINE)
 def whole(n):
-    """`n`, an index or a count below 2^32 that is not negative, so that LLVM knows it is not.
+    """`n`, an index or a count in [0, 2^32), in a form that tells LLVM it is not negative.
 
-    At the head of a kernel for what its loops run to, and for indices read from memory: what numba
-    asks of a signed index is then settled while compiling.
+    Use it at the head of a kernel for loop bounds, and for indices read from memory: numba's test
+    for a negative index is then resolved at compile time.
     """
     return np.int64(np.uint32(n))
 
@@ -137,7 +139,7 @@ def erf(R, x):
 
 
 def erfinv(R, x):
-    """Inverse of erf, x clamped just inside (-1, 1). erf(erfinv(x)) = x within 5e-7."""
+    """Inverse of erf, x clamped just inside (-1, 1). erf(erfinv(x)) equals x within 5e-7."""
     return R(_erfinv64(R, float(x)))
 
 
@@ -148,7 +150,7 @@ def i0e(R, x):
 
 @_inner
 def _unless_nan(x, value):
-    """`value`, or NaN where `x` is: min and max inside a polynomial may have dropped it."""
+    """`value`, or NaN if `x` is NaN: min and max inside a polynomial may have dropped the NaN."""
     return value if x == x else x
 
 
@@ -161,7 +163,7 @@ def _exp32(R, x):
     p = np.float32(0.00836888243) + r * np.float32(0.00139504768)
     p = np.float32(0.166665189) + r * (np.float32(0.041666206) + r * p)
     p = np.float32(1) + r * (np.float32(1) + r * (np.float32(0.5) + r * p))
-    # The exponent field is built in floating point: k + 127 below 2^24 is exact.
+    # The exponent field is built in floating point, which is exact because k + 127 is below 2^24.
     scale = np.int32((k + np.float32(127)) * np.float32(8388608)).view(np.float32)
     return _unless_nan(x, np.float32(0) if x < np.float32(-87.3) else p * scale)
 
@@ -220,7 +222,7 @@ def _cos32(R, x):
 def _atan2_32(R, y, x):
     a, b = abs(x), abs(y)
     low, high = (a, b) if a < b else (b, a)
-    # The floor makes the origin's angle 0 without a branch.
+    # The lower bound on the denominator makes the angle of the origin 0 without a branch.
     t = low / max(high, np.float32(1e-37))
     z = t * t
     p = np.float32(-0.0162828691) + z * np.float32(0.00290351746)
@@ -267,7 +269,7 @@ def _erf32(R, x):
 @_inner
 def _erfinv32(R, x):
     c = min(max(x, np.float32(-0.99999994)), np.float32(0.99999994))
-    # [Giles2012]: in this variable the quotient erfinv(x)/x is smooth enough for two polynomials.
+    # [Giles2012]: in this variable, erfinv(x)/x is smooth enough for two polynomials.
     w = -_log32(R, (np.float32(1) - c) * (np.float32(1) + c))
     v = min(w, np.float32(5))
     p = np.float32(2.16469083e-07) + v * np.float32(-8.59043191e-09)
@@ -290,7 +292,7 @@ def _erfinv64(R, x):
     tail = -math.log(0.5 * math.sqrt(math.pi) * (1.0 - min(a, 1.0 - 1.2e-16)))
     far = math.sqrt(max(tail - 0.5 * math.log(max(tail, 1.0)), 0.0))
     y = float(_erfinv32(np.float32, np.float32(a))) if a < 0.99999 else far
-    # Halley's steps on erfc, which keeps its relative precision where erf is nearly 1.
+    # Halley iterations on erfc, which keeps its relative precision where erf is nearly 1.
     for _ in range(4):
         error = (1.0 - a) - math.erfc(y)
         step = error * 0.5 * math.sqrt(math.pi) * math.exp(y * y)
@@ -318,14 +320,14 @@ def _i0e32(R, x):
 @_inner
 def _i0e64(R, x):
     if x < 25.0:
-        # Sum of (x^2/4)^k/k!^2: every term is positive, so nothing cancels.
+        # The sum of (x^2/4)^k/k!^2; every term is positive, so nothing cancels.
         quarter = 0.25 * x * x
         term = total = 1.0
         for k in range(1, 80):
             term *= quarter / (k * k)
             total += term
         return total * math.exp(-x)
-    # The asymptotic series, cut where its terms are smallest: e^-2x at x = 25.
+    # The asymptotic series, truncated where its terms are smallest: e^-2x at x = 25.
     term = total = 1.0
     for k in range(1, 30):
         term *= (2.0 * k - 1.0) * (2.0 * k - 1.0) / (8.0 * k * x)
@@ -374,7 +376,7 @@ def _atan2_64(R, y, x):
 
 
 def _compile_by_precision(face: Any, single: Any, double: Any) -> None:
-    """Make `face(R, x)` compile to `single` where R is float32, else to `double`."""
+    """Make `face(R, x)` compile to `single` if R is float32, else to `double`."""
 
     def choose(R, x):
         return single if R.instance_type == types.float32 else double

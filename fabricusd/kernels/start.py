@@ -1,4 +1,4 @@
-"""What numba loads before its first kernel, without three things that only cost time."""
+"""Start numba faster: skip three pieces of work that it does before its first kernel."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from fabricusd.kernels.internals import use_internals
 
 if use_internals():
     with suppress(ImportError):
-        # Before the modules that overload indexing: numba asks in the order of import, and arrays,
-        # which nearly every index of a kernel is of, would otherwise come after seven kinds of
-        # strings and lists. That order is a fifth of all the time it takes to compile.
+        # Import this before the modules that overload indexing. numba tries the overloads in the
+        # order of import, and arrays, which nearly every indexing in a kernel refers to, would
+        # otherwise come after seven kinds of strings and lists. That order costs a fifth of the
+        # whole compile time.
         import numba.core.typing.arraydecl  # noqa: F401
     with suppress(ImportError, AttributeError):
         from fabricusd.kernels.damaged_cache import forgive_damage
@@ -22,10 +23,10 @@ if use_internals():
 
 
 def load_without_blas() -> None:
-    """Load numba's array functions without the linear algebra of scipy.
+    """Load numba's array functions without scipy's linear algebra.
 
-    To learn whether it is there, numba imports it: a tenth of the time that a picture takes. Code
-    that calls it, ours does not, looks again.
+    numba imports scipy's linear algebra to learn whether it is installed, which takes a tenth of
+    the time of a picture. No kernel here calls it; code that does makes numba check again.
     """
     if not use_internals():
         return
@@ -43,10 +44,11 @@ def load_without_blas() -> None:
 
 
 def load_as_they_are(kernels: Iterable[Any]) -> None:
-    """Let kernels that numba has on disk be loaded without what only compiling needs.
+    """Let cached kernels be loaded without the modules that only compilation needs.
 
-    numba first imports and registers all that it knows how to compile: a tenth of the time that a
-    picture takes. Where nothing is on disk the compiler does so by itself.
+    Before it loads a kernel, numba imports and registers everything that it can compile, which
+    takes a tenth of the time of a picture. If a kernel is not cached, the compiler imports and
+    registers these things itself.
     """
     if not use_internals():
         return
@@ -58,12 +60,12 @@ def load_as_they_are(kernels: Iterable[Any]) -> None:
     for kernel in kernels:
         cache = getattr(kernel, "_cache", None)
         if isinstance(cache, FunctionCache):
-            # For reference counts, which kernels that allocate arrays call by name.
+            # Kernels that allocate arrays call the reference-counting functions by name.
             rtsys.initialize(kernel.targetctx)
             cache.load_overload = partial(_load, cache)
 
 
 def _load(cache: Any, signature: Any, context: Any) -> Any:
-    """`FunctionCache.load_overload` after its first line, which refreshes `context`."""
+    """`FunctionCache.load_overload` without its first line, which refreshes `context`."""
     with cache._guard_against_spurious_io_errors():
         return cache._load_overload(signature, context)

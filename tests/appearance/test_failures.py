@@ -224,8 +224,8 @@ BAD = {
     "wi has shape (1, 2); it must be (n, 3)": {"wi": [(0, 1)]},
     "level is 'near'; it must be one of far, weave, thread": {"level": "near"},
     "shadow is 'soft'; it must be one of none, peak, horizon, traced": {"shadow": "soft"},
-    "uv is missing; level weave asks for weave coordinates, (n, 2)": {"level": "weave"},
-    "wo has 2 directions; it must have 3, or 1": {
+    "uv is missing; level weave requires weave coordinates, (n, 2)": {"level": "weave"},
+    "wo has 2 directions; it must have 3 or 1": {
         "wi": [(0, 0, 1)] * 3, "level": "weave", "uv": [(0, 0)] * 2, "wo": [(0, 0, 1)] * 2
     },
 }  # fmt: skip

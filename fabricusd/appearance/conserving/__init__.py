@@ -1,1 +1,1 @@
-"""The law of fabrics whose threads conserve energy."""
+"""The surface law of cloth whose threads conserve energy."""

@@ -1,4 +1,4 @@
-"""The conserving law at each level, as kernels call it."""
+"""Evaluate the conserving law at the levels `weave` and `thread`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fabricusd.kernels.real import PART, cos, sin
 def conserving_level_value(
     R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz
 ):  # type: ignore[no-untyped-def]
-    """`multiple.conserving_point_value`, with the factors across the width if `across_too`."""
+    """`multiple.conserving_point_value`, times the factors across the width if `across_too`."""
     row = tables.threads[thread]
     if not across_too or row[LAW] != R(CONSERVING):
         return conserving_point_value(R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz)

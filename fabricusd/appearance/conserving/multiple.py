@@ -1,20 +1,23 @@
-"""Light that `conserving` cloth scatters more than once: a table of what single scattering loses.
+"""Multiple scattering of `conserving` cloth, from a table of what single scattering loses.
 
-For a white cloth single scattering gives back the shares `rho_R` and `rho_T` of what comes from w;
-`m(w) = 1 - gap - rho_R - rho_T` went from thread to thread. After [KullaConty2017] it leaves as
+From light that arrives from w, single scattering of a white cloth reflects the share `rho_R` and
+transmits the share `rho_T`; the rest, `m(w) = 1 - gap - rho_R - rho_T`, is scattered from thread to
+thread. Following [KullaConty2017] it leaves as
 
     f_ms = C m(wi) m(wo) / (pi M) {1 - tau on the same side, tau on the other},
     M = (1/pi) integral over one side of m |N.w| dw, from the *interpolated* table,
 
-so that at albedo 1 everything comes back but for the table's error. Per channel
-`C = alpha^2 p / (1 - alpha (1 - p))`: after the first the light meets threads of mean albedo alpha
-and escapes with probability p each time. Opaque cloth has no transmission, `m` counts what would
-have passed, and all of it leaves on its own side. Source: MODEL section 7.
+so that at albedo 1 all energy comes back, up to the error of the table. Per channel
+`C = alpha^2 p / (1 - alpha (1 - p))`: after its first scattering, light meets threads of mean
+albedo alpha and escapes with probability p at each of them. Opaque cloth transmits nothing: `m`
+then includes the light that would have passed, and all of it leaves on its own side. Source: MODEL
+section 7.
 
-The table is over polar angle and azimuth: averaged over azimuth it is 12-15 % wrong on satin. Row
-t in [0, 1] lies at the polar angle 90 sin(90 t) degrees: narrow lobes make m steep within their
-width of the horizon, where these rows crowd, and there m is even in 1 - t, at the pole it goes on
-on the other side, so that cubic interpolation needs no one-sided border.
+The table is indexed by polar angle and azimuth, because an average over azimuth is 12-15 % wrong on
+satin. Row t in [0, 1] lies at the polar angle 90 sin(90 t) degrees. Narrow lobes make m steep
+within their width of the horizon, and the rows are dense there. At the horizon m is an even
+function of 1 - t, and at the pole it continues on the opposite side, so cubic interpolation needs
+no one-sided stencil.
 """
 
 from __future__ import annotations
@@ -53,12 +56,12 @@ Reals = NDArray[Any]
 
 WOVEN_TABLE = (25, 24, 8192)
 PILE_TABLE = (25, 72, 4096)
-"""Polar angles from N to the horizon, azimuths all round, and points of the low-discrepancy
-sequence that measure an entry. Pile has a ridge some degrees wide in azimuth, which 36 azimuths
-miss by 1 %; what it scatters once is a tenth of woven cloth's, so fewer points give the same
-absolute error."""
+"""Number of polar angles from N to the horizon, of azimuths over a full turn, and of points of the
+low-discrepancy sequence per entry. Pile has a ridge a few degrees wide in azimuth, at which 36
+azimuths are wrong by 1 %. Pile scatters a tenth as much light once as woven cloth does, so fewer
+points give the same absolute error."""
 HORIZON = 1e-3
-"""N.w of the last row, which stands for the limit at the horizon."""
+"""N.w at which the last row is measured; it stands for the limit at the horizon."""
 
 
 def conserving_tables(
@@ -68,10 +71,10 @@ def conserving_tables(
     multiple: bool = True,
     rule: Rule | None = None,
 ) -> ConservingTables:
-    """Tables of `fabric` in `precision`, with the multiple-scattering term if it is asked for.
+    """Tables of `fabric` in `precision`, with the multiple-scattering term if `multiple`.
 
-    A scene of published models, or of dark opaque cloth, does not need the term; its table takes
-    about a second.
+    Published models and dark opaque cloth do not need the term, whose table takes about a second to
+    compute.
     """
     tables = single_tables(fabric, precision=precision, rule=rule)
     if not multiple or not tables.scatters.any():
@@ -95,9 +98,9 @@ def conserving_tables(
 
 
 def mean_albedo(fabric: Fabric) -> NDArray[np.float64]:
-    """(3,) alpha: what a thread gives back of diffuse light, by area covered.
+    """(3,) alpha: the albedo of the threads under diffuse light, weighted by covered area.
 
-    A thread of a published model, whose A is no albedo, counts as black.
+    A thread of a published model counts as black, because its A is not an albedo.
     """
     area = coverage(fabric).type_area.sum(axis=0)
     total = np.zeros(3)
@@ -111,21 +114,26 @@ def mean_albedo(fabric: Fabric) -> NDArray[np.float64]:
 
 
 def _mean_surface_albedo(albedo: NDArray[np.float64]) -> float:
-    """(2/pi) integral of E cos^2 theta over +-90 degrees; albedo : E at even sqrt(cos theta)."""
+    """(2/pi) times the integral of E cos^2 theta over +-90 degrees.
+
+    albedo : E at evenly spaced sqrt(cos theta)
+    """
     cos_theta = np.linspace(0.0, 1.0, len(albedo)) ** 2
     theta = np.arccos(cos_theta)
-    # theta falls along the table.
+    # theta decreases along the table, hence the sign.
     return -4.0 / math.pi * float(np.trapezoid(albedo * cos_theta**2, theta))
 
 
 def scattered_shares(
     tables: ConservingTables, fabric: Fabric, draws: int = 0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(rho_R, rho_T), each (rows, columns): what single scattering of a white cloth gives back.
+    """(rho_R, rho_T), each (rows, columns): reflectance and transmittance of a white cloth by
+    single scattering.
 
-    Opaque cloth is measured as if it let light through, so that both are the facets' own.
+    Opaque cloth is measured as if it transmitted light, so that both shares are those of the
+    facets.
 
-    draws : points that measure an entry; 0 for the default
+    draws : points per entry; 0 takes the default
     """
     pile = any(is_pile(t.curve) for t in fabric.thread_list)
     *shape, default = PILE_TABLE if pile else WOVEN_TABLE
@@ -147,7 +155,7 @@ def scattered_shares(
 
 @njit(**INLINE)
 def _polar_angle(t):
-    """Of the row t in [0, 1] [rad]."""
+    """Polar angle [rad] of the row t in [0, 1]."""
     return 0.5 * math.pi * math.sin(0.5 * math.pi * t)
 
 
@@ -167,7 +175,10 @@ def _measure(R, tables, draws, out):
 
 @njit(**PART)
 def _shares(R, tables, draws, x, y, z):
-    """(rho_R, rho_T) from above, z > 0: facets drawn by what they see, then a thread's sampler."""
+    """(rho_R, rho_T) of light from (x, y, z), z > 0.
+
+    Facets are drawn by the area that (x, y, z) sees of them, directions by the thread's sampler.
+    """
     reflected, transmitted = 0.0, 0.0
     total = 0.0
     for k in range(tables.nodes.shape[0]):
@@ -175,7 +186,7 @@ def _shares(R, tables, draws, x, y, z):
     k, below, here = -1, 0.0, 0.0
     for n in range(draws):
         target = total * (n + 0.5) / draws
-        # The draws come in the facets' order, so the search only goes forward.
+        # The targets increase with n, so the search for the facet only moves forward.
         while k < tables.nodes.shape[0] - 1 and (k < 0 or below + here <= target):
             below += here
             k += 1
@@ -184,8 +195,8 @@ def _shares(R, tables, draws, x, y, z):
         c, s = tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN]
         row = tables.threads[tables.node_thread[k]]
         a, b, d = to_thread(R, warp, c, s, x, y, z)
-        # What is left of the target inside its facet chooses the lobe, so each lobe of each facet
-        # takes a stretch of the R2 sequence [Roberts2018], 1/x and 1/x^2 for x^3 = x + 1.
+        # The remainder of the target inside its facet chooses the lobe, so each lobe of each facet
+        # gets a contiguous range of the R2 sequence [Roberts2018]: 1/x and 1/x^2 with x^3 = x + 1.
         u0 = R(min(max((target - below) / here, 0.0), 1.0))
         u1 = R((n * 0.7548776662466927 + 0.5) % 1.0)
         u2 = R((n * 0.5698402909980532 + 0.5) % 1.0)
@@ -205,20 +216,20 @@ def _shares(R, tables, draws, x, y, z):
 
 @njit(**INLINE)
 def _seen(R, tables, k, x, y, z):
-    """a q mu(w) of node k, w above the cloth; 0 where its thread does not scatter."""
+    """a q mu(w) of node k for w above the cloth; 0 if the node's thread does not scatter."""
     along = y if k >= tables.warp_start else x
     mu = facing(R, R(1), tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN], along, z)
     return float(tables.nodes[k, NODE_WEIGHT] * mu) * tables.scatters[k]
 
 
 def mean_share(table: NDArray[np.float64]) -> float:
-    """(1/pi) integral of a table over one side, cosine-weighted, by the trapezium rule."""
+    """(1/pi) times the cosine-weighted integral of a table over one side, by the trapezium rule."""
     theta = 0.5 * math.pi * np.sin(0.5 * math.pi * np.linspace(0.0, 1.0, table.shape[0]))
     return float(np.trapezoid(table.mean(axis=1), np.sin(theta) ** 2))
 
 
 def mean_lost(tables: ConservingTables) -> float:
-    """M, by Gauss-Legendre points in every cell of the interpolated table; 0 without a table."""
+    """M, from Gauss-Legendre points in every cell of the interpolated table; 0 without a table."""
     if tables.lost.size == 0:
         return 0.0
     x, w = np.polynomial.legendre.leggauss(4)
@@ -247,7 +258,7 @@ def _integrate_table(R, lost, x, w):
 
 @njit(**INLINE)
 def _cubic(R, a, b, c, d, t):
-    """Catmull-Rom between b and c."""
+    """Catmull-Rom interpolation between b and c."""
     return b + R(0.5) * t * (
         c - a + t * (R(2) * a - R(5) * b + R(4) * c - d + t * (R(3) * (b - c) + d - a))
     )
@@ -255,7 +266,8 @@ def _cubic(R, a, b, c, d, t):
 
 @njit(**PART)
 def _across_columns(R, lost, row, column, t):
-    """The table along azimuth in a row that may lie beyond the pole or the horizon."""
+    """The table interpolated along azimuth, in a row that may lie beyond the pole or the
+    horizon."""
     rows, columns = lost.shape
     half = columns // 2
     if row < 0:
@@ -274,7 +286,7 @@ def _across_columns(R, lost, row, column, t):
 
 @njit(**PART)
 def lost_share(R, lost, x, y, z):
-    """m(w) >= 0, by cubic interpolation between rows and azimuths; m(-w) = m(w)."""
+    """m(w) >= 0, interpolated cubically between rows and azimuths; m(-w) = m(w)."""
     if z < R(0):
         x, y, z = -x, -y, -z
     rows, columns = lost.shape
@@ -300,7 +312,7 @@ def lost_share(R, lost, x, y, z):
 
 @njit(**PART)
 def multiple_share(R, tables, ix, iy, iz, ox, oy, oz):
-    """f_ms |N.wi| per unit `tables.strength`: what all channels share of the term."""
+    """f_ms |N.wi| per unit `tables.strength`: the factor that all channels share."""
     if tables.lost.shape[0] == 0 or iz == R(0) or oz == R(0):
         return R(0)
     m = lost_share(R, tables.lost, ix, iy, iz) * lost_share(R, tables.lost, ox, oy, oz)
@@ -310,7 +322,7 @@ def multiple_share(R, tables, ix, iy, iz, ox, oy, oz):
 
 @njit(**PART)
 def conserving_value(R, tables, ix, iy, iz, ox, oy, oz):
-    """(r, g, b) of the whole repeat, radiance per unit `L_i dwi`, both sides of the cloth."""
+    """(r, g, b) of the whole repeat: radiance per unit `L_i dwi`, on both sides of the cloth."""
     red, green, blue = conserving_single(R, tables, ix, iy, iz, ox, oy, oz)
     share = multiple_share(R, tables, ix, iy, iz, ox, oy, oz)
     return (
@@ -322,9 +334,9 @@ def conserving_value(R, tables, ix, iy, iz, ox, oy, oz):
 
 @njit(**PART)
 def conserving_point_value(R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):
-    """(r, g, b) of the bit of thread under a point; its mean over the repeat is the above.
+    """(r, g, b) of the thread under a point; the mean over the repeat is `conserving_value`.
 
-    The multiple-scattering term is the covered area's, none in a gap.
+    The multiple-scattering term belongs to the covered area: there is none in a gap.
     """
     red, green, blue = conserving_point_single(
         R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz

@@ -1,4 +1,4 @@
-"""What conserving cloth hands to the sampler: its values, for the shares of the lobes."""
+"""Build the sampler of conserving cloth: pass the law's values to the fit of the lobe shares."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import KERNEL
 
 EVEN_SHARE = 0.1
-"""Share of even directions: less than published cloth's, since without `1/Q` there are no narrow
-bright places that the lobes miss."""
+"""Share of uniform directions. It is smaller than for published cloth because, without `1/Q`, there
+are no narrow bright regions that the lobes miss."""
 
 LEAST_SHARE = 0.02
 """See `share_fit.best_shares`."""
 
 
 def conserving_mixture(fabric: Fabric, tables: ConservingTables) -> Mixture:
-    """Lobes on both sides, or on one of opaque cloth, their shares measured on `tables`."""
+    """Lobes on both sides, or on one side of opaque cloth, with shares measured on `tables`."""
     single: Any = np.float32
     kept = _in_single_precision(tables)
 
@@ -42,7 +42,7 @@ def conserving_mixture(fabric: Fabric, tables: ConservingTables) -> Mixture:
 
 
 def _in_single_precision(tables: ConservingTables) -> ConservingTables:
-    """Shares need no more, and one kernel serves both precisions."""
+    """The tables in float32, which suffices for the shares: one kernel serves both precisions."""
     return tables._replace(
         threads=tables.threads.astype(np.float32),
         nodes=tables.nodes.astype(np.float32),
@@ -55,7 +55,7 @@ def _in_single_precision(tables: ConservingTables) -> ConservingTables:
 
 @njit(**KERNEL)
 def _far_values(R, tables, wi, wo, out):
-    """`conserving_value`: wi, wo, out (3, n)."""
+    """`conserving_value` of all pairs: wi, wo, out are (3, n)."""
     for k in range(wi.shape[1]):
         out[0, k], out[1, k], out[2, k] = conserving_value(
             R, tables, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
@@ -64,7 +64,7 @@ def _far_values(R, tables, wi, wo, out):
 
 @njit(**KERNEL)
 def _point_values(R, tables, stretch, wi, wo, out):
-    """`conserving_point_value` on a stretch: wi, wo, out (3, n)."""
+    """`conserving_point_value` of all pairs on a stretch: wi, wo, out are (3, n)."""
     for k in range(wi.shape[1]):
         out[0, k], out[1, k], out[2, k] = conserving_point_value(
             R, tables, int(stretch[OF_SET]), int(stretch[OF_THREAD]), stretch[PSI0],

@@ -1,17 +1,18 @@
-"""Cloth whose threads are `conserving`: bits of thread as the facets of a surface, both sides.
+"""Single scattering of `conserving` cloth, whose segments of thread are the facets of a surface.
 
-One law over the whole sphere, reflection and transmission alike,
+One law covers the whole sphere, reflection and transmission alike:
 
     f = G1(wi) G1(wo) / (|N.wi| |N.wo|) sum a <f_s mu(wi) mu(wo) q>,
     mu(w) = max(0, sign(N.w) n_t.w),  q = 1/max(n_t.N, cos 85),
     S(w) = sum a <mu q>,  G1 = min(1, (1 - gap) |N.w| / S),
 
-which is reciprocal to rounding, and passive: a facet scatters at most mu(wo) <= cos theta_o of its
-thread's energy into wo, and the facets that see wi add up to S. What light does between threads is
-`multiple`'s, added here where the tables hold it. Values carry the cosine |N.wi|; there is no value
-at the horizon itself. Straight through the gaps is the caller's. Source: MODEL sections 4 and 7.
+The law is reciprocal to rounding, and passive: a facet scatters at most mu(wo) <= cos theta_o of
+its thread's energy into wo, and the facets that see wi add up to S. Scattering between threads is
+the subject of `multiple`; `ConservingTables` has room for its table. Values carry the cosine
+|N.wi|; at the horizon itself there is no value. Callers account for the light that passes straight
+through the gaps. Source: MODEL sections 4 and 7.
 
-In a cloth that mixes models every thread shadows, and only the `conserving` ones scatter here.
+In a cloth that mixes models, all threads cast shadows, but only the `conserving` ones scatter here.
 """
 
 from __future__ import annotations
@@ -38,33 +39,34 @@ from fabricusd.kernels.real import INLINE, PART, cos, sin
 Reals = NDArray[Any]
 
 MOST_NODES = 192
-"""A fabric whose lobes are so narrow that it would take more nodes gets coarser ones: the energy
-stays exact, since the law is passive for any set of nodes."""
+"""Upper bound on the number of nodes. A fabric whose lobes are so narrow that it needs more gets a
+coarser spacing; energy is still conserved, since the law is passive for any set of nodes."""
 
 PILE_SPACING = 0.25
-"""Distance of nodes on pile in surface lobe widths: q grows elevenfold along it. Measured, the mean
-error is 0.1 % so, 1.5 % with one width; woven cloth has 0.2 % and less with one."""
+"""Spacing of nodes on pile, in widths of the surface lobe; q grows elevenfold along the pile. The
+measured mean error is 0.1 % with this spacing and 1.5 % with one width; on woven cloth it is 0.2 %
+or less with one width."""
 
 NODE_COS, NODE_SIN, NODE_WEIGHT = 0, 1, 2
-"""Columns of `ConservingTables.nodes`: cosine and sine of the clamped tangent angle; a q."""
+"""Columns of `ConservingTables.nodes`: cosine and sine of the clamped tangent angle, and a q."""
 
 _STEEPEST_COS = math.cos(PILE_ANGLE)
 
 
 class ConservingTables(NamedTuple):
-    """What the kernels read; `real` is the precision asked for.
+    """The tables that the kernels read; `real` is the precision asked for.
 
     threads : (k, COLUMNS) real - see `scattering.columns`
-    nodes : (n, 3) real - NODE_ columns, by set (weft first), thread and tangent angle
+    nodes : (n, 3) real - NODE_ columns, sorted by set (weft first), thread and tangent angle
     node_thread : (n,) int32
     scatters : (n,) uint8 - 1 where the node's thread is `conserving`
     warp_start : int - nodes from here on are warp
     covered : real - 1 - gap
-    opaque : int - 1 where no light passes
-    lost : (r, c) real - what single scattering loses of a white cloth's energy, by direction; see
-        `multiple`. (0, 0) where the multiple-scattering term is off
+    opaque : int - 1 if no light passes through the cloth
+    lost : (r, c) real - share of the energy that single scattering of a white cloth loses, by
+        direction; see `multiple`. (0, 0) without the multiple-scattering term
     strength : (3,) real - C/(pi M) per channel
-    forward : real - share of that term that leaves on the other side
+    forward : real - share of the multiple-scattering term that leaves on the other side
     """
 
     threads: Reals
@@ -85,9 +87,9 @@ def single_tables(
     precision: type[np.floating[Any]] = np.float64,
     rule: Rule | None = None,
 ) -> ConservingTables:
-    """Tables of `fabric` without multiple scattering; `multiple.conserving_tables` adds it.
+    """Tables of `fabric` without multiple scattering, which `multiple.conserving_tables` adds.
 
-    rule : quadrature over the curves; None takes points one surface lobe's width apart
+    rule : quadrature over the curves; None takes points one width of the surface lobe apart
     """
     if precision not in (np.float32, np.float64):
         raise FabricError("precision", f"is {precision!r}; it must be float32 or float64")
@@ -113,20 +115,20 @@ def single_tables(
 
 
 def _default_rule(fabric: Fabric) -> Rule:
-    """Points one surface lobe's width apart, or as much farther as MOST_NODES demands."""
+    """Points one width of the surface lobe apart, or farther apart to keep to MOST_NODES."""
     pile = any(is_pile(t.curve) for t in fabric.thread_list)
     return fewer_points(fabric, PILE_SPACING if pile else 1.0, MOST_NODES)
 
 
 @njit(**INLINE)
 def facing(R, side, c, s, along, z):
-    """mu(w) at a tangent angle given by its cosine and sine; `side` is the sign of N.w."""
+    """mu(w) at the tangent angle with cosine c and sine s; `side` is the sign of N.w."""
     return max(R(0), side * (s * along + c * z))
 
 
 @njit(**INLINE)
 def projected(R, tables, x, y, z):
-    """S(w): facets that see w, per area of cloth, times their cosines."""
+    """S(w): the area of the facets that see w, per area of cloth, times their cosines."""
     side = R(1) if z > R(0) else R(-1)
     total = R(0)
     for k in range(tables.nodes.shape[0]):
@@ -138,17 +140,17 @@ def projected(R, tables, x, y, z):
 
 @njit(**PART)
 def visible(R, tables, x, y, z):
-    """G1(w)/|N.w|: what of each facet that faces w is seen; 0 at the horizon or without facets."""
+    """G1(w)/|N.w|, the visible share of facets that face w; 0 at the horizon or without facets."""
     up = abs(z)
     if up == R(0) or tables.covered == R(0):
         return R(0)
-    # min(1, (1 - gap) up/S)/up without a division by a vanishing S.
+    # This is min(1, (1 - gap) up/S)/up without a division by a vanishing S.
     return R(1) / max(up, projected(R, tables, x, y, z) / tables.covered)
 
 
 @njit(**PART)
 def facet_terms(R, tables, thread_set, thread, c, s, ix, iy, iz, ox, oy, oz):
-    """`f_s mu(wi) mu(wo)` as (surface, volume without A), tangent angle by cosine and sine."""
+    """`f_s mu(wi) mu(wo)` as (surface, volume without A); c, s : cos and sin of tangent angle."""
     ta, tb, tn = to_thread(R, thread_set, c, s, ix, iy, iz)
     va, vb, vn = to_thread(R, thread_set, c, s, ox, oy, oz)
     seen = max(R(0), tn if iz > R(0) else -tn) * max(R(0), vn if oz > R(0) else -vn)
@@ -160,7 +162,7 @@ def facet_terms(R, tables, thread_set, thread, c, s, ix, iy, iz, ox, oy, oz):
 
 @njit(**PART)
 def conserving_single(R, tables, ix, iy, iz, ox, oy, oz):
-    """(r, g, b) of single scattering: radiance per unit `L_i dwi` from the whole repeat."""
+    """(r, g, b) of single scattering: radiance per unit `L_i dwi` of the whole repeat."""
     red, green, blue = R(0), R(0), R(0)
     scale = visible(R, tables, ix, iy, iz) * visible(R, tables, ox, oy, oz) * abs(iz)
     if tables.opaque != 0 and (iz > R(0)) != (oz > R(0)):
@@ -185,9 +187,11 @@ def conserving_single(R, tables, ix, iy, iz, ox, oy, oz):
 
 @njit(**PART)
 def conserving_point_single(R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):
-    """`conserving_single` of the bit of thread under a point; its mean over the repeat is that.
+    """`conserving_single` of the thread under a point; the mean over the repeat is that value.
 
-    psi0 : tangent angle there [rad]. 0 on a thread of another model.
+    psi0 : tangent angle at the point [rad]
+
+    The value is 0 on a thread of another model.
     """
     row = tables.threads[thread]
     scale = visible(R, tables, ix, iy, iz) * visible(R, tables, ox, oy, oz) * abs(iz)

@@ -1,1 +1,1 @@
-"""The published law: masked, reweighted threads at the levels far, weave and thread."""
+"""The published surface law: masked, reweighted threads at the levels far, weave and thread."""

@@ -1,7 +1,7 @@
-"""A block of direction pairs on its way through the vectorised loops.
+"""The intermediate results of a block of direction pairs, which the vectorised loops share.
 
-All rows lie one behind the other in one array: pointers of their own would have to be checked for
-overlap before a loop is vectorised, and there would be too many.
+All rows are stored one after the other in a single array. With separate arrays LLVM would have to
+check every pair of pointers for overlap before it vectorises a loop, and there would be too many.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ AXIS_I, ACROSS_I, UP_I, SCALE_I = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
 AXIS_O, ACROSS_O, UP_O, SCALE_O = 4 * BLOCK, 5 * BLOCK, 6 * BLOCK, 7 * BLOCK
 OVERLAP = 8 * BLOCK
 NORMALIZATION, RED, GREEN, BLUE = 9 * BLOCK, 10 * BLOCK, 11 * BLOCK, 12 * BLOCK
-"""Where each row starts: what `segment.along_set` gives (UP is N.w), then the sums."""
+"""Offsets of the rows: the results of `segment.along_set` (UP is N.w), then the sums."""
 
 ROWS = 13
 
 NOTHING = 1e-12
-"""`Q` at or below which the value is 0, a stated loss: a tenth of random pairs on velvet."""
+"""The value is 0 where `Q` is at or below this. On velvet this loses a tenth of random pairs."""
 
 
 @njit(**INLINE)
 def node_range(tables, thread_set):
-    """(first, last + 1) of the set's nodes."""
+    """(first, last + 1) of the nodes of a set."""
     if thread_set == WARP:
         return tables.warp_start, tables.nodes.shape[0]
     return 0, tables.warp_start
@@ -35,7 +35,7 @@ def node_range(tables, thread_set):
 
 @njit(**INLINE)
 def prepare(R, thread_set, precision, wi, wo, start, size, block, at=0):
-    """What the set's threads share, for a block: its rows lie from `at` on."""
+    """Compute `along_set` for a block of pairs, into the rows that start at offset `at`."""
     for y in range(size):
         x, k = at + y, index(start, y)
         iz, oz = wi[2, k], wo[2, k]
@@ -52,7 +52,7 @@ def prepare(R, thread_set, precision, wi, wo, start, size, block, at=0):
 
 @njit(**INLINE)
 def masking_at(R, c, s, block, x):
-    """`P` at place x of a block."""
+    """`P` of entry x of a block."""
     return seen_along(
         R, c, s, block[AXIS_I + x], block[UP_I + x], block[SCALE_I + x],
         block[AXIS_O + x], block[UP_O + x], block[SCALE_O + x], block[OVERLAP + x],
@@ -61,7 +61,7 @@ def masking_at(R, c, s, block, x):
 
 @njit(**INLINE)
 def add_masking(R, tables, k, size, block, at=0):
-    """Node k's share of `Q`, for a block whose set's rows lie from `at` on."""
+    """Add node k's share of `Q` to a block; the rows of the node's set start at offset `at`."""
     c, s, weight = (
         tables.nodes[k, NODE_COS],
         tables.nodes[k, NODE_SIN],
@@ -73,12 +73,15 @@ def add_masking(R, tables, k, size, block, at=0):
 
 @njit(**INLINE)
 def divide(R, out, start, size, block):
-    """A block's sums over `Q` into out (3, n), 0 where either direction is not above the cloth."""
+    """Write the sums of a block, divided by `Q`, to out (3, n).
+
+    The value is 0 where either direction is not above the cloth.
+    """
     for x in range(size):
         q = block[NORMALIZATION + x]
         dark = min(block[UP_I + x], block[UP_O + x]) <= R(0) or q <= R(NOTHING)
         inverse = R(0) if dark else R(1) / q
-        # Where it is dark the sums may be what is not a number.
+        # The sums of dark entries may be NaN, so they are not multiplied by 0.
         block[RED + x] = R(0) if dark else block[RED + x] * inverse
         block[GREEN + x] = R(0) if dark else block[GREEN + x] * inverse
         block[BLUE + x] = R(0) if dark else block[BLUE + x] * inverse

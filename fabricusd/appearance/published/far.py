@@ -1,9 +1,9 @@
-"""Level `far`: the whole repeat at once, what a distant view sees.
+"""Evaluate the published law at level `far`: the mean over the repeat, as a distant view sees it.
 
-`L_o = 1/Q sum_j a_j < f_s M P cos theta_i >`, `Q = sum_j a_j <P>_j + gap (N.wo)`, the means taken
-over the tangent curves by the nodes of `surface_tables`. `P` costs a dozen operations a node, so
-`Q` is summed directly: a table of it would cost as much to read and be less exact. Both directions
-above the cloth, else 0. Source: `docs/model.md` section 4, [Sadeghi2013].
+`L_o = 1/Q sum_j a_j < f_s M P cos theta_i >`, `Q = sum_j a_j <P>_j + gap (N.wo)`, with means over
+the tangent curves taken at the nodes of `surface_tables`. `P` costs a dozen operations per node, so
+`Q` is summed directly: reading it from a table would take as long and be less exact. The value is 0
+unless both directions are above the cloth. Source: `docs/model.md` section 4, [Sadeghi2013].
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, index
 
 @njit(**INLINE)
 def normalization(R, tables, ix, iy, iz, ox, oy, oz):
-    """`Q(wi, wo)`, both directions above the cloth."""
+    """`Q(wi, wo)` of two directions above the cloth."""
     q = tables.gap * oz
     for thread_set in (WEFT, WARP):
         first, last = node_range(tables, thread_set)
@@ -78,7 +78,7 @@ def node_terms(R, tables, k, a_i, b_i, iz, a_o, b_o, oz):
 
 @njit(**PART)
 def far_value(R, tables, ix, iy, iz, ox, oy, oz):
-    """(r, g, b) of level `far` for one pair of directions, published models."""
+    """(r, g, b) of the published models at level `far` for one pair of directions."""
     none = R(0)
     if iz <= none or oz <= none:
         return none, none, none
@@ -96,7 +96,7 @@ def far_value(R, tables, ix, iy, iz, ox, oy, oz):
             )  # fmt: skip
             p *= tables.nodes[k, NODE_WEIGHT]
             q += p
-            # A node turned away from either direction adds nothing; NaN goes on.
+            # A node that faces away from either direction adds nothing; NaN is passed on.
             if p == none or tables.published[k] == 0:
                 continue
             surface, volume = node_terms(R, tables, k, a_i, b_i, iz, a_o, b_o, oz)
@@ -112,11 +112,10 @@ def far_value(R, tables, ix, iy, iz, ox, oy, oz):
 
 @njit(**KERNEL)
 def far_values(R, tables, wi, wo, out, begin, end):
-    """`far_value` of the pairs from `begin` to before `end`: wi, wo, out (3, n) real.
+    """`far_value` of the pairs from `begin` to `end` - 1: wi, wo, out are (3, n) real.
 
-    The same functions as in the scalar kernel, with the loop over directions innermost so that LLVM
-    vectorises it. All partial sums lie in one array: pointers of its own would have to be checked
-    for overlap, and there would be too many.
+    This calls the same functions as the scalar kernel, with the loop over directions innermost so
+    that LLVM vectorises it. All partial sums are in a single array, see `blocks`.
     """
     block = np.empty(ROWS * BLOCK, wi.dtype)
     for start in range(begin, end, BLOCK):
@@ -183,7 +182,7 @@ _cell_of = specialised(_add_cell, CELL_MODELS)
 
 @njit(**PART)
 def _add_node(R, tables, k, size, block):
-    """Node k's share of `Q` and of the value, for a block, by the loop that its kind needs."""
+    """Add node k's share of `Q` and of the value to a block, by the loop for its kind of node."""
     row = tables.threads[tables.node_thread[k]]
     model = int(row[MODEL])
     if tables.published[k] == 0:

@@ -1,10 +1,10 @@
-"""Levels `weave` and `thread`: the thread under a point, and the place across it.
+"""Evaluate the published law at levels `weave` and `thread`: at a point of one thread.
 
-`L_o(x) = f_s M P(x)/Q cos theta_i` with `far`'s own `Q`, so the mean over the repeat is `far`; at
-level `thread` the two terms are modulated across the width by factors whose mean is 1, so the mean
-over the width is `weave`. Both directions above the cloth, else 0; a gap reflects nothing.
-Shadowing multiplies the value and is applied by the caller. Source: `docs/model.md` section 4,
-[Bisker2011] eq. 5.1.
+`L_o(x) = f_s M P(x)/Q cos theta_i` with the same `Q` as level `far`, so the mean over the repeat is
+the value at level `far`. At level `thread` the two terms are modulated across the width by factors
+with a mean of 1, so the mean over the width is the value at level `weave`. The value is 0 unless
+both directions are above the cloth; a gap reflects nothing. Shadowing multiplies the value and is
+applied by the caller. Source: `docs/model.md` section 4, [Bisker2011] eq. 5.1.
 """
 
 from __future__ import annotations
@@ -50,19 +50,19 @@ from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, cos, index, sin
 from fabricusd.kernels.unrolled import tuple_reader
 
 _WARP = 13 * BLOCK
-"""Where the warp's nine rows start; the weft's are the block's own."""
+"""Offset of the nine rows of the warp; the weft uses the first nine rows of the block."""
 _IS_WARP, _COS, _SIN, _ACROSS = 22 * BLOCK, 23 * BLOCK, 24 * BLOCK, 25 * BLOCK
 _THREAD = 26 * BLOCK
-"""Where the columns of each point's own thread start."""
+"""Offset of the columns of each point's own thread."""
 POINT_ROWS = 26 + POINT_COLUMNS
 _NO_MODEL = -1.0
 
 
 @njit(**PART)
 def point_value(R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz):
-    """(r, g, b) on `thread` of `thread_set` at tangent angle psi0 [rad], published models.
+    """(r, g, b) of the published models on `thread` of `thread_set` at tangent angle psi0 [rad].
 
-    across_too : level `thread` at `w` in [-1, 1] across the visible width; else level `weave`
+    across_too : evaluate level `thread` at `w` in [-1, 1] across the visible width, not `weave`
     """
     none = R(0)
     row = tables.threads[thread]
@@ -92,7 +92,7 @@ def point_value(R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, 
 
 @njit(**INLINE)
 def _bit_of_thread(R, model, across_too, row, precision, c, s, w, a_i, b_i, iz, a_o, b_o, oz):
-    """`segment`, with the factors across the width where they are asked for."""
+    """`segment`, times the factors across the width if `across_too`."""
     surface, volume = segment(R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz)
     if across_too:
         n_i, n_o = s * a_i + c * iz, s * a_o + c * oz
@@ -103,7 +103,7 @@ def _bit_of_thread(R, model, across_too, row, precision, c, s, w, a_i, b_i, iz, 
 
 @njit(**KERNEL)
 def point_values(R, tables, across_too, sets, threads, psi0, w, wi, wo, out, begin, end):
-    """`point_value` at the places from `begin` to before `end`.
+    """`point_value` at the places from `begin` to `end` - 1.
 
     sets, threads : (n,) ints; psi0, w : (n,) real; wi, wo, out : (3, n) real
     """
@@ -119,13 +119,13 @@ def point_values(R, tables, across_too, sets, threads, psi0, w, wi, wo, out, beg
 def point_block(
     R, tables, across_too, sets, threads, psi0, w, first, wi, wo, out, start, size, block
 ):
-    """`size` of `point_values`: places from `first` on, directions and answers from `start` on.
+    """`size` entries of `point_values`.
 
-    block : (POINT_ROWS*BLOCK,) real, written over
+    first : index of the first place; start : index of the first pair of directions and result
+    block : (POINT_ROWS*BLOCK,) real, overwritten
 
-    The numbers of each point's thread are copied into rows of the block first, in a loop of their
-    own, so that LLVM vectorises the one that computes. A set that is neither weft nor warp is a
-    gap.
+    A separate loop first copies the numbers of each point's thread into rows of the block, so that
+    LLVM vectorises the loop that computes. A set that is neither weft nor warp is a gap.
     """
     for x in range(size):
         block[NORMALIZATION + x] = tables.gap * wo[2, index(start, x)]
@@ -151,7 +151,7 @@ def _has_model(R, tables, model):
 
 @njit(**INLINE)
 def _copy_threads(R, tables, sets, threads, psi0, w, first, size, block):
-    """Set, tangent angle, place across and the thread's numbers of a block of points."""
+    """Copy set, tangent angle, place across and the thread's numbers for a block of points."""
     for x in range(size):
         k = index(first, x)
         which, thread = sets[k], np.uintp(threads[k])
@@ -167,19 +167,19 @@ def _copy_threads(R, tables, sets, threads, psi0, w, first, size, block):
 
 
 _row_at = tuple_reader(POINT_COLUMNS, BLOCK)
-"""(block, _THREAD + x): the columns of the point's thread, to be read as a row of the table."""
+"""Called with (block, _THREAD + x): the columns of the point's thread, like a row of the table."""
 
 
 @njit(**INLINE)
 def _own(block, x, warp):
-    """The entry at x of the point's own set. Both are loaded: a selection, not a branch."""
+    """The entry at x for the point's own set. Both are loaded, to select instead of branching."""
     weft_value, warp_value = block[x], block[x + _WARP]
     return warp_value if warp else weft_value
 
 
 @njit(**INLINE)
 def _of_model(R, model, tables, across_too, size, block):
-    """The value without `1/Q` of the points whose thread has the model, into the sums' rows."""
+    """Add the value without `1/Q` to the sums, for the points whose thread has this model."""
     if not _has_model(R, tables, model):
         return
     precision = tables.overlap_precision

@@ -1,7 +1,7 @@
-"""A bit of thread in the cloth: what it scatters, masked and shadowed, before the division by `Q`.
+"""Evaluate a segment of thread in the cloth, masked and shadowed, before the division by `Q`.
 
-Scalar kernels, precision `R` first, written once for the vectorised loops and for the path tracer.
-Both directions are above the cloth. Source: `docs/model.md` section 4, [Sadeghi2013].
+These scalar kernels, with the precision `R` first, serve both the vectorised loops and the path
+tracer. Both directions are above the cloth. Source: `docs/model.md` section 4, [Sadeghi2013].
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ def masked(R, x, y, u):
 
 @njit(**INLINE)
 def overlap(R, cos_half, precision):
-    """`u` = exp(-d^2/(2 width^2)) of the azimuths' difference d, from cos(d/2); its height is 1.
+    """`u` = exp(-d^2/(2 width^2)), in [0, 1], for azimuths that differ by d; from cos(d/2).
 
-    precision : 2/width^2
+    precision : 2/width^2 [1/rad^2]
     """
     half = acos(R, cos_half)
     return exp(R, -precision * half * half)
@@ -42,10 +42,11 @@ def overlap(R, cos_half, precision):
 
 @njit(**INLINE)
 def along_set(R, thread_set, precision, ix, iy, iz, ox, oy, oz):
-    """What all threads of a set share: (a_i, b_i, scale_i, a_o, b_o, scale_o, u of psi).
+    """The quantities that all threads of a set share: (a_i, b_i, scale_i, a_o, b_o, scale_o, u).
 
-    a, b : components along the set's axis and across it; scale : 1/|w without b|, so that
-    n_t.w scale = cos psi whatever the tangent angle is, which only turns psi.
+    a, b : components along the axis of the set and across it
+    scale : 1/|w without b|, so that cos psi = n_t.w scale at any tangent angle
+    u : `overlap` of the longitudes psi, which a tangent angle shifts by the same amount
     """
     warp = thread_set == WARP
     a_i, b_i = (iy, -ix) if warp else (ix, iy)
@@ -58,7 +59,7 @@ def along_set(R, thread_set, precision, ix, iy, iz, ox, oy, oz):
 
 @njit(**INLINE)
 def seen_along(R, c, s, a_i, iz, scale_i, a_o, oz, scale_o, u):
-    """`P` of a tangent angle given by its cosine and sine."""
+    """`P` at the tangent angle with cosine c and sine s."""
     x = max(s * a_i + c * iz, R(0)) * scale_i
     y = max(s * a_o + c * oz, R(0)) * scale_o
     return masked(R, x, y, u)
@@ -66,9 +67,11 @@ def seen_along(R, c, s, a_i, iz, scale_i, a_o, oz, scale_o, u):
 
 @njit(**INLINE)
 def segment(R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
-    """`f_s M cos theta_i` as (surface, volume without `A`); model : the row's, a published one.
+    """`f_s M cos theta_i` as (surface, volume without `A`); 0 where `M` is 0.
 
-    Times `seen_along` it is the integrand of level `far`; 0 where `M` is.
+    model : the number of the row's model, which must be a published one
+
+    Multiplied by `seen_along`, this is the integrand of level `far`.
     """
     t_i, cos_i, _, t_o, cos_o, _, surface, volume = _masked_factors(
         R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz
@@ -91,8 +94,11 @@ def mean_segment(R, model, row, half, precision, c, s, a_i, b_i, iz, a_o, b_o, o
 
 @njit(**INLINE)
 def _masked_factors(R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
-    """Sine and cosine of the inclination and cosine of the azimuth of wi and of wo; the model's
-    (surface, volume) factors times `M cos theta_i`."""
+    """(t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o, surface, volume).
+
+    The first six are the sine and cosine of the inclination and the cosine of the azimuth of wi and
+    of wo; the last two are the factors of the model times `M cos theta_i`.
+    """
     t_i, n_i = c * a_i - s * iz, s * a_i + c * iz
     t_o, n_o = c * a_o - s * oz, s * a_o + c * oz
     cos_i, cos_o = cos_inclination(R, b_i, n_i), cos_inclination(R, b_o, n_o)

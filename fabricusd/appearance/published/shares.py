@@ -1,4 +1,4 @@
-"""What published cloth hands to the sampler: its values, for the shares of the lobes."""
+"""Build the sampler of published cloth: pass the law's values to the fit of the lobe shares."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import KERNEL
 
 EVEN_SHARE = 0.15
-"""Share of directions that are even over the hemisphere."""
+"""Share of directions that are uniform over the hemisphere."""
 
 LEAST_SHARE = 0.1
-"""See `share_fit.best_shares`: grazing views see narrow bright places that a few directions a lobe
-miss, and without it satin's variance doubles."""
+"""See `share_fit.best_shares`. At grazing views there are narrow bright regions that a few
+directions per lobe miss; without this share, the variance on satin doubles."""
 
 
 def published_mixture(fabric: Fabric, tables: SurfaceTables) -> Mixture:
-    """Lobes above the cloth alone, their shares measured on `tables`."""
+    """Lobes above the cloth only, with shares measured on `tables`."""
     single: Any = np.float32
     kept = _in_single_precision(tables)
 
@@ -43,7 +43,8 @@ def published_mixture(fabric: Fabric, tables: SurfaceTables) -> Mixture:
 
 
 def _in_single_precision(tables: SurfaceTables) -> SurfaceTables:
-    """Shares need no more, and one kernel serves both precisions."""
+    """The tables in float32, which suffices for the shares; one kernel then serves all
+    precisions."""
     return tables._replace(
         threads=tables.threads.astype(np.float32),
         nodes=tables.nodes.astype(np.float32),
@@ -54,7 +55,7 @@ def _in_single_precision(tables: SurfaceTables) -> SurfaceTables:
 
 @njit(**KERNEL)
 def _point_values(R, tables, stretch, wi, wo, out):
-    """`point_value` at level `weave` on a stretch: wi, wo, out (3, n)."""
+    """`point_value` at level `weave` of all pairs on a stretch: wi, wo, out are (3, n)."""
     for k in range(wi.shape[1]):
         out[0, k], out[1, k], out[2, k] = point_value(
             R, tables, False, int(stretch[OF_SET]), int(stretch[OF_THREAD]), stretch[PSI0], R(0),

@@ -1,4 +1,4 @@
-"""What the surface kernels read of a fabric: its threads and the nodes over their curves."""
+"""The tables that the kernels of the published law read: threads and the nodes on their curves."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
 Reals = NDArray[Any]
-"""float32 or float64, by the precision that the tables were made for."""
+"""float32 or float64: the precision that the tables were made for."""
 
 NODE_COS, NODE_SIN, NODE_WEIGHT, NODE_HALF = 0, 1, 2, 3
 """Columns of `SurfaceTables.nodes`: cosine and sine of the tangent angle, share of the cloth's
-area, half the stretch of angle that the node's lobes are averaged over [rad]."""
+area, and half the range of angles [rad] over which the node's lobes are averaged."""
 
 NARROWEST_MASKING = 1e-6
-"""Masking width below which `u` is taken as this wide [rad], so that 1/width^2 stays finite."""
+"""Least masking width [rad]: narrower ones are replaced by it, so that 1/width^2 stays finite."""
 
 
 class SurfaceTables(NamedTuple):
     """Arrays of one fabric for the surface law; `real` is the precision asked for.
 
     threads : (k, COLUMNS) real - see `scattering.columns`
-    nodes : (q, 4) real - NODE_ columns, weft nodes first; those of conserving threads included
+    nodes : (q, 4) real - NODE_ columns, weft nodes first, including those of conserving threads
     node_thread : (q,) int32
     published : (q,) uint8 - 1 where the node's thread has a published model
     warp_start : int - nodes from here on are warp
-    gap : real - share that no thread covers
+    gap : real - share of the cloth that no thread covers
     overlap_precision : real - 2/masking_width^2 [1/rad^2]
     """
 
@@ -62,8 +62,8 @@ def surface_tables(
     if not cells and q.half.any():
         raise FabricError(
             "rule",
-            f"averages lobes over cells, which a model of {fabric.name} has no formula for; "
-            "its form must be points",
+            f"averages lobes over cells, but a model of {fabric.name} has no formula for such a "
+            "mean; the form of the rule must be points",
         )
     threads = pack_threads(fabric, np.float64)
     width = max(fabric.masking_width, NARROWEST_MASKING)
@@ -80,6 +80,6 @@ def surface_tables(
 
 
 def has_cell_lobes(fabric: Fabric) -> bool:
-    """Whether the lobes of all threads that follow the published law have a mean over a cell."""
+    """Whether every thread of the published law has a formula for the mean lobe over a cell."""
     models = [model_of(fabric, t) for t in fabric.thread_list]
     return all(m.cell_lobes is not None for m in models if m.law == PUBLISHED)

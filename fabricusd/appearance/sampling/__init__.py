@@ -1,1 +1,1 @@
-"""What the samplers of both laws share: lobes, stretches of a curve, shares."""
+"""Importance sampling for both surface laws: lobes, stretches of a curve, and lobe shares."""

@@ -1,4 +1,4 @@
-"""Directions that follow the highlight across the width of a thread."""
+"""Sample directions that follow the highlight across the width of a thread."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from fabricusd.kernels.real import INLINE, atan2
 
 @njit(**INLINE)
 def narrower(R, gamma, c, s, thread_set, w, ix, iy, iz, ox, oy, oz):
-    """The surface lobe's density at the place w across its thread over that of the whole width."""
+    """Ratio of the surface lobe's density at w across the thread to its density at level
+    `weave`."""
     t, b, n = to_thread(R, thread_set, c, s, ix, iy, iz)
     _, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
     phi_o, beta = azimuth_seen(R, b_o, n_o), across_deviation(R, gamma)
@@ -23,7 +24,7 @@ def narrower(R, gamma, c, s, thread_set, w, ix, iy, iz, ox, oy, oz):
 
 @njit(**INLINE)
 def narrow_direction(R, gamma, width, c, s, psi0, thread_set, w, ox, oy, oz, u1, u2):
-    """A direction of the surface lobe, `width` [rad] wide, at the place w across its thread."""
+    """A direction of the surface lobe, `width` [rad] wide, at the position w across the thread."""
     t_o, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
     theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
     phi_o, beta = azimuth_seen(R, b_o, n_o), across_deviation(R, gamma)

@@ -1,9 +1,10 @@
-"""`mixture`, for many hits at a time: the densities and directions of one side of the cloth.
+"""The vectorised form of `mixture`: sample many hits at a time, on one side of the cloth.
 
-Here each hit's shares are read once for one drawing and two densities, and loops run over hits so
-that LLVM vectorises them; the scalar functions of `mixture` are what they are tested against. The
-mixtures are of one side, without cosine lobes, as those of published cloth. All rows of a block
-lie in one array, their distances known to the compiler, which need not check them for overlap.
+The shares of each hit are read once for one drawn direction and two densities, and the loops run
+over hits so that LLVM vectorises them. They are tested against the scalar functions of `mixture`.
+The mixtures must have one side and no cosine lobes, like those of published cloth. All rows of a
+block are in a single array at distances known to the compiler, which then need not check them for
+overlap.
 """
 
 from __future__ import annotations
@@ -44,12 +45,12 @@ from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, atan2, cos, sin
 from fabricusd.kernels.unrolled import tuple_reader
 
 _EVEN = THREAD_LOBES
-"""In place of a lobe: uniform over the hemisphere."""
+"""Stands in place of a lobe's number for directions that are uniform over the hemisphere."""
 
-# Rows of a block: the viewer, the light, the drawn direction; the stretch of thread it is drawn
-# from, with its thread's surface lobe; two uniform numbers; both densities; where the view lies on
-# the grid of shares; the place across the thread and what that makes of both surface densities; the
-# shares of one stretch's lobes, and after them those of all.
+# Rows of a block: the viewer, the light, and the drawn direction; the stretch of thread that it is
+# drawn from, with the surface lobe of its thread; two uniform numbers; both densities; the place of
+# the view on the grid of shares; the position across the thread and its factor on both surface
+# densities; the shares of one stretch's lobes, followed by the shares of all lobes.
 (_OX, _OY, _OZ, _IX, _IY, _IZ, _GX, _GY, _GZ, _WARP, _PSI0, _COS, _SIN, _TAN, _ON_SURFACE,
  _ON_VOLUME, _GAMMA, _LOBE, _U1, _U2, _P_LIGHT, _P_GO, _ELEVATION, _AZIMUTH, _UP, _ROUND, _W,
  _NARROW_LIGHT, _NARROW_GO, _OURS) = (
@@ -58,12 +59,13 @@ _EVEN = THREAD_LOBES
 _SHARES = _OURS + THREAD_LOBES * BLOCK
 
 _shares_of = tuple_reader(THREAD_LOBES, BLOCK)
-"""(block, _OURS + x): shares of the lobes of the stretch at hand."""
+"""Called with (block, _OURS + x): the shares of the lobes of the current stretch."""
 
 
 @njit(**INLINE)
 def _into(R, warp, c, s, x, y, z):
-    """`frame.to_thread` without a branch: (w.t, w.b, w.n_t); warp is 1 or 0."""
+    """`frame.to_thread` without a branch: (w.t, w.b, w.n_t); warp : 1 on the warp, 0 on the
+    weft."""
     along = warp * y + (R(1) - warp) * x
     across = (R(1) - warp) * y - warp * x
     return c * along - s * z, across, s * along + c * z
@@ -71,7 +73,7 @@ def _into(R, warp, c, s, x, y, z):
 
 @njit(**INLINE)
 def _lobes_at(R, warp, psi0, c, s, tangent, surface, volume, theta_o, x, y, z, shares, narrow):
-    """The lobes' densities at a direction, times their shares; 0 behind the thread."""
+    """The sum of the lobes' densities at a direction times their shares; 0 behind the thread."""
     t, across, n = _into(R, warp, c, s, x, y, z)
     found = lobe_densities(R, psi0, tangent, surface, volume, theta_o, t, across, max(n, R(1e-12)))
     p = mixed(shares, narrowed(found, narrow))
@@ -90,7 +92,7 @@ def _load(wo, wi, start, size, block):
 
 @njit(**INLINE)
 def _find_views(R, size, block):
-    """`view_corner` of all viewers."""
+    """Compute `view_corner` for all viewers."""
     for x in range(size):
         row, column, _, up, round_ = view_corner(R, block[_OX + x], block[_OY + x], block[_OZ + x])
         block[_ELEVATION + x], block[_AZIMUTH + x] = R(row), R(column)
@@ -99,7 +101,7 @@ def _find_views(R, size, block):
 
 @njit(**INLINE)
 def _corner(block, x):
-    """What `view_corner` found."""
+    """The result of `view_corner` for entry x."""
     column = int(block[_AZIMUTH + x])
     following = column + 1 if column + 1 < AZIMUTHS else 0
     return int(block[_ELEVATION + x]), column, following, block[_UP + x], block[_ROUND + x]
@@ -107,8 +109,11 @@ def _corner(block, x):
 
 @njit(**PART)
 def _read_shares(R, shares, size, block, mixed):
-    """The shares of all lobes, `share_at`: read lobe by lobe where they lie side by side, and then
-    laid out hit by hit."""
+    """Compute `share_at` for all lobes.
+
+    The shares are read hit by hit, where those of the lobes are contiguous, and then transposed
+    into rows over hits.
+    """
     lobes = shares.shape[2]
     for x in range(size):
         row, column, following, up, round_ = _corner(block, x)
@@ -126,7 +131,7 @@ def _read_shares(R, shares, size, block, mixed):
 
 @njit(**INLINE)
 def _choose(R, even, shares, count, u0, block, x):
-    """Lobe of `count` that u0 falls on, -1 for none of them: uniform."""
+    """The lobe out of `count` that u0 selects; -1 stands for the uniform part."""
     left = u0 - even
     if left < R(0) or count == 0:
         return -1
@@ -141,7 +146,7 @@ def _choose(R, even, shares, count, u0, block, x):
 
 @njit(**PART)
 def _draw(R, size, block):
-    """Directions from the lobes chosen, in the surface frame."""
+    """Draw directions from the chosen lobes, in the surface frame."""
     for x in range(size):
         warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
         lobe = block[_LOBE + x]
@@ -164,7 +169,7 @@ def _draw(R, size, block):
 
 @njit(**INLINE)
 def _store(R, start, size, block, go, p_light, p_go, first):
-    """Directions and densities of a block; 0 at or below the cloth."""
+    """Write the directions and densities of a block; the densities are 0 at or below the cloth."""
     for row in range(3):
         drawn = go[row][start:]
         for x in range(size):
@@ -179,9 +184,13 @@ def _store(R, start, size, block, go, p_light, p_go, first):
 
 @njit(**KERNEL)
 def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first, n):
-    """`far_direction` for `n` viewers, and `far_density` of it and of the direction to the light.
+    """`mixture.direction` for `n` viewers, and `mixture.density` of it and of the light's
+    direction.
 
-    wo, wi, go : (3, n) real; u0, u1, u2, p_light, p_go : rows of which hits `first`... are used
+    wo, wi : (3, n) real - directions to the viewer and to the light
+    go : (3, n) real - receives the drawn directions
+    u0, u1, u2 : real - uniform numbers, read from `first` to `first + n - 1`
+    p_light, p_go : real - receive the densities of wi and of go, at the same indices
     """
     stretches = sampling.stretches
     lobes = THREAD_LOBES * stretches.shape[0]
@@ -216,11 +225,12 @@ def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first, n):
 
 @njit(**PART)
 def _add_stretch(R, row, shares, size, block):
-    """A stretch's part of both densities."""
+    """Add a stretch's part of both densities."""
     warp = R(1) if int(row[OF_SET]) == WARP else R(0)
     psi0, c, s, tangent = row[PSI0], row[COS], row[SIN], row[TAN]
     surface, volume = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
-    # To a known place: a distance that the compiler does not know would keep the loop scalar.
+    # Copy the shares to a fixed offset: with an offset unknown to the compiler, the loop below
+    # would stay scalar.
     for x in range(THREAD_LOBES * BLOCK):
         block[_OURS + x] = block[shares + x]
     for x in range(size):
@@ -240,10 +250,10 @@ def _add_stretch(R, row, shares, size, block):
 @njit(**KERNEL)
 def sample_points(R, table, sampling, across_too, sets, threads, psi0, w, wo, wi, u0, u1, u2, go,
                   p_light, p_go, first, n):  # fmt: skip
-    """As `sample_far` with `point_direction` and `point_density`, at the threads found.
+    """`sample_far` with `point_direction` and `point_density`, at the threads under the hits.
 
-    table : rows of `pack_threads`; sets, threads, psi0, w : (n,) what lies under each hit; a gap is
-    sampled uniformly
+    table : rows of `pack_threads`
+    sets, threads, psi0, w : (n,) - what lies under each hit; a gap is sampled uniformly
     """
     block = np.empty(_SHARES, wo.dtype)
     for start in range(0, n, BLOCK):
@@ -272,7 +282,7 @@ def sample_points(R, table, sampling, across_too, sets, threads, psi0, w, wo, wi
 
 @njit(**PART)
 def _find_threads(R, table, sampling, sets, threads, psi0, w, start, size, block):
-    """The thread under each hit, with the shares of its lobes; 0 in a gap."""
+    """Read the thread under each hit and the shares of its lobes, which are 0 in a gap."""
     for x in range(size):
         on_thread = sets[start + x] <= WARP and sampling.stretches.shape[0] > 0
         thread_set, thread, angle = 0, 0, R(0)
@@ -298,7 +308,7 @@ def _find_threads(R, table, sampling, sets, threads, psi0, w, start, size, block
 
 @njit(**PART)
 def _turn(R, size, block):
-    """Cosine, sine and tangent of each hit's tangent angle."""
+    """Compute the cosine, sine and tangent of each hit's tangent angle."""
     for x in range(size):
         c, s = cos(R, block[_PSI0 + x]), sin(R, block[_PSI0 + x])
         block[_COS + x], block[_SIN + x], block[_TAN + x] = c, s, s / c
@@ -306,7 +316,7 @@ def _turn(R, size, block):
 
 @njit(**PART)
 def _draw_across(R, size, block):
-    """Directions from the surface lobe at level `thread`, in place of those that `_draw` made."""
+    """Draw from the surface lobe at level `thread`, in place of the directions of `_draw`."""
     for x in range(size):
         warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
         t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
@@ -326,7 +336,7 @@ def _draw_across(R, size, block):
 
 @njit(**PART)
 def _narrow(R, size, block):
-    """What the place across the thread makes of both surface densities."""
+    """Compute the factors of the position across the thread on both surface densities."""
     for x in range(size):
         warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
         _, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
@@ -342,7 +352,7 @@ def _narrow(R, size, block):
 
 @njit(**PART)
 def _add_points(R, uniform, size, block):
-    """Both densities at each hit's own stretch."""
+    """Compute both densities from the lobes of each hit's own thread."""
     for x in range(size):
         warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
         t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
@@ -350,7 +360,7 @@ def _add_points(R, uniform, size, block):
         ours = _shares_of(block, _OURS + x)
         angle, tangent = block[_PSI0 + x], block[_TAN + x]
         surface, volume = block[_ON_SURFACE + x], block[_ON_VOLUME + x]
-        # Without a thread all shares are 0 and the whole is uniform.
+        # In a gap all shares are 0 and every direction is drawn uniformly.
         even = R(1 / (2 * math.pi))
         even = uniform * even if mixed(ours, ours) > R(0) else even
         block[_P_LIGHT + x] = even + _lobes_at(

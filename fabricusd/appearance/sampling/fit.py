@@ -1,7 +1,8 @@
-"""Measure the shares of a mixture's lobes: for the whole cloth, and at points of each stretch.
+"""Fit the shares of a mixture's lobes, for the whole cloth and for points of each stretch.
 
-A law brings its values: no closed form has been found for the shares, `1/Q` alone moves them too
-much. On velvet the variance falls from half of that of uniform directions to less than a tenth.
+The shares are measured on the values of a law. No closed form has been found for them: `1/Q` alone
+changes them too much. On velvet, measured shares reduce the variance from half of that of uniform
+directions to less than a tenth.
 """
 
 from __future__ import annotations
@@ -53,16 +54,16 @@ from fabricusd.kernels.unrolled import tuple_writer
 
 Singles = NDArray[np.float32]
 FarValues = Callable[[Singles, Singles, Singles], None]
-"""(wi, wo, out), each (3, n): the law's values at level `far`, into out."""
+"""(wi, wo, out), each (3, n): writes the law's values at level `far` to out."""
 PointValues = Callable[[Singles, Singles, Singles, Singles], None]
-"""(stretch, wi, wo, out): the same on a thread of a stretch, at level `weave`."""
+"""(stretch, wi, wo, out): writes the law's values at level `weave`, on a thread of the stretch."""
 
 LOWEST = 1e-6
-"""Height of a direction up to which it counts as on neither side of the cloth."""
+"""A direction whose |N.w| is at most this counts as being on neither side of the cloth."""
 
 
 def no_mixture(precision: Any, *, sides: int = 1, cosines: int = 0) -> Mixture:
-    """Of a law without threads: all directions are even."""
+    """The mixture of a law without threads: all directions are uniform."""
     nothing = np.zeros((0, STRETCH_COLUMNS), precision)
     none = np.zeros((ELEVATIONS, AZIMUTHS, 0), precision)
     return Mixture(nothing, none, none, precision(1), sides, 1, cosines)
@@ -80,12 +81,13 @@ def fitted_mixture(
     far: FarValues,
     at_point: PointValues,
 ) -> Mixture:
-    """The mixture for `fabric` whose shares leave the least variance, in `threads`' precision.
+    """The mixture for `fabric` whose shares leave the least variance, in the precision of
+    `threads`.
 
     threads : rows of `pack_threads`
     even, sides, opaque, cosines : see `Mixture`
     least : see `share_fit.best_shares`
-    far, at_point : the law's values, in single precision: shares need no more
+    far, at_point : the law's values, in single precision, which suffices for the shares
     """
     R = threads.dtype.type
     rows = stretches_of(fabric)
@@ -98,8 +100,8 @@ def fitted_mixture(
     )
     possible = _possible(len(rows), mixture)
     shares = best_shares(_noted(mixture, possible, far), possible, even, least)
-    # At a point there is one stretch, as wide as the thread's own lobes; the points of all
-    # stretches are fitted at once, as views of their own.
+    # At a point there is a single stretch, whose lobes are as wide as the thread's own. The points
+    # of all stretches are fitted together, as if they were further views.
     possible = _possible(1, mixture)
     found = []
     for row in mixture.stretches:
@@ -127,7 +129,7 @@ def fitted_mixture(
 
 
 def _possible(stretches: int, mixture: Mixture) -> NDArray[np.intp]:
-    """Lobes that may have a share: none below opaque cloth."""
+    """Indices of the lobes that may have a share; those below opaque cloth may not."""
     lobes = THREAD_LOBES * stretches
     sides = 1 if mixture.opaque else mixture.sides
     first = mixture.sides * lobes
@@ -135,7 +137,7 @@ def _possible(stretches: int, mixture: Mixture) -> NDArray[np.intp]:
 
 
 def _noted(mixture: Mixture, possible: NDArray[np.intp], values: FarValues) -> Singles:
-    """Directions of every possible lobe at every view, as `share_fit.noted`."""
+    """Records of directions from every possible lobe at every view, as in `share_fit.noted`."""
     R: Any = np.float32
     lobes = count_lobes(len(mixture.stretches), mixture.sides, mixture.cosines)
     found = noted(len(possible), lobes)
@@ -156,7 +158,7 @@ def _noted(mixture: Mixture, possible: NDArray[np.intp], values: FarValues) -> S
 
 @njit(**KERNEL)
 def _draw(R, mixture, possible, views, wi, wo):
-    """The directions, view by view and lobe by lobe: wi, wo (3, n)."""
+    """Draw the directions, view by view and lobe by lobe: wi, wo are (3, n)."""
     for view in range(views):
         ox, oy, oz = grid_view(R, view)
         for k in range(possible.size * DRAWS):
@@ -169,9 +171,9 @@ def _draw(R, mixture, possible, views, wi, wo):
 
 @njit(**KERNEL)
 def _describe(R, mixture, wi, wo, even, density):
-    """Densities of the even part, (n,), and of all lobes, (lobes, n), which starts as zeros.
+    """Compute the densities of the uniform part, (n,), and of all lobes, (lobes, n), initially 0.
 
-    A block's rows lie in one array, so that LLVM vectorises the loop over it.
+    The rows of a block are in a single array, so that LLVM vectorises the loop over it.
     """
     lobes = THREAD_LOBES * mixture.stretches.shape[0]
     block = np.empty((6 + THREAD_LOBES) * BLOCK, np.float32)

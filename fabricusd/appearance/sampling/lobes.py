@@ -1,25 +1,26 @@
-"""The lobes that the surface sampler mixes: directions of one thread, cut at the cloth's horizon.
+"""The lobes of the surface sampler: directions around one thread, cut off at the cloth's horizon.
 
-A lobe stands for a stretch of thread around one tangent angle psi0. In that thread's frame
+A lobe represents a stretch of thread around the tangent angle psi0. In the frame of that thread
 
     p(theta, phi) = p(theta)/cos theta * cos phi/(2 sin phi_m),   |phi| < phi_m
     phi_m(theta) = acos(clamp(tan theta tan psi0, 0, 1))
 
-which is above the cloth and in front of the thread, where the published law is not 0, and nowhere
-else. `p(theta)` is a normal distribution cut at the inclinations that are above the cloth at all;
-its mean is the mirror inclination moved inside the cut, so that its mass there never vanishes. The
-isotropic term has the cosine about the thread's normal instead, cut in the same way: seen along the
-normal that is half a disk and half an ellipse, of semi-axis cos psi0. Every density is per
-steradian and exact.
+This density is positive above the cloth and in front of the thread, where the published law is not
+0, and nowhere else. `p(theta)` is a normal distribution truncated to the inclinations that are
+above the cloth at some azimuth. Its mean is the mirror inclination, moved inside that interval so
+that the mass there never vanishes. The isotropic term uses the cosine about the thread's normal
+instead, truncated in the same way: projected along the normal, its directions fill half a disk and
+half an ellipse of semi-axis cos psi0. Every density is per steradian and exact.
 
-At level `thread` the surface term is a normal distribution in `h = sin phi_h` about the place `w`
-across the thread, `phi_h` half way between the azimuths of viewer and light; so is part of the
-lobe's azimuths there (`_share_across`), cut to those above the cloth:
+At level `thread` the surface term is a normal distribution in `h = sin phi_h` about the position
+`w` across the thread, where `phi_h` is half way between the azimuths of viewer and light. Part of
+the lobe (`_share_across`) draws its azimuths from the same distribution, truncated to those above
+the cloth:
 
     p(phi) = p(h) cos(phi_h)/2,   phi_h = (phi + phi_o)/2
 
-Source: `docs/model.md` section 6, which has uniform in sin theta for the isotropic term; the cosine
-leaves .14 instead of .19 of the variance over mean^2 on spun polyester at level `weave`.
+Source: `docs/model.md` section 6, which draws the isotropic term uniformly in sin theta. On spun
+polyester at level `weave`, the cosine leaves a variance over mean^2 of .14 instead of .19.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ from numba import njit
 from fabricusd.kernels.real import INLINE, acos, asin, atan2, cos, erf, erfinv, exp, sin
 
 STEEPEST = math.radians(89.5)
-"""Tangent angles of lobes stop here: beyond, hardly a direction is above the cloth."""
+"""Limit on the tangent angle of a lobe: beyond it, hardly any direction is above the cloth."""
 
 SURFACE, VOLUME, ISOTROPIC = 0, 1, 2
 """The lobes of one thread, in the order of every table."""
 THREAD_LOBES = 3
-"""To add a lobe: its number above, its density in `lobe_densities`, and how it is drawn in
-`sample_lobe` and `sample_any_lobe`; all else counts to THREAD_LOBES."""
+"""To add a lobe, add its number above, its density to `lobe_densities`, and its sampling to
+`sample_lobe` and `sample_any_lobe`. All other code loops up to THREAD_LOBES."""
 
 _HALF_PI = math.pi / 2
 _SQRT_2 = math.sqrt(2.0)
@@ -53,7 +54,8 @@ def theta_range(R, psi0):
 
 @njit(**INLINE)
 def cut_normal(R, x, mean, deviation, low, high):
-    """Density [1/rad] at x of a normal distribution cut to [low, high]; `mean` is inside."""
+    """Density [1/rad] at x of a normal distribution truncated to [low, high], which holds
+    `mean`."""
     scale = R(1 / _SQRT_2) / deviation
     mass = erf(R, (high - mean) * scale) - erf(R, (low - mean) * scale)
     z = (x - mean) * scale
@@ -62,7 +64,7 @@ def cut_normal(R, x, mean, deviation, low, high):
 
 @njit(**INLINE)
 def sample_cut_normal(R, u, mean, deviation, low, high):
-    """Its value for a number u in [0, 1)."""
+    """A sample of `cut_normal` [rad] for a number u in [0, 1)."""
     scale = R(1 / _SQRT_2) / deviation
     first, last = erf(R, (low - mean) * scale), erf(R, (high - mean) * scale)
     x = mean + erfinv(R, first + u * (last - first)) / scale
@@ -73,8 +75,10 @@ def sample_cut_normal(R, u, mean, deviation, low, high):
 def lobe_densities(R, psi0, tangent, surface, volume, theta_o, t, b, n):
     """Densities [1/sr] of the lobes at a direction (t, b, n) of the thread frame.
 
-    The direction is above the cloth and n > 0; tangent : tan psi0; surface, volume : the normals'
-    deviations [rad].
+    The direction must be above the cloth, with n > 0.
+
+    tangent : tan psi0
+    surface, volume : standard deviations of the two normal distributions [rad]
     """
     cos_theta = math.sqrt(b * b + n * n)
     inverse = R(1) / max(cos_theta, R(1e-9))
@@ -92,24 +96,26 @@ def lobe_densities(R, psi0, tangent, surface, volume, theta_o, t, b, n):
 
 @njit(**INLINE)
 def narrowed(densities, by):
-    """`lobe_densities` with the surface lobe's multiplied by `density_across`."""
+    """`densities` with that of the surface lobe multiplied by `by`, a `density_across`."""
     return densities[SURFACE] * by, densities[VOLUME], densities[ISOTROPIC]
 
 
 _NARROWEST = 2e-3
-"""Half the range of azimuths [rad] at the least, so that densities over it are numbers."""
+"""Least half-width [rad] of a range of azimuths, so that densities over the range stay finite."""
 
 
 @njit(**INLINE)
 def _share_across(R, beta, tangent):
-    """How much of the surface lobe goes by the place across; the rest keeps its cosine, which is
-    the better of the two where the highlight is wide, and on pile."""
+    """The share of the surface lobe that follows the position across the thread.
+
+    The rest keeps its cosine in azimuth, which is better for wide highlights and on pile.
+    """
     return min(max(R(1.1) - R(2) * beta, R(0.25)), R(0.9)) / math.sqrt(R(1) + tangent * tangent)
 
 
 @njit(**INLINE)
 def _across_range(R, t, cos_theta, tangent, phi_o):
-    """Sines (low, high) of the azimuths half way between the viewer and light above the cloth."""
+    """Sines (low, high) of phi_h for lights above the cloth."""
     edge = min(max(t * tangent / max(cos_theta, R(1e-9)), R(0)), R(1))
     limit = max(acos(R, edge), R(_NARROWEST))
     return sin(R, R(0.5) * (phi_o - limit)), sin(R, R(0.5) * (phi_o + limit))
@@ -117,15 +123,15 @@ def _across_range(R, t, cos_theta, tangent, phi_o):
 
 @njit(**INLINE)
 def azimuth_seen(R, b_o, n_o):
-    """Azimuth [rad] of a viewer (b_o, n_o) about its thread, held in front of it."""
+    """Azimuth [rad] of a viewer (b_o, n_o) about its thread, clamped to the front of the thread."""
     return atan2(R, b_o, max(n_o, R(0)))
 
 
 @njit(**INLINE)
 def density_across(R, tangent, phi_o, w, beta, t, b, n):
-    """The surface lobe's density at level `thread` over that of `lobe_densities`.
+    """Ratio of the surface lobe's density at level `thread` to the one of `lobe_densities`.
 
-    w : place across the thread in [-1, 1]; beta : deviation of `segment.across`
+    w : position across the thread in [-1, 1]; beta : deviation of `scattering.across`
     """
     cos_theta = math.sqrt(b * b + n * n)
     inverse = R(1) / max(cos_theta, R(1e-9))
@@ -140,7 +146,7 @@ def density_across(R, tangent, phi_o, w, beta, t, b, n):
 
 @njit(**INLINE)
 def sample_across(R, psi0, tangent, deviation, theta_o, phi_o, w, beta, u1, u2):
-    """(t, b, n) of the thread frame from the surface lobe at level `thread`."""
+    """A direction (t, b, n) of the thread frame, drawn from the surface lobe at level `thread`."""
     low, high = theta_range(R, psi0)
     mean = min(max(-theta_o, low), high)
     theta = sample_cut_normal(R, u1, mean, deviation, low, high)
@@ -160,7 +166,10 @@ def sample_across(R, psi0, tangent, deviation, theta_o, phi_o, w, beta, u1, u2):
 
 @njit(**INLINE)
 def sample_lobe(R, lobe, psi0, tangent, surface, volume, theta_o, u1, u2):
-    """(t, b, n) of the thread frame from `lobe`; surface, volume : the deviations [rad]."""
+    """A direction (t, b, n) of the thread frame, drawn from `lobe`.
+
+    surface, volume : standard deviations of the two normal distributions [rad]
+    """
     if lobe == ISOTROPIC:
         return _sample_cosine(R, tangent, u1, u2)
     width = surface if lobe == SURFACE else volume
@@ -169,7 +178,7 @@ def sample_lobe(R, lobe, psi0, tangent, surface, volume, theta_o, u1, u2):
 
 @njit(**INLINE)
 def sample_any_lobe(R, lobe, psi0, tangent, surface, volume, theta_o, u1, u2):
-    """`sample_lobe` without a branch, for loops to be vectorised; lobe : a number of type R."""
+    """`sample_lobe` without a branch, for vectorised loops; lobe : a number of type R."""
     width = surface if lobe == R(SURFACE) else volume
     t, b, n = _sample_normal(R, psi0, tangent, width, theta_o, u1, u2)
     ti, bi, ni = _sample_cosine(R, tangent, u1, u2)
@@ -190,14 +199,14 @@ def _sample_normal(R, psi0, tangent, deviation, theta_o, u1, u2):
 
 @njit(**INLINE)
 def _sample_cosine(R, tangent, u1, u2):
-    """The isotropic term's direction: a place on the half disk or on the half ellipse."""
+    """A direction of the isotropic term: a point on the half disk or on the half ellipse."""
     cosine = R(1) / math.sqrt(R(1) + tangent * tangent)
     v = u1 * (R(1) + cosine)
     on_disk = v < R(1)
     radius = math.sqrt(v if on_disk else min((v - R(1)) / max(cosine, R(1e-6)), R(1)))
     turn = R(math.pi) * (u2 - R(0.5))
     t, b = radius * cos(R, turn), radius * sin(R, turn)
-    # The disk's side is the one that the horizon leaves whole.
+    # The half disk is on the side that the horizon does not cut.
     side = R(-1) if tangent >= R(0) else R(1)
     t *= side if on_disk else -side * cosine
     return t, b, math.sqrt(max(R(1) - t * t - b * b, R(0)))

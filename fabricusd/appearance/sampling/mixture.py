@@ -1,16 +1,18 @@
-"""Importance sampling of cloth: one mixture of lobes, which every surface law hands its lobes to.
+"""Importance sampling of cloth: the mixture of lobes that all surface laws use.
 
-A part of the directions is even over the sphere or the hemisphere. The rest goes to the lobes of
-`lobes`, THREAD_LOBES for each of the `stretches` of tangent angle, and to cosine lobes about the
-cloth's normal, which stand for light scattered more than once. Their shares are measured once per
-fabric and view, by `fit`; at a point of the weave only the lobes of the thread there take part.
+Part of the directions are uniform over the sphere or the hemisphere. The others are drawn from the
+lobes of `lobes`, THREAD_LOBES for each of the `stretches` of tangent angle, and from cosine lobes
+about the cloth's normal, which represent light scattered more than once. `fit` measures the shares
+of the lobes for a grid of views, once per fabric. At a point of the weave only the lobes of the
+thread under the point are used.
 
-Below the cloth a lobe's directions are those above it, negated, around the mirror inclination of
-that side. A viewer below is one above with both directions negated: a law that is the same then has
-a mixture of two sides. A mixture of one side draws nothing below and has no viewers there.
+Below the cloth, a lobe draws the directions of the lobe above, negated, around the mirror
+inclination of that side. A viewer below the cloth is equivalent to one above with both directions
+negated; a law that has this symmetry uses a mixture of two sides. A mixture of one side draws
+nothing below the cloth and has no viewers there.
 
-Source: `docs/model.md` section 6. Scalar kernels, precision `R` first; `blocks` has the same for
-many hits at a time.
+Source: `docs/model.md` section 6. The kernels are scalar and take the precision `R` first; `blocks`
+does the same for many hits at a time.
 """
 
 from __future__ import annotations
@@ -54,19 +56,19 @@ _GAMMA, _ON_SURFACE, _ON_VOLUME = (
 
 
 class Mixture(NamedTuple):
-    """What the sampler reads; `real` is the law's precision.
+    """The tables of the sampler; `real` is the precision of the law.
 
     stretches : (s, STRETCH_COLUMNS) real - see `stretches_of`
-    shares : (ELEVATIONS, AZIMUTHS, lobes) real - at level `far`, of the lobes in this order:
+    shares : (ELEVATIONS, AZIMUTHS, lobes) real - shares of the lobes at level `far`, in this order:
         THREAD_LOBES of every stretch, above the cloth and then below, then the cosine lobes above
         and below; a mixture of one side has none below. They sum to 1 - even at each view
-    point_shares : (ELEVATIONS, AZIMUTHS, s lobes) real - at a point of each stretch, in the same
-        order and with the same sum
-    even : real - share of directions that are even over the sphere, or the upper hemisphere: it
-        bounds the weight of what no lobe expects
+    point_shares : (ELEVATIONS, AZIMUTHS, s lobes) real - shares at a point of each stretch, in the
+        same order and with the same sum
+    even : real - share of directions that are uniform over the sphere or the upper hemisphere; it
+        bounds the weight of directions that no lobe covers
     sides : int - 1 or 2
-    opaque : int - 1 where nothing is drawn on the side that the viewer is not on
-    cosines : int - 1 where there are cosine lobes
+    opaque : int - 1 if no direction is drawn on the side opposite the viewer
+    cosines : int - 1 if there are cosine lobes
     """
 
     stretches: Reals
@@ -79,13 +81,13 @@ class Mixture(NamedTuple):
 
 
 def count_lobes(stretches: int, sides: int, cosines: int) -> int:
-    """Lobes of a mixture, in `shares`; of one stretch, at a point of it."""
+    """Number of lobes of a mixture in `shares`; with one stretch, the number at a point."""
     return sides * (THREAD_LOBES * stretches + cosines)
 
 
 @njit(**INLINE)
 def even_density(R, mixture, iz):
-    """Density [1/sr] of the even part, the viewer being above."""
+    """Density [1/sr] of the uniform part, for a viewer above the cloth."""
     if mixture.opaque != 0:
         return R(0.5 / math.pi) if iz > R(0) else R(0)
     return R(0.25 / math.pi)
@@ -93,7 +95,7 @@ def even_density(R, mixture, iz):
 
 @njit(**INLINE)
 def even_direction(R, mixture, u0, u1, u2):
-    """A direction of the even part; u0 : in [0, even)."""
+    """A direction of the uniform part; u0 : in [0, even)."""
     x, y, z = uniform_direction(R, u1, u2)
     if mixture.opaque == 0 and u0 < R(0.5) * mixture.even:
         return -x, -y, -z
@@ -103,7 +105,7 @@ def even_direction(R, mixture, u0, u1, u2):
 @njit(**INLINE)
 def stretch_densities(R, c, s, psi0, tangent, surface_width, volume_width, thread_set,
                       ix, iy, iz, ox, oy, oz):  # fmt: skip
-    """Densities [1/sr] of one tangent angle's lobes on wi's own side, the viewer being above."""
+    """Densities [1/sr] of one tangent angle's lobes on the side of wi, for a viewer above."""
     turn = R(1) if iz > R(0) else R(-1)
     t, b, n = to_thread(R, thread_set, c, s, turn * ix, turn * iy, turn * iz)
     t_o, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
@@ -111,7 +113,7 @@ def stretch_densities(R, c, s, psi0, tangent, surface_width, volume_width, threa
     found = lobe_densities(
         R, psi0, tangent, surface_width, volume_width, theta_o, t, b, max(n, R(1e-12))
     )
-    # Behind the thread there is nothing; without a branch, since loops are vectorised.
+    # The density is 0 behind the thread; a product instead of a branch lets LLVM vectorise loops.
     return _times(R, R(1) if n > R(0) else R(0), found)
 
 
@@ -132,7 +134,7 @@ mixed = sum_of_products(THREAD_LOBES)
 
 @njit(**PART)
 def density(R, mixture, ix, iy, iz, ox, oy, oz):
-    """pdf(wi) [1/sr] of `direction`, at level `far`; 0 at the horizon and where it never goes."""
+    """pdf(wi) [1/sr] of `direction`, at level `far`; 0 at the horizon and where it never draws."""
     if iz == R(0) or oz == R(0) or (mixture.sides == 1 and min(iz, oz) < R(0)):
         return R(0)
     if oz < R(0):
@@ -160,7 +162,7 @@ def density(R, mixture, ix, iy, iz, ox, oy, oz):
 
 @njit(**INLINE)
 def _choose(R, shares, corner, first, count, left):
-    """The lobe of `count`, from `first` on, that `left` falls on."""
+    """The lobe out of `count`, whose shares start at `first`, that `left` selects."""
     k = 0
     while k < count - 1:
         left -= share_at(R, shares, corner, first + k)
@@ -172,8 +174,10 @@ def _choose(R, shares, corner, first, count, left):
 
 @njit(**INLINE)
 def _drawn_lobe(mixture, stretches, k):
-    """`k`, or the cosine lobe above for the last, which lies below where the cloth is opaque:
-    rounding alone leads there, its share is 0."""
+    """Lobe `k`, or the upper cosine lobe if `k` is the lower one and the cloth is opaque.
+
+    The share of that lower lobe is 0, so it can only be selected through rounding.
+    """
     cosine = mixture.sides * THREAD_LOBES * stretches
     if mixture.opaque != 0 and mixture.sides == 2 and k > cosine:
         return cosine
@@ -182,7 +186,7 @@ def _drawn_lobe(mixture, stretches, k):
 
 @njit(**PART)
 def direction(R, mixture, ox, oy, oz, u0, u1, u2):
-    """wi (x, y, z) at level `far` for a viewer and three numbers in [0, 1)."""
+    """wi (x, y, z) at level `far`, for a viewer and three numbers in [0, 1)."""
     flip = R(-1) if oz < R(0) and mixture.sides == 2 else R(1)
     ox, oy, oz = flip * ox, flip * oy, flip * oz
     left = u0 - mixture.even
@@ -199,7 +203,7 @@ def direction(R, mixture, ox, oy, oz, u0, u1, u2):
 
 @njit(**INLINE)
 def lobe_direction(R, mixture, k, ox, oy, oz, u1, u2):
-    """A direction of lobe k in the order of `shares`, for a viewer above the cloth."""
+    """A direction of lobe k, in the order of `shares`, for a viewer above the cloth."""
     lobes = THREAD_LOBES * mixture.stretches.shape[0]
     if k >= mixture.sides * lobes:
         below = k > mixture.sides * lobes
@@ -216,7 +220,7 @@ def lobe_direction(R, mixture, k, ox, oy, oz, u1, u2):
 @njit(**INLINE)
 def _stretch_direction(R, lobe, below, c, s, psi0, tangent, surface_width, volume_width, thread_set,
                        ox, oy, oz, u1, u2):  # fmt: skip
-    """A direction of one of a tangent angle's lobes, above the cloth or below."""
+    """A direction of a lobe of one tangent angle, above the cloth or below it."""
     turn = R(-1) if below else R(1)
     t_o, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
     theta_o = turn * atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
@@ -228,13 +232,13 @@ def _stretch_direction(R, lobe, below, c, s, psi0, tangent, surface_width, volum
 @njit(**PART)
 def point_density(R, threads, mixture, across_too, thread_set, thread, psi0, w,
                   ix, iy, iz, ox, oy, oz):  # fmt: skip
-    """pdf(wi) [1/sr] of `point_direction`; 0 at the horizon and where it never goes.
+    """pdf(wi) [1/sr] of `point_direction`; 0 at the horizon and where it never draws.
 
-    threads : rows of `pack_threads`; thread_set, thread, psi0, w : what `weave.find` gave
+    threads : rows of `pack_threads`; thread_set, thread, psi0, w : what `weave.find` returns
     """
     if iz == R(0) or oz == R(0) or (mixture.sides == 1 and min(iz, oz) < R(0)):
         return R(0)
-    # The place across the thread narrows the lobe of viewers and light on the front.
+    # The position across the thread narrows the lobe if viewer and light are both on the front.
     narrow = across_too and oz > R(0) and iz > R(0)
     if oz < R(0):
         ix, iy, iz, ox, oy, oz = -ix, -iy, -iz, -ox, -oy, -oz
@@ -264,13 +268,13 @@ def point_density(R, threads, mixture, across_too, thread_set, thread, psi0, w,
 
 @njit(**INLINE)
 def _lobes_at(mixture):
-    """Lobes at a point."""
+    """Number of lobes at a point."""
     return mixture.sides * (THREAD_LOBES + mixture.cosines)
 
 
 @njit(**INLINE)
 def _first_at(R, mixture, thread_set, thread, psi0):
-    """Where in `point_shares` those of the stretch start that a tangent angle is in."""
+    """Index into `point_shares` of the first lobe of the stretch that a tangent angle is in."""
     stretch = nearest_stretch(R, mixture.stretches, thread_set, thread, psi0)
     return _lobes_at(mixture) * stretch
 
@@ -278,10 +282,7 @@ def _first_at(R, mixture, thread_set, thread, psi0):
 @njit(**PART)
 def point_direction(R, threads, mixture, across_too, thread_set, thread, psi0, w,
                     ox, oy, oz, u0, u1, u2):  # fmt: skip
-    """wi (x, y, z) at level `weave`, or `thread` if `across_too`.
-
-    A gap is sampled evenly.
-    """
+    """wi (x, y, z) at level `weave`, or `thread` if `across_too`; uniform in a gap."""
     flip = R(-1) if oz < R(0) and mixture.sides == 2 else R(1)
     ox, oy, oz = flip * ox, flip * oy, flip * oz
     gap = thread_set > WARP or mixture.stretches.shape[0] == 0

@@ -1,8 +1,8 @@
-"""Stretches of tangent angle, for which the surface samplers have lobes.
+"""Divide the tangent curves of a fabric into stretches, each of which gets lobes of the samplers.
 
-They are coarser than the quadrature's nodes, a handful a fabric, and their lobes wider by what the
-angle varies inside: measured, twice as many lobes gain a few per cent of the variance and double
-the cost of every density.
+Stretches are coarser than the nodes of the quadrature, a handful per fabric, and their lobes are
+widened by the variation of the angle inside. Measurements show that twice as many lobes reduce the
+variance by a few per cent and double the cost of every density.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fabricusd.fabric import Fabric, TangentCurve
 from fabricusd.kernels.real import INLINE
 
 WIDEST_STRETCH = math.radians(15.0)
-"""Stretches of sloping curve are at most this long in tangent angle."""
+"""Largest range of tangent angle [rad] of a stretch on the sloping part of a curve."""
 
 STRETCH_COLUMNS = 8
 OF_SET, OF_THREAD, PSI0, COS, SIN, TAN, SURFACE_WIDTH, VOLUME_WIDTH = range(STRETCH_COLUMNS)
@@ -30,10 +30,10 @@ OF_SET, OF_THREAD, PSI0, COS, SIN, TAN, SURFACE_WIDTH, VOLUME_WIDTH = range(STRE
 
 
 def stretches_of(fabric: Fabric) -> NDArray[np.float64]:
-    """(s, 8) stretches of a fabric.
+    """(s, STRETCH_COLUMNS) stretches of a fabric.
 
-    A tangent angle [rad] of a thread in a set, its cosine, sine and tangent, the deviations of its
-    two normal lobes [rad].
+    The columns are the set, the thread, the tangent angle [rad], its cosine, sine and tangent, and
+    the standard deviations [rad] of the two normal lobes.
     """
     rows = []
     area = coverage(fabric).type_area
@@ -43,7 +43,7 @@ def stretches_of(fabric: Fabric) -> NDArray[np.float64]:
                 continue
             for middle, deviation in _curve_stretches(thread.curve, thread.gamma_surface):
                 psi0 = min(max(middle, -STEEPEST), STEEPEST)
-                # A tangent turned by x moves the mirror inclination by up to 2 x.
+                # Turning the tangent by x moves the mirror inclination by up to 2 x.
                 widths = [
                     math.hypot(width, 2 * deviation)
                     for width in model_of(fabric, thread).widths(
@@ -57,7 +57,8 @@ def stretches_of(fabric: Fabric) -> NDArray[np.float64]:
 def _curve_stretches(curve: TangentCurve, width: float) -> list[tuple[float, float]]:
     """(mean, standard deviation) [rad] of the tangent angle over each stretch of a curve.
 
-    Level pieces of one angle are a stretch together, sloping ones share equal intervals of angle.
+    Pieces of nearly constant angle form one stretch per angle; the range of the sloping pieces is
+    divided into equal intervals.
     """
     p = pieces(curve)
     level = np.abs(p.last - p.first) < width
@@ -83,7 +84,7 @@ def _curve_stretches(curve: TangentCurve, width: float) -> list[tuple[float, flo
 
 @njit(**INLINE)
 def nearest_stretch(R, stretches, thread_set, thread, psi0):
-    """The stretch of a thread in a set whose tangent angle is nearest to psi0."""
+    """Index of the stretch of `thread` in `thread_set` whose tangent angle is nearest to psi0."""
     best, least = 0, R(1e9)
     for y in range(stretches.shape[0]):
         row = stretches[y]

@@ -1,4 +1,4 @@
-"""Tables of shares by view, and directions drawn uniformly."""
+"""Look up lobe shares in tables by view, and draw uniform directions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fabricusd.kernels.real import INLINE, atan2, cos, sin
 
 @njit(**INLINE)
 def view_corner(R, ox, oy, oz):
-    """Where a view lies on the grid of shares: (elevation, next azimuths, two fractions)."""
+    """Place of a view on the grid of shares: (row, two columns, and the fractions between them)."""
     flat = math.sqrt(ox * ox + oy * oy)
     e = atan2(R, flat, max(oz, R(0))) * R((ELEVATIONS - 1) / (0.5 * math.pi))
     row = min(int(e), ELEVATIONS - 2)
@@ -24,7 +24,7 @@ def view_corner(R, ox, oy, oz):
 
 @njit(**INLINE)
 def share_at(R, shares, corner, k):
-    """Share of lobe k at a view, bilinear in the grid."""
+    """Share of lobe k at a view, interpolated bilinearly."""
     row, column, following, e, a = corner
     low = shares[row, column, k] + a * (shares[row, following, k] - shares[row, column, k])
     row += 1
@@ -34,7 +34,7 @@ def share_at(R, shares, corner, k):
 
 @njit(**INLINE)
 def uniform_direction(R, u1, u2):
-    """Uniform over the upper hemisphere."""
+    """A direction (x, y, z), uniform over the upper hemisphere."""
     flat = math.sqrt(max(R(0), (R(1) - u1) * (R(1) + u1)))
     phi = R(2 * math.pi) * u2
     return flat * cos(R, phi), flat * sin(R, phi), u1

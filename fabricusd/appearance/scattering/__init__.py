@@ -1,1 +1,1 @@
-"""Scattering of one thread."""
+"""Scattering models of a single thread."""

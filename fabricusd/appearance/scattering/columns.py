@@ -1,6 +1,6 @@
-"""A thread as a row of numbers of precision R: the names of its columns.
+"""Names of the columns of the thread table, in which kernels see a thread as a row of numbers.
 
-`table.pack_threads` fills them, in float64, from what the thread's model says of it.
+`table.pack_threads` computes the columns in float64, as the model of the thread defines them.
 """
 
 from __future__ import annotations
@@ -9,14 +9,14 @@ from __future__ import annotations
     ALBEDO_R, ALBEDO_G, ALBEDO_B, MODEL, IOR_EXCESS, ISOTROPIC, GAMMA_SURFACE, GAMMA_VOLUME,
     SURFACE_LOBE, _, VOLUME_LOBE, _, POINT_COLUMNS,
 ) = range(13)  # fmt: skip
-"""ALBEDO_ : `A` per channel, clamped where the model says so
+"""ALBEDO_ : `A` per channel, clamped to the model's `most_albedo`
 MODEL : index into `fabric.MODELS`
 IOR_EXCESS : eta^2 - 1
 ISOTROPIC : kd
 GAMMA_ : standard deviations gs and gv [rad], at least `lobes.NARROWEST`
-SURFACE_LOBE, VOLUME_LOBE : first of two numbers each that the model's lobes need, by its
+SURFACE_LOBE, VOLUME_LOBE : first of two constants each of the model's lobes, from its
     `lobe_constants`
-POINT_COLUMNS : how many columns these are; the vectorised loops over points copy them hit by hit
+POINT_COLUMNS : the number of these columns; the vectorised loops over points copy them for each hit
 """
 
 (
@@ -25,16 +25,16 @@ POINT_COLUMNS : how many columns these are; the vectorised loops over points cop
 ) = range(POINT_COLUMNS, POINT_COLUMNS + 8)  # fmt: skip
 """SURFACE_GAIN : ks
 LAW : `model.PUBLISHED` or `model.CONSERVING`
-SURFACE_WIDTH, VOLUME_WIDTH : deviations of theta_i that the samplers give the two lobes [rad]
+SURFACE_WIDTH, VOLUME_WIDTH : standard deviations of theta_i in the samplers' two lobes [rad]
 BRIGHTNESS : mean of the albedo's channels, for sampling
 INVERSE_T_MAX : 1/T_max, for models with a table
-COMPLETION_SCALE : sqrt(2 pi X), by which an entry of the table from COMPLETION on is x(theta)
-TRANSMISSION : first of TRANSMISSION_ENTRIES + 1 columns: T over sqrt(cos theta) from 0 to 1, the
-    last one repeated; 0 for models without that table
+COMPLETION_SCALE : sqrt(2 pi X), by which an entry of the table at COMPLETION becomes x(theta)
+TRANSMISSION : first of TRANSMISSION_ENTRIES + 1 columns: T at sqrt(cos theta) from 0 to 1, with the
+    last entry repeated; 0 for models without this table
 """
 
 CONSTANTS = TRANSMISSION
-"""Columns before the table."""
+"""Number of columns before the table."""
 
 TRANSMISSION_ENTRIES = 721
 

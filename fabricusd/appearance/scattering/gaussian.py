@@ -1,4 +1,4 @@
-"""Gaussian lobes in theta_h: what the published models share."""
+"""The Gaussian lobes in theta_h and the bounded factors that the published models share."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ COS_SUM_MINIMUM = 1e-3
 
 @njit(**INLINE)
 def compressed(R, cos2_d):
-    """1/cos^2(theta_d), bounded."""
+    """1/cos^2(theta_d), bounded by 1/COS2_D_MINIMUM."""
     return R(1) / max(cos2_d, R(COS2_D_MINIMUM))
 
 
 @njit(**INLINE)
 def spread(R, cos_i, cos_o):
-    """1/(cos theta_i + cos theta_o), bounded: of light that left a volume."""
+    """1/(cos theta_i + cos theta_o), bounded by 1/COS_SUM_MINIMUM: a factor of the volume term."""
     return R(1) / max(cos_i + cos_o, R(COS_SUM_MINIMUM))
 
 
@@ -46,10 +46,10 @@ def gaussian_lobes(R, row, sin_i, cos_i, sin_o, cos_o):
 
 @njit(**INLINE)
 def gaussian_cell_lobes(R, row, half, sin_i, cos_i, cos_phi_i, sin_o, cos_o, cos_phi_o):
-    """`gaussian_lobes` averaged over a stretch of tangent angle, `half` [rad] to each side.
+    """`gaussian_lobes` averaged over tangent angles up to `half` [rad] to each side.
 
-    Across it theta_h is taken as linear in the tangent angle, with slope
-    -(cos phi_i + cos phi_o)/2: exact in the plane of the thread, an approximation out of it.
+    Over this range theta_h is approximated as linear in the tangent angle, with the slope
+    -(cos phi_i + cos phi_o)/2. This is exact in the plane of the thread.
     """
     theta_h = half_inclination(R, sin_i, cos_i, sin_o, cos_o)
     reach = R(0.5) * abs(cos_phi_i + cos_phi_o) * half
@@ -68,7 +68,7 @@ def mean_gaussian(R, width, half_precision, norm, x, reach):
     """Mean of the Gaussian over [x - reach, x + reach]."""
     ratio = reach / width
     if ratio < R(0.05):
-        # The difference of error functions would cancel; two terms of its series do not.
+        # The difference of error functions would cancel; the first two terms of its series do not.
         z = x / width
         g = gaussian(R, half_precision, norm, x)
         return g * (R(1) + (z * z - R(1)) * ratio * ratio * R(1.0 / 6.0))
@@ -79,7 +79,7 @@ def mean_gaussian(R, width, half_precision, norm, x, reach):
 
 @njit(**INLINE)
 def gaussian_energies(R, row, cos_o, transmitted, around, narrow_s, narrow_v):
-    """See `ThreadModel.energies`; the volume's, up to a common factor, is that of a wide lobe."""
+    """See `ThreadModel.energies`; up to a common factor, the volume's is that of a wide lobe."""
     kd = row[ISOTROPIC]
     whole = R(2 * math.pi) * transmitted * transmitted * row[BRIGHTNESS]
     volume = (R(1) - kd) * whole * narrow_v / max(cos_o, row[GAMMA_VOLUME])

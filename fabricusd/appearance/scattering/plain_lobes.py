@@ -1,4 +1,4 @@
-"""Angles and lobes in plain float64 NumPy, for the formulas that kernels are tested against.
+"""Angles and lobes in plain float64 NumPy, for the reference formulas that test the kernels.
 
 Every function broadcasts over directions. Source: MODEL sections 1 and 2 (`docs/model.md`).
 """
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Angles:
-    """One direction in a thread's frame (t, b, n_t): inclination and the two azimuths [rad].
+    """Directions in a thread's frame (t, b, n_t): inclination, azimuth and longitude [rad].
 
     theta : (n,) - asin(w.t); phi : (n,) - atan2(w.b, w.n_t); psi : (n,) - atan2(w.t, w.n_t)
     """
@@ -40,7 +40,7 @@ def wrap(angle: Array) -> Array:
 
 
 def angles(w: Array) -> Angles:
-    """Of `w` : (n, 3) in the thread frame, x along `t`, y along `b`, z along `n_t`."""
+    """The angles of `w` : (n, 3) in the thread frame, x along `t`, y along `b`, z along `n_t`."""
     t, b, n = np.moveaxis(np.asarray(w, np.float64), -1, 0)
     return Angles(theta=np.arctan2(t, np.hypot(b, n)), phi=azimuth(b, n), psi=azimuth(t, n))
 
@@ -67,7 +67,7 @@ def fresnel(ior: float, cosine: Array) -> Array:
 
 
 def longitudinal(a: Array, b: Array, s: float) -> Array:
-    """`K(a, b; s)`, [dEon2011] eq. 7 without cancellation; its integral over cos b db is 1."""
+    """`K(a, b; s)`, [dEon2011] eq. 7 without cancellation; K cos b integrates to 1 over b."""
     v = s * s
     peak = np.exp(-2 * np.sin(0.5 * (a + b)) ** 2 / v)
     return peak * i0e(np.cos(a) * np.cos(b) / v) / (v * -math.expm1(-2 / v))
@@ -76,7 +76,7 @@ def longitudinal(a: Array, b: Array, s: float) -> Array:
 def gaussian_terms(
     thread: Thread, i: Angles, o: Angles, reflected: Array, transmitted: Array
 ) -> tuple[Array, Array]:
-    """Surface and volume of a published model whose Fresnel factors are given. MODEL section 2."""
+    """Surface and volume term of a published model with given Fresnel factors. MODEL section 2."""
     theta_h, theta_d = 0.5 * (i.theta + o.theta), 0.5 * (i.theta - o.theta)
     kd = thread.isotropic
     surface = reflected * half_azimuth(i, o) * gaussian(thread.gamma_surface, theta_h)

@@ -1,15 +1,16 @@
 """Importance sampling of one thread: directions over the whole sphere, and their density.
 
-A mixture, each of its lobes exact in closed form per steradian:
+The sampler is a mixture of lobes, each with an exact closed form per steradian:
 
-- surface, azimuth by cos(phi_d/2)/4: theta_i normal with the model's width, about twice gs, cut at
-  +-90 degrees;
-- surface, azimuth uniform: where Fresnel's rise towards phi_d = 180 degrees evens the cosine out;
-- volume: the same with its own width, azimuth uniform;
-- isotropic: uniform on the sphere.
+- surface, with azimuth distributed as cos(phi_d/2)/4 and theta_i normally distributed with the
+  width of the model, about twice gs, truncated at +-90 degrees;
+- surface, with uniform azimuth, for the rise of Fresnel reflection towards phi_d = 180 degrees,
+  which offsets the cosine;
+- volume, with a width of its own and uniform azimuth;
+- isotropic, uniform on the sphere.
 
-The shares follow the model's estimates of its terms' energies; the isotropic lobe keeps at least a
-tenth, which bounds the weight of every direction. Source: MODEL section 6.
+The shares follow the model's estimates of the energies of its terms. The isotropic lobe gets at
+least a tenth, which bounds the weight of every direction. Source: MODEL section 6.
 """
 
 from __future__ import annotations
@@ -37,12 +38,12 @@ _SQRT_2 = math.sqrt(2.0)
 
 @njit(**INLINE)
 def inclination_lobe(R, wide, sin_o, cos_o):
-    """(mean, deviation, narrowing) [rad] of the normal distribution that stands for a lobe.
+    """(mean [rad], deviation [rad], narrowing) of the normal distribution that represents a lobe.
 
-    The lobe has the deviation `wide` in theta_i, times cos^2(theta_i)/cos^2(theta_d); the cosines,
-    to second order around the mirror direction, narrow it and shift it towards the normal plane.
-    Towards grazing views that expansion fails and is faded out. `narrowing` is the deviation over
-    `wide`: its energy.
+    The lobe has the standard deviation `wide` in theta_i and is multiplied by
+    cos^2(theta_i)/cos^2(theta_d). To second order around the mirror direction, the cosines narrow
+    the lobe and shift it towards the normal plane. Towards grazing views this expansion fails and
+    is faded out. `narrowing` is the deviation over `wide`, and thereby the energy of the lobe.
     """
     narrowing = R(1) / math.sqrt(R(1) + R(1.5) * cos_o * wide * wide)
     deviation = wide * narrowing
@@ -52,11 +53,14 @@ def inclination_lobe(R, wide, sin_o, cos_o):
 
 @njit(**INLINE)
 def lobe_shares(R, row, cos_o, narrow_s, narrow_v):
-    """(surface by cosine, surface uniform, volume): shares of the mixture; isotropic the rest.
+    """(surface by cosine, surface uniform, volume): shares of the mixture.
+
+    The isotropic lobe has the rest.
 
     narrow_s, narrow_v : `narrowing` of `inclination_lobe` for both widths
     """
-    # F cos(phi_d/2) at theta_d = -theta_o as a + b cos(phi_d/2), through phi_d = 0 and 120 degrees.
+    # Approximate F cos(phi_d/2) at theta_d = -theta_o by a + b cos(phi_d/2), interpolating it at
+    # phi_d = 0 and 120 degrees.
     f_0, transmitted = fresnel(R, row[IOR_EXCESS], cos_o)
     f_1, _ = fresnel(R, row[IOR_EXCESS], R(0.5) * cos_o)
     even = max(f_1 - f_0, R(0))
@@ -68,7 +72,7 @@ def lobe_shares(R, row, cos_o, narrow_s, narrow_v):
     )
     even *= surface
     by_cosine *= surface
-    # A black, unreflecting thread scatters nothing; any density will do.
+    # A black, unreflecting thread scatters nothing, so any density is valid.
     total = max(even + by_cosine + volume + isotropic, R(1e-30))
     scale = min(R(1) / total, R(1 - ISOTROPIC_SHARE) / max(total - isotropic, R(1e-30)))
     return by_cosine * scale, even * scale, volume * scale
@@ -83,7 +87,7 @@ def cut_normal_bounds(R, mean, deviation):
 
 @njit(**INLINE)
 def cut_normal(R, theta, mean, deviation):
-    """Density [1/rad] of a normal distribution cut at +-90 degrees."""
+    """Density [1/rad] of a normal distribution truncated at +-90 degrees."""
     low, high = cut_normal_bounds(R, mean, deviation)
     x = (theta - mean) / deviation
     return exp(R, R(-0.5) * x * x) * R(_SQRT_2 / math.sqrt(math.pi)) / (deviation * (high - low))
@@ -91,7 +95,7 @@ def cut_normal(R, theta, mean, deviation):
 
 @njit(**INLINE)
 def sample_cut_normal(R, mean, deviation, u):
-    """Inclination [rad] by inversion of `cut_normal`."""
+    """Inclination [rad] drawn from `cut_normal` by inversion."""
     low, high = cut_normal_bounds(R, mean, deviation)
     theta = mean + deviation * R(_SQRT_2) * erfinv(R, low + u * (high - low))
     return min(max(theta, R(-_HALF_PI)), R(_HALF_PI))
@@ -121,7 +125,7 @@ def sample_direction(R, row, ox, oy, oz, u0, u1, u2):
     mean_v, deviation_v, narrow_v = inclination_lobe(R, row[VOLUME_WIDTH], ox, cos_o)
     by_cosine, even, volume = lobe_shares(R, row, cos_o, narrow_s, narrow_v)
     turn = R(2) * u2 - R(1)
-    # The integral of cos(phi_d/2)/4 is (1 + sin(phi_d/2))/2.
+    # The cumulative distribution of cos(phi_d/2)/4 is (1 + sin(phi_d/2))/2.
     around = R(2) * asin(R, turn) if u0 < by_cosine else R(math.pi) * turn
     if u0 < by_cosine + even:
         theta = sample_cut_normal(R, mean_s, deviation_s, u1)

@@ -1,4 +1,4 @@
-"""Threads as rows of numbers: constants computed once, in float64, for the kernels to read."""
+"""Pack threads into rows of numbers: the constants that kernels read, computed once in float64."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ Reals = NDArray[Any]
 
 
 def pack_threads(fabric: Fabric, precision: type[np.floating[Any]] = np.float64) -> Reals:
-    """(k, COLUMNS) table of the fabric's threads, each with the model that the fabric gives it."""
+    """(k, COLUMNS) table of the fabric's threads, each with the model that it has in the fabric."""
     rows = [thread_row(t, fabric.model_of(t)) for t in fabric.thread_list]
     return np.ascontiguousarray(rows, dtype=precision)
 
 
 def thread_row(thread: Thread, name: str) -> NDArray[np.float64]:
-    """(COLUMNS,) float64 of one thread evaluated by the model called `name`: see `columns`."""
+    """(COLUMNS,) float64 row of one thread evaluated by the model called `name`; see `columns`."""
     model = named(name)
     row = np.zeros(column.COLUMNS)
     albedo = np.minimum(np.array(thread.albedo), model.most_albedo)
@@ -42,7 +42,7 @@ def thread_row(thread: Thread, name: str) -> NDArray[np.float64]:
     if model.transmission is not None:
         through = model.transmission(thread)
         _fill(row, column.TRANSMISSION, through)
-        # A surface that reflects everything lets nothing in: T/T_max is 0, not 0/0.
+        # A surface that reflects everything transmits nothing; T/T_max is then 0 instead of 0/0.
         largest = float(through.max())
         row[column.INVERSE_T_MAX] = 1.0 / largest if largest > 0 else 0.0
     if model.completion is not None:

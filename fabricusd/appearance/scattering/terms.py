@@ -1,7 +1,7 @@
-"""What one thread scatters: the surface and the volume term of its model, as kernels.
+"""Kernels for the surface and the volume term of a thread, whichever model it has.
 
-Each model is a module of `scattering.models`; here their parts are put together, chosen by the
-number in a row's column MODEL. See `model.ThreadModel` for what a term is.
+Each model is a module of `scattering.models`. This module combines their parts and selects them by
+the number in the column MODEL of a row. `model.ThreadModel` defines the terms.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ def _no_table(R, row, cos_i, cos_o):
 
 
 def _parts(name: str, numbers: Iterable[int]) -> Any:
-    """A kernel (R, model, row, ...) for one field of `ThreadModel`."""
+    """A kernel (R, model, row, ...) that selects one field of `ThreadModel` by the model's
+    number."""
     return by_number({k: getattr(REGISTRY[k], name) or _no_table for k in numbers})
 
 
@@ -40,13 +41,13 @@ cell_lobes = _parts("cell_lobes", CELL_MODELS)
 _conserving_factors = _parts("factors", CONSERVING_MODELS)
 _conserving_lobes = _parts("lobes", CONSERVING_MODELS)
 _conserving_looked_up = _parts("looked_up", CONSERVING_MODELS)
-"""Each takes (R, model, row, ...), as in `ThreadModel`; kernels that serve one law choose among its
-models alone, which keeps the others' code out of them."""
+"""Each of these takes (R, model, row, ...) as in `ThreadModel`. Kernels that serve one law select
+among the models of that law only, so they do not contain the code of the others."""
 
 
 @njit(**INLINE)
 def terms_at(R, row, sin_i, cos_i, sin_o, cos_o, cos_half):
-    """(surface, volume) [1/sr] of the model that the row names, from the angles' sines and cosines.
+    """(surface, volume) [1/sr] of the row's model, from the sines and cosines of the angles.
 
     row : (COLUMNS,) of the thread table
     """
@@ -59,7 +60,8 @@ def terms_at(R, row, sin_i, cos_i, sin_o, cos_o, cos_half):
 
 @njit(**INLINE)
 def pair_angles(R, iy, iz, oy, oz):
-    """(cos theta_i, cos theta_o, cos(phi_d/2)) of two directions' y and z in the thread frame."""
+    """(cos theta_i, cos theta_o, cos(phi_d/2)) from y and z of two directions in the thread
+    frame."""
     cos_i = cos_inclination(R, iy, iz)
     cos_o = cos_inclination(R, oy, oz)
     sin_phi_i, cos_phi_i = unit_azimuth(R, iy, iz, cos_i)

@@ -1,1 +1,1 @@
-"""Heights of the threads, and the shadows they throw on one another."""
+"""The height field of the threads, and the shadows that they cast on one another."""

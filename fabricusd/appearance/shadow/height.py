@@ -1,9 +1,10 @@
-"""The height field of the repeat, and the ray that is marched through it exactly.
+"""The height field of the repeat, and an exact ray march through it.
 
-A point's height is the height of its thread's axis plus half the thread's thickness, flat across
-the thread (level `weave`) or times sqrt(1 - w^2) (level `thread`). Gaps and pile have no height:
-they hide nothing. Along a straight line every visible stretch of thread has a closed form, so the
-march steps from stretch to stretch and misses nothing between. `docs/model.md` sections 3 and 5.
+The height of a point is the height of its thread's axis plus half the thickness of the thread:
+constant across the thread (level `weave`) or times sqrt(1 - w^2) (level `thread`). Gaps and pile
+have no height and hide nothing. Along a straight line every visible segment of thread has a closed
+form, so the march steps from segment to segment and misses nothing in between. Source:
+`docs/model.md` sections 3 and 5.
 """
 
 from __future__ import annotations
@@ -23,19 +24,21 @@ from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE, PART
 
 CELLS = 512
-"""Cells that a march crosses at most: light a quarter of a degree above the cloth clears the
-highest thread of the published fabrics within 40."""
+"""Largest number of cells that a march crosses. Light a quarter of a degree above the cloth clears
+the highest thread of the published fabrics within 40 cells."""
 
 NEAREST = 1e-4
-"""Of a pitch: the march begins this far from its point, where the slope to the next point of the
-same thread is still resolved in float32 and is the tangent to within the curve's bend."""
+"""Distance from its point at which a march begins, as a fraction of a pitch. At this distance
+float32 still resolves the slope to the next point of the same thread, and the slope is the tangent
+to within the bend of the curve."""
 
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 @njit(**INLINE)
 def crown_of(R, cloth, rounded, which, thread, w):
-    """Height [m] of a thread's visible side over its axis at `w`, flat or round."""
+    """Height [m] of a thread's visible side above its axis at `w`; round if `rounded`, else
+    flat."""
     if rounded != 0:
         return crown_on(R, cloth, which, thread, w)
     return cloth.half_thickness[which, thread]
@@ -45,12 +48,13 @@ def crown_of(R, cloth, rounded, which, thread, w):
 def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first):
     """Slope of the steepest line from a point at height `h` [m] to the height field, at least `k`.
 
-    u, v : weave coordinates of the point; dx, dy : unit direction on the cloth, metres along U, V
-    which, crown : the point's thread set and `crown_of` there. Along its own thread the march takes
-        the round for flat at that height: a thread's far side is dark because `f_s` says so, and g
-        must not say it again.
-    highest : no point of the field is higher [m]
-    first : return at the first slope above `k`: enough to know whether light at slope `k` arrives
+    u, v : weave coordinates of the point
+    dx, dy : unit direction on the cloth, in metres along U and V
+    which, crown : the thread set of the point and `crown_of` there. Along the point's own thread
+        the march treats the thread as flat at that height: `f_s` already darkens the far side of a
+        round thread, and g must not darken it again.
+    highest : upper bound on the height of the field [m]
+    first : return at the first slope above `k`, which tells whether light at slope `k` is blocked
     """
     du, dv = dx / float(cloth.pitch[WARP]), dy / float(cloth.pitch[WEFT])
     nearest = NEAREST * min(float(cloth.pitch[WARP]), float(cloth.pitch[WEFT]))
@@ -75,7 +79,7 @@ def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first):
 
 @njit(**INLINE)
 def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h, k):
-    """`steepest` over the threads seen in one cell, distances t0 to t1 [m]."""
+    """`steepest` over the visible threads of one cell, between the distances t0 and t1 [m]."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
     warp = int(cloth.sequence[WARP, wrap(end, cloth.sequence_length[WARP])])
     weft = int(cloth.sequence[WEFT, wrap(pick, cloth.sequence_length[WEFT])])
@@ -125,7 +129,8 @@ def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h
 
 @njit(**INLINE)
 def _within(x, x_t, low, high, t0, t1):
-    """The part of [t0, t1] with x + x_t t from `low` to `high`; empty where its end is less."""
+    """The part of [t0, t1] in which x + x_t t is in [low, high]; empty if its end is the
+    smaller."""
     if x_t == 0.0:
         if low <= x <= high:
             return t0, t1
@@ -136,7 +141,10 @@ def _within(x, x_t, low, high, t0, t1):
 
 @njit(**INLINE)
 def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w_t):
-    """`steepest` over a stretch of thread: distances a to b [m], position s + s_t t, w + w_t t."""
+    """`steepest` over a segment of thread between the distances a and b [m].
+
+    At distance t the position along the run is s + s_t t, and across the thread w + w_t t.
+    """
     if not b > a:
         return k
     pieces = cloth.curve_start.shape[1]
@@ -145,7 +153,8 @@ def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w
         if low >= 1.0:
             break
         high = min(1.0, float(cloth.curve_start[thread, p + 1])) if p + 1 < pieces else 1.0
-        # Stretch to both ends: rounding must not open a seam there.
+        # Extend the first and the last piece, so that rounding opens no seam at the ends of the
+        # run.
         low = -1.0 if p == 0 else low
         high = 2.0 if high >= 1.0 else high
         t0, t1 = _within(s, s_t, low, high, a, b)
@@ -161,8 +170,8 @@ def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w
         if bend == 0.0 or s_t == 0.0:
             continue
         for _ in range(3):
-            # Highest above the line of slope k where the thread runs parallel to it; raising k to
-            # the slope found there is Newton's method on the tangent from the point.
+            # The thread is highest above the line of slope k where it is parallel to the line.
+            # Raising k to the slope found there is Newton's method for the tangent from the point.
             angle = -math.atan(k / (length * s_t))
             turn = (
                 float(cloth.curve_start[thread, p])
@@ -188,10 +197,10 @@ def _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t):
 
 @njit(**PART)
 def _summit(cloth, thread, p, half, h, length, s, s_t, w, w_t, t0, t1, k):
-    """Where a round thread stands highest above the line of slope `k`, by golden section.
+    """Distance [m] at which a round thread is highest above the line of slope `k`.
 
-    Crown and hump are both concave, so there is one summit; a valley's highest points are its ends,
-    which the caller asks too.
+    Golden-section search is valid because crown and hump are both concave, so there is one summit.
+    In a valley the highest points are the ends, which the caller tests as well.
     """
     low, high = t0, t1
     left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
@@ -214,11 +223,13 @@ def _summit(cloth, thread, p, half, h, length, s, s_t, w, w_t, t0, t1, k):
 
 
 def highest_point(fabric: Fabric, cloth: CompiledFabric) -> float:
-    """Height of the highest thread of the repeat, half its thickness included [m]; 0 if all pile.
+    """Height [m] of the highest thread of the repeat, with half its thickness; 0 if all are pile.
 
-    cloth : `fabric` compiled; its run tables are used. A type counts at every length of visible run
-    that it can meet: places of the grid meet those places of the sequence that leave the same
-    remainder by their greatest common divisor.
+    cloth : `fabric` compiled; its run tables are used
+
+    Each type is tested with every length of visible run that it can have: a thread of the grid
+    meets those places of the sequence that have the same remainder modulo their greatest common
+    divisor.
     """
     found = 0.0
     peaks = [peak(t.curve) for t in fabric.thread_list]
@@ -236,8 +247,11 @@ def highest_point(fabric: Fabric, cloth: CompiledFabric) -> float:
 
 
 def _longest_runs(cloth: CompiledFabric, which: int) -> list[tuple[NDArray[np.int64], float]]:
-    """Longest visible run of each thread of a set, in cells, with the share of a cell that shows:
-    once on top and, where the set is seen underneath, once there."""
+    """(longest visible run of each thread [cells], visible share of a cell) for the threads of a
+    set.
+
+    There is one entry for runs on top and, if the set is seen underneath, another for those.
+    """
     axis = 1 if which == WARP else 0
     on_top = cloth.grid == which
     answer = []
@@ -255,8 +269,9 @@ def height_field(
 ) -> NDArray[np.float64]:
     """Heights [m] at the centres of `resolution` texels over one grid repeat, indexed [u, v].
 
-    level : "weave", threads flat across their width, or "thread", round. Gaps and pile are 0, the
-    height that a straight thread's axis has.
+    level : "weave" for threads that are flat across their width, or "thread" for round ones
+
+    Gaps and pile have the height 0, which is the height of a straight thread's axis.
     """
     if min(resolution) < 1:
         raise FabricError("resolution", f"is {resolution}; it must be at least 1 by 1")
@@ -275,7 +290,7 @@ def height_field(
 
 
 def level_is_round(level: str) -> int:
-    """1 for level "thread", where threads are round, 0 for "weave", where they are flat."""
+    """1 for level "thread", with round threads; 0 for level "weave", with flat ones."""
     if level not in ("weave", "thread"):
         raise FabricError("level", f"is '{level}'; it must be 'weave' or 'thread'")
     return int(level == "thread")

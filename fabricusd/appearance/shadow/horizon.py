@@ -1,9 +1,9 @@
-"""The horizon table: elevation of the horizon by place on a thread and azimuth, [Max1988].
+"""Build the horizon table: the elevation of the horizon by place on a thread and azimuth [Max1988].
 
-Texels lie on the visible threads, not on a raster over the cloth: a raster would average across
-every edge between a high thread and a low one. A cell has a slot for the thread on top and, where
-the coverage shows the set underneath, one for it. Azimuths are even in the diamond angle, which
-needs no arctangent. `horizon_lookup` reads the table.
+The texels lie on the visible threads instead of on a raster over the cloth, because a raster would
+average across every edge between a high thread and a low one. Each cell has a slot for the thread
+on top and, if the coverage shows the set underneath, a second slot for it. Azimuths are evenly
+spaced in the diamond angle, which needs no arctangent. `horizon_lookup` reads the table.
 """
 
 from __future__ import annotations
@@ -27,23 +27,27 @@ from fabricusd.kernels.real import KERNEL, PART
 
 AZIMUTHS = 16
 TEXELS = (8, 4)
-"""Texels along and across a thread in one cell. See docs/shadowing.md for what finer ones bring."""
+"""Texels along and across a thread in one cell. docs/shadowing.md shows the gain of finer
+texels."""
 
 MOST_BYTES = 2**25
-"""Largest horizon table, 256 x 256 cells at the usual size: half a minute's work to fill."""
+"""Size of the largest horizon table: 256 x 256 cells at the default size, filled in half a
+minute."""
 
 ELEVATIONS = 16
-"""Rows of the table of the mean of `g`."""
+"""Number of rows of the table of the mean of `g`."""
 
 MOST_CELLS = 256
-"""Cells that the mean of `g` is taken over."""
+"""Largest number of cells over which the mean of `g` is taken."""
 
 LEAST_LIGHT = 0.1
-"""Least mean of `g`: at the horizon it falls to 0, and `g` over its mean would have no bound. A set
-that lies in the shade of the other but for a few places is not made up for by these."""
+"""Lower bound on the mean of `g`. The mean falls to 0 at the horizon, where `g` over its mean would
+be unbounded. A set that lies in the shade of the other except at a few places is not compensated by
+brightening those places."""
 
 LOWEST = math.tan(math.radians(0.25))
-"""Slope below which a horizon counts as level: half the sun's disc."""
+"""Slope below which a horizon counts as level: that of a quarter of a degree, half the sun's
+disc."""
 
 
 def horizon_table(
@@ -54,12 +58,14 @@ def horizon_table(
     azimuths: int,
     texels: tuple[int, int],
 ) -> NDArray[np.uint8] | None:
-    """(I, J, slots, along, across, azimuths) sine of the horizon's elevation, 255 for 1.
+    """(I, J, slots, along, across, azimuths) sine of the horizon's elevation, with 255 for 1.
 
-    None for a repeat whose table would be larger than MOST_BYTES.
+    The result is None if the table of the repeat would be larger than MOST_BYTES.
 
-    cloth : `fabric` in float64. The table repeats as the threads' *shapes* do: types that differ in
-    colour alone do not lengthen it.
+    cloth : `fabric` in float64
+
+    The table has the period of the threads' *shapes*: types that differ in colour only do not
+    lengthen it.
     """
     if azimuths < 16 or azimuths % 4:
         raise FabricError("azimuths", f"is {azimuths}; it must be a multiple of 4, at least 16")
@@ -78,7 +84,7 @@ def horizon_table(
 
 
 def shape_repeat(fabric: Fabric) -> tuple[int, int]:
-    """Ends and picks after which the height field repeats."""
+    """Number of ends and of picks after which the height field repeats."""
     shapes = [(t.curve, t.thickness) for t in fabric.thread_list]
     lengths = []
     for count, sequence in (
@@ -96,7 +102,7 @@ def shape_repeat(fabric: Fabric) -> tuple[int, int]:
 
 
 def _diamond_directions(azimuths: int) -> NDArray[np.float64]:
-    """(azimuths, 2) unit directions, even in the diamond angle from +U over +V."""
+    """(azimuths, 2) unit directions, evenly spaced in the diamond angle, from +U towards +V."""
     quadrant, f = np.divmod(np.arange(azimuths) * (4.0 / azimuths), 1.0)
     x, y = 1.0 - f, f
     for turn in range(1, 4):
@@ -108,7 +114,7 @@ def _diamond_directions(azimuths: int) -> NDArray[np.float64]:
 
 @njit(parallel=True, **KERNEL)
 def _fill(cloth, rounded, highest, directions, cells, entries):
-    """The horizon at the centre of every texel of each of cells (n, 2), in every direction."""
+    """Compute the horizon at the centre of every texel of `cells` (n, 2), in every direction."""
     count, slots, rows, columns, azimuths = entries.shape
     for cell in prange(count):
         i, j = cells[cell, 0], cells[cell, 1]
@@ -142,12 +148,12 @@ def mean_light(
     softness: float,
     table: NDArray[np.uint8] | None,
 ) -> NDArray[np.float64]:
-    """(2, ELEVATIONS, azimuths + 1) share of the light on each set's threads that `g` lets arrive.
+    """(2, ELEVATIONS, azimuths + 1) mean of `g` over the threads of each set, at least LEAST_LIGHT.
 
-    Each place counts by the light that its slope would catch, max(n_t.wi, 0). Rows are even in the
-    square root of the sine of the light's elevation, columns in the diamond angle, the last being
-    the first again. Read off the horizon table, or off cells of it that are filled for this where
-    `table` is None; at most MOST_CELLS of them. Not below LEAST_LIGHT.
+    Each place is weighted by the light that it would catch unshadowed, max(n_t.wi, 0). Rows are
+    evenly spaced in the square root of the sine of the light's elevation, columns in the diamond
+    angle; the last column repeats the first. The mean is taken over at most MOST_CELLS cells of the
+    horizon table; if `table` is None, these cells are computed for the purpose.
     """
     repeat = shape_repeat(fabric)
     number = np.arange(math.prod(repeat))
@@ -164,7 +170,7 @@ def mean_light(
     azimuths = entries.shape[-1]
     normal, area, sets = _texel_normals(cloth, cells, entries.shape[1:4])
     sine = entries.reshape(-1, azimuths) / 255.0
-    # Not quite level: flat threads catch nothing of that.
+    # The lowest light is not quite level, because flat threads catch no level light.
     z = np.maximum(np.linspace(0.0, 1.0, ELEVATIONS) ** 2, 1e-3)
     found = np.empty((2, ELEVATIONS, azimuths + 1))
     for a, direction in enumerate(_diamond_directions(azimuths)):
@@ -177,7 +183,7 @@ def mean_light(
             for which in (WEFT, WARP):
                 total = float(caught[sets == which].sum())
                 found[which, row, a] = let[sets == which].sum() / total if total > 0 else 1.0
-    # Straight down nothing is in the way, whatever the edge's width makes of a steep place.
+    # Nothing blocks light from the zenith, even where the soft edge darkens a steep place.
     found[:, -1] = 1.0
     found[:, :, azimuths] = found[:, :, 0]
     return np.maximum(found, LEAST_LIGHT)
@@ -186,7 +192,8 @@ def mean_light(
 def _texel_normals(
     cloth: CompiledFabric, cells: NDArray[np.int64], shape: tuple[int, ...]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """(texels, 3) normals n_t of the threads at the table's texels, (texels,) areas and sets."""
+    """(texels, 3) normals n_t of the threads at the table's texels, and (texels,) areas and
+    sets."""
     texels = len(cells) * math.prod(shape)
     psi0, sets, area = np.zeros(texels), np.zeros(texels, np.int64), np.zeros(texels)
     _describe_texels(cloth, cells, shape, psi0, sets, area)
@@ -198,7 +205,7 @@ def _texel_normals(
 
 @njit(**KERNEL)
 def _describe_texels(cloth, cells, shape, psi0, sets, area):
-    """Tangent angle [rad], set and area in cells of each texel; area 0 where none is seen."""
+    """Compute tangent angle [rad], set and area [cells] of each texel; the area is 0 if unseen."""
     slots, rows, columns = shape
     k = 0
     for cell in range(cells.shape[0]):
@@ -220,7 +227,7 @@ def _describe_texels(cloth, cells, shape, psi0, sets, area):
 
 @njit(**PART)
 def _texel_centre(cloth, i, j, slot, along, across):
-    """Weave coordinates of a place on a slot's thread, and whether that thread is seen at all."""
+    """(u, v, seen): weave coordinates of a place on a slot's thread, and whether it is visible."""
     top = int(cloth.grid[i % cloth.grid.shape[0], j % cloth.grid.shape[1]])
     width = float(cloth.width[top])
     if slot == 0:
@@ -238,7 +245,7 @@ def _texel_centre(cloth, i, j, slot, along, across):
 
 @njit(parallel=True, **KERNEL)
 def _compare(cloth, rounded, highest, table, uv, angle, out):
-    """Elevation of the table minus that of the march [rad]; NaN where nothing casts shadows."""
+    """Compute the table's elevation minus that of the march [rad]; NaN in gaps and on pile."""
     for k in prange(uv.shape[0]):
         which, thread, s, w, _, length = find(np.float64, cloth, uv[k, 0], uv[k, 1])
         out[k] = np.nan
@@ -256,10 +263,10 @@ def _compare(cloth, rounded, highest, table, uv, angle, out):
 def horizon_error(
     cloth: CompiledFabric, rounded: int, highest: float, table: NDArray[np.uint8]
 ) -> float:
-    """How wide the table's own edge is [rad]: median error of its elevation, at least 1 degree.
+    """Softness [rad] that hides the table's error: twice the median error, at least 1 degree.
 
-    Measured against the march at fixed places; the median, because at the foot of a thread every
-    table is wrong by a right angle on a stretch of no width.
+    The error of the elevation is measured against the march at fixed places. The median is used
+    because, at the foot of a thread, every table is wrong by a right angle over a vanishing width.
     """
     least = math.radians(1.0)
     if not highest > 0:

@@ -1,6 +1,7 @@
-"""Reading the horizon table at a block of places, in loops that LLVM vectorises.
+"""Read the horizon table at a block of places, in loops that LLVM vectorises.
 
-The rows of a block are `place_blocks`'; the interpolation is `horizon_lookup.horizon_at`'s.
+The rows of a block are those of `place_blocks`; the interpolation is that of
+`horizon_lookup.horizon_at`.
 """
 
 from __future__ import annotations
@@ -28,17 +29,18 @@ from fabricusd.kernels.real import BLOCK, PART, index
 
 @njit(**PART)
 def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
-    """Where in the flat table each of a block of places reads, and the three shares it mixes.
+    """Compute the indices into the flat table and the three weights for a block of places.
 
-    wi : (3, n), the block's from `begin` on. Fills the rows FIRST, SECOND (of both azimuths) and
-    SHARES.
+    wi : (3, n), of which the block uses the columns from `begin` on
+
+    The indices for both azimuths go to the rows FIRST and SECOND, the weights to SHARES.
     """
     rows, columns, azimuths = table.shape[3], table.shape[4], table.shape[5]
     picks, slots = table.shape[1], table.shape[2]
     weft_width, warp_width = cloth.width[WEFT], cloth.width[WARP]
     for k in range(size):
         p, q, top, which = reals[X + k], reals[Y + k], ints[TOP + k], ints[OF_SET + k]
-        # A gap, and what is not a number, reads somewhere; the caller has its answer already.
+        # In a gap or for NaN the texel is arbitrary: the caller does not use the result.
         sound = p >= R(0) and which != GAP
         warp = top == WARP
         along, over = (q, p) if warp else (p, q)
@@ -66,7 +68,7 @@ def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
 
 @njit(**PART)
 def mix_texels(R, texels, columns, azimuths, size, ints, reals):
-    """The horizon's sine at a block of places, from the flat table, into the row LIT."""
+    """Interpolate the horizon's sine at a block of places in the flat table, into the row LIT."""
     step = np.uintp(columns * azimuths)
     beside = np.uintp(azimuths)
     for k in range(size):

@@ -1,8 +1,8 @@
-"""Reading the horizon table at one place; `texel_blocks` reads it at a block of them.
+"""Read the horizon table at one place; `horizon_blocks` reads it at a block of places.
 
-The azimuth is the diamond angle: from 0 to 4, one per quadrant, linear in `y/(|x| + |y|)` inside
-it. Between texels and azimuths the *sine* of the elevation is interpolated, which is what the light
-is compared with.
+The azimuth is the diamond angle: it goes from 0 to 4, 1 per quadrant, and is linear in
+`y/(|x| + |y|)` inside a quadrant. The *sine* of the elevation, with which the light is compared, is
+interpolated between texels and azimuths.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from fabricusd.kernels.real import INLINE
 
 @njit(**INLINE)
 def diamond(R, x, y):
-    """Azimuth of (x, y) from 0 to 4: one per quadrant, linear in y/(|x| + |y|) inside it."""
+    """Diamond angle of (x, y), from 0 to 4: 1 per quadrant, linear in y/(|x| + |y|) inside it."""
     part = x / max(abs(x) + abs(y), R(1e-30))
     return R(1) - part if y >= R(0) else R(3) + part
 
 
 @njit(**INLINE)
 def cell_of_texels(R, place, count):
-    """Lower of the two texels around `place` in [0, 1], and the share of the upper one."""
+    """The lower of the two texels around `place` in [0, 1], and the weight of the upper one."""
     x = max(R(0), min(place * R(count) - R(0.5), R(count - 1)))
     k = min(int(x), count - 2)
     return k, x - R(k)
@@ -34,14 +34,15 @@ def cell_of_texels(R, place, count):
 
 @njit(**INLINE)
 def _between(R, table, i, j, slot, row, column, first, second, c):
-    """A texel's horizon between two azimuths, c of the way from the first."""
+    """A texel's horizon, interpolated from the azimuth `first` to `second` by c in [0, 1]."""
     low = R(table[i, j, slot, row, column, first])
     return low + (R(table[i, j, slot, row, column, second]) - low) * c
 
 
 @njit(**INLINE)
 def split_table(table, u, v):
-    """Cell of the table at weave coordinates, float64; where they are not sound, the first one."""
+    """Cell of the table at weave coordinates (float64); the first cell if they are not finite or
+    lie beyond FARTHEST."""
     sound = abs(u) <= FARTHEST and abs(v) <= FARTHEST
     return (
         wrap(np.floor(u) if sound else 0.0, table.shape[0]),
@@ -51,14 +52,14 @@ def split_table(table, u, v):
 
 @njit(**INLINE)
 def horizon_at(R, cloth, table, u, v, which, x, y):
-    """Sine of the horizon's elevation at (u, v) on the thread of set `which` towards (x, y)."""
+    """Sine of the horizon's elevation towards (x, y), seen from (u, v) on the thread of `which`."""
     i, j, _, _, p, q = split(R, cloth, u, v)
     in_u, in_v = split_table(table, u, v)
     top = int(cloth.grid[i, j])
     along, over = (q, p) if top == WARP else (p, q)
     width = cloth.width[top]
     on_top = which == top
-    # Selections, not branches: neither thread nor azimuth can be predicted.
+    # Select instead of branching: neither the thread nor the azimuth can be predicted.
     seen = (over if over < R(0.5) else over - width) / max(R(1) - width, cloth.tiny)
     across = ((over if on_top else along) - R(0.5)) / (width if on_top else cloth.under_width)
     slot = 0 if on_top else table.shape[2] - 1
@@ -81,12 +82,12 @@ def horizon_at(R, cloth, table, u, v, which, x, y):
 
 @njit(**INLINE)
 def soft_edge(R, above, softness):
-    """A smooth step from 0 to 1 over `softness`, in how far the light stands above the horizon."""
+    """A smooth step from 0 to 1 of width `softness`, in the light's elevation above the horizon."""
     t = max(R(0), min(R(1), above / softness + R(0.5)))
     return t * t * (R(3) - R(2) * t)
 
 
 @njit(**INLINE)
 def above_horizon(R, sine, flat, z):
-    """Sine of the angle from the horizon up to light of elevation (flat, z)."""
+    """Sine of the angle from the horizon up to light with the elevation atan2(z, flat)."""
     return z * math.sqrt(max(R(0), R(1) - sine * sine)) - flat * sine

@@ -1,17 +1,17 @@
-"""Thread-to-thread shadowing: four answers to "does this light reach this point of the weave?".
+"""Thread-to-thread shadowing: four methods to decide whether light reaches a point of the weave.
 
-`g(x, wi)` from 0 to 1, `docs/model.md` section 5. Every method reads the same height field, and
-each is 1 on pile, which has none, and 0 for light at or below the cloth:
+Each method computes `g(x, wi)` in [0, 1], `docs/model.md` section 5, from the same height field.
+`g` is 1 on pile, which has no height field, and 0 for light at or below the cloth:
 
-none    : 1, the neighbouring threads are left to the masking term
+none    : 1; the effect of neighbouring threads is left to the masking term
 peak    : the nearest of the highest points is the horizon in every direction, [Bisker2011] 5.2.3
-horizon : a table of the horizon by place on the thread and azimuth, [Max1988]; marched instead
-          where the repeat is too large for a table
-traced  : the height field is marched along the ray, the answer that the others are measured by
+horizon : a table of the horizon by place on the thread and azimuth, [Max1988]; repeats too large
+          for a table are traced instead
+traced  : the height field is marched along the ray; the reference for the other methods
 
-What a cloth sends back is multiplied by `shade`. By `peak` that is `g`, as the thesis has it. By
+The value of the cloth is multiplied by `shade`. For `peak`, `shade` is `g`, as in the thesis. For
 `horizon` and `traced` it is `g` over its mean over the threads of the same set: the masking term
-already holds the mean of this shade, and `g` says where it falls. See docs/decisions/004.
+already contains the mean shadow, and `g` only says where it falls. See docs/decisions/004.
 """
 
 from __future__ import annotations
@@ -64,31 +64,31 @@ METHODS = ("none", "peak", "horizon", "traced")
 NONE, PEAK, HORIZON, TRACED = range(4)
 
 TRACED_SOFTNESS = 1e-3
-"""Width [rad] of the edge with which the mean of the marched `g` is taken; its own is hard."""
+"""Width [rad] of the soft edge used for the mean of `traced`; the marched `g` has a hard edge."""
 
 PEAK_SOFTNESS = math.radians(5.0)
-"""Width of the edge of a `peak` shadow. The horizon it asks about is a guess; a sharper edge would
-only alias."""
+"""Width [rad] of the edge of a `peak` shadow. The horizon of `peak` is a guess, and a sharper edge
+would only alias."""
 
 SEARCH = 64
-"""Cells around a point in which `peak` looks for the highest point; beyond it the horizon of every
-published fabric is under a quarter of a degree."""
+"""Radius [cells] in which `peak` searches for the highest point. Beyond it, the horizon of every
+published fabric is below a quarter of a degree."""
 
 
 class Shadow(NamedTuple):
-    """What a shadowing method needs beside the compiled fabric.
+    """The tables that a shadowing method needs in addition to the compiled fabric.
 
     method : int - NONE, PEAK, HORIZON or TRACED
-    rounded : int - 1 where threads are round across their width (level `thread`)
+    rounded : int - 1 if threads are round across their width (level `thread`)
     highest : real - greatest height of the field [m]
-    softness : real - width of the shadow's edge in the light's elevation [rad]; `traced` has none
-    crest_first, crest_last : (k, q) real - stretches of each type's run as high as its peak, empty
-        where the last is less than the first
+    softness : real - width of the shadow's edge in the light's elevation [rad]; unused by `traced`
+    crest_first, crest_last : (k, q) real - intervals of each type's run that are as high as its
+        peak; an interval is empty if its last position is less than its first
     crest_height : (k,) real - height there, in run lengths
     table : (I, J, slots, along, across, azimuths) uint8 - sine of the horizon's elevation times
-        255, see `horizon`; one zero for the other methods
-    texels : the same memory in one row
-    mean : (2, elevations, azimuths + 1) real - what `shade` divides by on each set, see
+        255, see `horizon`; a single zero for the other methods
+    texels : the same memory as a one-dimensional array
+    mean : (2, elevations, azimuths + 1) real - the divisor of `shade` on each set, see
         `horizon.mean_light`; ones for `none` and `peak`
     """
 
@@ -116,13 +116,14 @@ def compile_shadow(
 ) -> Shadow:
     """The tables of shadowing `method`, one of METHODS, for `fabric`.
 
-    level : "weave" or "thread", whether threads are flat or round across their width
-    softness : angular width of the light, over which a shadow's edge is spread [rad]; None takes
-        the table's own error for `horizon` and PEAK_SOFTNESS for `peak`
-    azimuths, texels : size of the horizon table, directions and (along, across) a thread in a cell
+    level : "weave" for threads that are flat across their width, "thread" for round ones
+    softness : angular width of the light [rad], over which a shadow's edge is spread; None takes
+        `horizon_error` for `horizon` and PEAK_SOFTNESS for `peak`
+    azimuths, texels : size of the horizon table: directions, and texels (along, across) a thread in
+        one cell
 
-    A repeat too large for a horizon table, a figured cloth of hundreds of ends and picks, is traced
-    instead: the answer's `method` is then TRACED, which is slower and nearer to the truth.
+    A repeat that is too large for a horizon table, such as a figured cloth of hundreds of ends and
+    picks, is traced instead: `method` is then TRACED, which is slower and more exact.
     """
     if method not in METHODS:
         raise FabricError("shadow", f"is '{method}'; it must be one of {', '.join(METHODS)}")
@@ -172,7 +173,8 @@ def mean_lit(R, shadow, which, x, y, z):
 
 @njit(**INLINE)
 def _cell_of_mean(R, shadow, x, y, z):
-    """(row, column) of the mean's table for light from (x, y, z), and the shares of the next."""
+    """(row, column) in the table of means for light from (x, y, z), and weights of the next
+    ones."""
     rows, columns = shadow.mean.shape[1], shadow.mean.shape[2]
     e = math.sqrt(min(max(z, R(0)), R(1))) * R(rows - 1)
     turn = diamond(R, x, y) * R(0.25 * (columns - 1))
@@ -182,7 +184,7 @@ def _cell_of_mean(R, shadow, x, y, z):
 
 @njit(**INLINE)
 def _between_means(shadow, which, row, column, a, b):
-    """The mean between four entries of its set's table; in a gap it is nobody's."""
+    """The mean interpolated between four entries of its set's table; arbitrary in a gap."""
     k = np.uintp(1 if which == WARP else 0)
     ahead, beside = row + np.uintp(1), column + np.uintp(1)
     low = shadow.mean[k, row, column]
@@ -194,9 +196,9 @@ def _between_means(shadow, which, row, column, a, b):
 
 @njit(**INLINE)
 def shade(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
-    """What the value at a point is multiplied by for light from (x, y, z): see the module's text.
+    """The factor of the value at a point for light from (x, y, z); see the module's docstring.
 
-    Arguments as for `lit`.
+    The arguments are those of `lit`.
     """
     g = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
     if shadow.method < HORIZON or not g > R(0):
@@ -206,11 +208,12 @@ def shade(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
 
 @njit(**INLINE)
 def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
-    """Share of light from direction (x, y, z) in the surface frame that reaches a point: `g`.
+    """`g`: the share of light from direction (x, y, z) of the surface frame that reaches a point.
 
-    u, v : weave coordinates, float64; the next five are what `weave.find` gave there
+    u, v : weave coordinates, float64
+    which, thread, s, w, length : what `weave.find` returns at (u, v)
 
-    What is not a number stays so, and never indexes a table.
+    NaN in the arguments gives NaN, and never indexes a table.
     """
     flat = math.sqrt(x * x + y * y)
     if not (s >= R(0) and flat < R(2) and z < R(2)):
@@ -226,11 +229,11 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
         return soft_edge(R, above_horizon(R, sine, flat, z), shadow.softness)
     axis = height_on(R, cloth, thread, s, length)
     if shadow.method == PEAK:
-        # [Bisker2011] gives a place on the thread one height, whatever the level: no round here.
+        # [Bisker2011] gives a place on the thread one height at every level, so threads are flat.
         drop = shadow.highest - axis - cloth.half_thickness[which, thread]
         if drop <= R(1e-6) * shadow.highest:
             return R(1)
-        # No horizon lower than this one can touch the shadow's edge.
+        # A horizon lower than this one cannot reach the soft edge of the shadow.
         lowest = max(z / flat - shadow.softness * (R(1) + z * z / (flat * flat)), R(1e-6))
         distance = R(_to_crest(cloth, shadow, u, v, float(drop / lowest)))
         reach = math.sqrt(drop * drop + distance * distance)
@@ -247,7 +250,8 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
 
 @njit(**PART)
 def _to_crest(cloth, shadow, u, v, most):
-    """Distance on the cloth [m] to the nearest of the highest points, at most `most`."""
+    """Distance on the cloth [m] to the nearest of the highest points, or `most` if it is
+    farther."""
     end, pick = np.floor(u), np.floor(v)
     pitch_u, pitch_v = float(cloth.pitch[WARP]), float(cloth.pitch[WEFT])
     best = most
@@ -263,7 +267,7 @@ def _to_crest(cloth, shadow, u, v, most):
 
 @njit(**PART)
 def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
-    """The smaller of `best` and the distance [m] to the highest points in one cell."""
+    """The smaller of `best` and the distance [m] to the highest points of one cell."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
     top = int(cloth.grid[i, j])
     width = float(cloth.width[top])
@@ -307,9 +311,10 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
 
 @njit(**PART)
 def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
-    """`lit` by the horizon table at a block of places that `look_up_block` has found, into LIT.
+    """Compute `lit` from the horizon table at the places found by `look_up_block`, into the row
+    LIT.
 
-    wi : (3, n), the block's from `begin` on
+    wi : (3, n), of which the block uses the columns from `begin` on
     """
     table = shadow.table
     choose_texels(R, cloth, table, wi, begin, size, ints, reals)
@@ -327,10 +332,10 @@ def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
 
 @njit(**PART)
 def mean_block(R, shadow, wi, begin, size, ints, reals):
-    """Divide the row LIT by the mean of `g`, in loops as those of `texel_blocks`."""
+    """Divide the row LIT by the mean of `g`, in loops like those of `horizon_blocks`."""
     for k in range(size):
         m = index(begin, k)
-        # What is not a number has its answer, and must not index the table.
+        # Where LIT is NaN it stays NaN, and the NaN must not index the table.
         sound = reals[LIT + k] >= R(0)
         x, y, z = wi[0, m] if sound else R(0), wi[1, m] if sound else R(0), wi[2, m]
         ints[FIRST + k], ints[SECOND + k], a, b = _cell_of_mean(
@@ -346,7 +351,7 @@ def mean_block(R, shadow, wi, begin, size, ints, reals):
 
 @njit(**PART)
 def _one_by_one(R, cloth, shadow, shaded, uv, begin, wi, out):
-    """`shade`, or else `lit`, at as many places from `begin` on as `out` holds."""
+    """`shade` if `shaded`, else `lit`, at `out.size` places from `begin` on."""
     for k in range(out.size):
         u, v = uv[begin + k, 0], uv[begin + k, 1]
         x, y, z = wi[0, begin + k], wi[1, begin + k], wi[2, begin + k]
@@ -359,7 +364,8 @@ def _one_by_one(R, cloth, shadow, shaded, uv, begin, wi, out):
 
 @njit(parallel=True, **KERNEL)
 def lit_all(R, cloth, shadow, shaded, uv, wi, out):
-    """`lit`, or `shade` if `shaded`, at places uv (n, 2) float64 for light wi (3, n): out (n,)."""
+    """`shade` if `shaded`, else `lit`, at places uv (n, 2) float64 for light wi (3, n): out
+    (n,)."""
     n = uv.shape[0]
     for b in prange((n + BLOCK - 1) // BLOCK):
         begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
@@ -386,8 +392,8 @@ def shadowing(
 ) -> NDArray[Any]:
     """`g` (n,) for light from unit directions wi (n, 3) at weave coordinates uv_threads (n, 2).
 
-    compiled : the fabric and `compile_shadow` of it, where the caller has them; `method` and
-        `level` are then the shadow's. Otherwise both are made, in float64.
+    compiled : the compiled fabric and its `compile_shadow`, if the caller has them; `method` and
+        `level` are then ignored. Otherwise both are compiled in float64.
     """
     if compiled is None:
         cloth = compile_fabric(fabric, precision=np.float64)

@@ -1,8 +1,9 @@
-"""Looking up a block of places of the weave, in loops that LLVM vectorises.
+"""Look up a block of places of the weave, in loops that LLVM vectorises.
 
-The integers noted about a block lie row behind row in one array and the reals in another: pointers
-of their own would have to be checked for overlap, and there would be too many. Loops that gather
-from tables stand apart from those that compute, since the former stay scalar.
+The integers of a block are stored row after row in a single array, and the reals in another. With
+separate arrays LLVM would have to check every pair of pointers for overlap, and there would be too
+many. Loops that gather from tables are separate from those that compute, because gathers stay
+scalar.
 """
 
 from __future__ import annotations
@@ -17,31 +18,34 @@ from fabricusd.appearance.weave.lookup import angle_on, cell_of, place_on, whole
 from fabricusd.kernels.real import BLOCK, INLINE, PART, index
 
 CELL_I, CELL_J, END, PICK = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
-"""Rows of int32: the cell of the grid and the places in the sequences of threads."""
+"""Rows of int32: the cell of the grid, and the places in the sequences of threads."""
 TOP, OF_SET, OF_THREAD, FREE = 4 * BLOCK, 5 * BLOCK, 6 * BLOCK, 7 * BLOCK
-"""The set on top of the cell, the set or GAP and the thread that are seen, and 1 where nothing
-keeps light off: gap or pile."""
+"""The set on top of the cell; the visible set, or GAP; the visible thread; and 1 in gaps and on
+pile, which nothing shadows."""
 TABLE_I, TABLE_J = 8 * BLOCK, 9 * BLOCK
 """The cell of the horizon table."""
 FIRST, SECOND = 10 * BLOCK, 11 * BLOCK
-"""For `horizon_lookup.choose_texels`."""
+"""Filled by `horizon_blocks.choose_texels`."""
 _WARP_THREAD, _WEFT_THREAD = 12 * BLOCK, 13 * BLOCK
 INT_ROWS = 14
 
 X, Y, S, ANGLE = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
-"""Rows of reals: the place in the cell, on the thread's run, and the tangent angle [rad] there."""
+"""Rows of reals: the place in the cell, the position on the thread's run, and the tangent angle
+[rad] there."""
 SHARES, LIT = 4 * BLOCK, 7 * BLOCK
-"""Three rows for `horizon_lookup.choose_texels`; the share of light that reaches the place."""
+"""Three rows filled by `horizon_blocks.choose_texels`; the share of light that reaches the
+place."""
 _UPPER_PLACE, _UPPER_CELLS, _LOWER_PLACE, _LOWER_CELLS = (row * BLOCK for row in range(8, 12))
 REAL_ROWS = 12
 
 
 @njit(**PART)
 def look_up_block(R, cloth, table, uv, begin, size, ints, reals):
-    """`weave.find` of `size` places uv (n, 2) float64 from `begin` on, and their cells of `table`.
+    """`weave.find` at `size` places uv (n, 2) float64 from `begin` on, and their cells of `table`.
 
-    ints : (INT_ROWS*BLOCK,) int32; reals : (REAL_ROWS*BLOCK,) - FIRST, SECOND, SHARES and LIT are
-    left for `shadow.horizon_block`
+    ints : (INT_ROWS*BLOCK,) int32; reals : (REAL_ROWS*BLOCK,)
+
+    `methods.horizon_block` fills the rows FIRST, SECOND, SHARES and LIT.
     """
     _cells(R, cloth, uv, begin, size, ints, reals)
     _cells_of_table(cloth, table, uv, begin, size, ints)
@@ -55,7 +59,7 @@ def look_up_block(R, cloth, table, uv, begin, size, ints, reals):
 
 @njit(**INLINE)
 def _cells(R, cloth, uv, begin, size, ints, reals):
-    """`weave.split` of a block; the places in the sequences only where they repeat otherwise."""
+    """`weave.split` of a block."""
     for k in range(size):
         p = index(begin, k)
         i, j, x, y = cell_of(R, cloth, uv[p, 0], uv[p, 1])
@@ -67,8 +71,11 @@ def _cells(R, cloth, uv, begin, size, ints, reals):
 
 @njit(**INLINE)
 def _places_in_sequence(cloth, which, uv, begin, size, ints, row, cell_row):
-    """The places in a set's sequence, which are those in the grid unless it repeats otherwise."""
-    # Read once: for all that LLVM knows the loop writes over it.
+    """Compute the places in a set's sequence.
+
+    They are copied from the cell of the grid if the sequence has the period of the grid.
+    """
+    # Read these once: as far as LLVM knows, the loop overwrites them.
     period, cells = cloth.sequence_length[which], cloth.grid.shape[0 if which == WARP else 1]
     if period == 1:
         for k in range(size):
@@ -85,7 +92,7 @@ def _places_in_sequence(cloth, which, uv, begin, size, ints, row, cell_row):
 
 @njit(**INLINE)
 def _cells_of_table(cloth, table, uv, begin, size, ints):
-    """The cells of the horizon table, which is the grid's unless it repeats later."""
+    """Compute the cells of the horizon table: those of the grid, unless the table is larger."""
     if table.shape[0] == cloth.grid.shape[0] and table.shape[1] == cloth.grid.shape[1]:
         for k in range(size):
             ints[TABLE_I + k], ints[TABLE_J + k] = ints[CELL_I + k], ints[CELL_J + k]
@@ -97,7 +104,7 @@ def _cells_of_table(cloth, table, uv, begin, size, ints):
 
 @njit(**INLINE)
 def _gather(cloth, size, ints, reals):
-    """What the tables hold about each cell, its end and its pick."""
+    """Read what the tables hold for each cell, its end and its pick."""
     lower = cloth.runs.shape[2] - 1
     for k in range(size):
         i, j = np.uintp(ints[CELL_I + k]), np.uintp(ints[CELL_J + k])
@@ -112,7 +119,7 @@ def _gather(cloth, size, ints, reals):
 
 @njit(**INLINE)
 def _place(R, cloth, size, ints, reals):
-    """The thread that is seen, and where on its run."""
+    """Compute the visible thread, and the position on its run."""
     weft_width, warp_width = cloth.width[WEFT], cloth.width[WARP]
     for k in range(size):
         top, x = ints[TOP + k], reals[X + k]

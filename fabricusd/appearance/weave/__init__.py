@@ -1,1 +1,1 @@
-"""Which thread lies at a point of the cloth, and how it runs there."""
+"""Look up the thread at a point of the cloth, and the course of its tangent curve."""

@@ -1,8 +1,8 @@
-"""The weave of a fabric as contiguous arrays: what the lookup and the shadows read.
+"""Compile the weave of a fabric into contiguous arrays, which the lookup and the shadows read.
 
 `compile_fabric` turns the frozen dataclasses of `fabricusd.fabric` into a `CompiledFabric`, once
-per fabric and precision. Index conventions: sets are WEFT and WARP of `coverage`, thread types
-count as `Fabric.threads`, the grid is `[end, pick]`.
+per fabric and precision. Sets are indexed by WEFT and WARP of `coverage`, thread types by their
+order in `Fabric.threads`, and the grid by `[end, pick]`.
 """
 
 from __future__ import annotations
@@ -21,30 +21,32 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
 Reals = NDArray[Any]
-"""float32 or float64, by the precision that the fabric was compiled for."""
+"""float32 or float64: the precision that the fabric was compiled for."""
 
 
 class CompiledFabric(NamedTuple):
     """Arrays and scalars of one fabric; `real` below is the precision asked for.
 
     grid : (m, n) uint8 - 1 where end i lies over pick j
-    runs : (m, n, slots, 2) uint16, uint32 beyond 65535 threads - in slot 0 for the thread on top,
-        in slot 1 for the one underneath (only where `under` is a set): place of the cell in the
-        visible run (cells from its start along the thread), and length of that run (cells)
-    sequence : (2, k) int32 - thread types of each set, in as many columns as the longer one takes
-    sequence_length : (2,) int64 - after how many threads the types repeat
+    runs : (m, n, slots, 2) uint16, or uint32 beyond 65535 threads - place of the cell in the
+        visible run (cells from the start of the run along the thread), and length of that run
+        (cells); slot 0 is for the thread on top, slot 1, present only if `under` is a set, for the
+        one underneath
+    sequence : (2, k) int32 - thread types of each set; k is the length of the longer sequence
+    sequence_length : (2,) int64 - number of threads after which the types repeat
     width : (2,) real - share of its cells' width that a set takes where it is on top
     under : int - the set that is seen underneath the other, or GAP
-    under_width : real - share of its width that it shows there
+    under_width : real - share of its own width that this set shows there
     area : (2, k) real - share of the cloth that type k of set j covers
-    gap : real - share that no thread covers
+    gap : real - share of the cloth that no thread covers
     pitch : (2,) real - distance from one thread of the set to the next [m]
-    half_thickness : (2, k) real - [m]; half the visible width where the thread states none
+    half_thickness : (2, k) real - [m]; half the visible width if the thread states no thickness
     curve_start : (k, p) real - start of each linear piece of a type's curve, in run lengths; padded
         with 2 to a power of two
-    curve_angle, curve_slope : (k, p) real - angle there [rad], change of angle per run length
-    curve_height : (k, p) real - height there, in run lengths
-    pile : (k,) uint8 - 1 where the type's curve has no height field
+    curve_angle, curve_slope : (k, p) real - angle at that start [rad], change of angle per run
+        length
+    curve_height : (k, p) real - height at that start, in run lengths
+    pile : (k,) uint8 - 1 if the type's curve has no height field
     last, tiny : real - the largest number below 1, the smallest normal number
     """
 
@@ -107,7 +109,7 @@ def compile_fabric(
 
 
 def true_repeat(fabric: Fabric) -> tuple[int, int]:
-    """Ends and picks after which the weave and the sequences of threads both start again."""
+    """Numbers of ends and picks after which weave and thread sequences repeat together."""
     return (
         math.lcm(fabric.weave.ends, len(fabric.warp.sequence)),
         math.lcm(fabric.weave.picks, len(fabric.weft.sequence)),
@@ -115,10 +117,10 @@ def true_repeat(fabric: Fabric) -> tuple[int, int]:
 
 
 def _run_table(cells: NDArray[np.bool_], under: int) -> NDArray[Any]:
-    """`runs` of the grid: those of the warp go along the picks, those of the weft along the ends.
+    """`CompiledFabric.runs`: runs of the warp cross the picks, runs of the weft cross the ends.
 
-    Along a thread a run is the same stretch of equal cells whether it is on top there or
-    underneath, so one table per direction serves both slots.
+    A run is a sequence of equal cells along a thread, whether the thread is on top or underneath,
+    so one table per direction serves both slots.
     """
     kind: Any = np.uint16 if max(cells.shape) <= np.iinfo(np.uint16).max else np.uint32
     found = np.empty((*cells.shape, 1 if under == GAP else 2, 2), kind)
@@ -133,7 +135,7 @@ def _run_table(cells: NDArray[np.bool_], under: int) -> NDArray[Any]:
 
 @njit(cache=True)
 def _share_out(cells, by_end, by_pick, out):
-    """Runs along the warp (m, n, 2) and along the weft (n, m, 2) -> out (m, n, slots, 2)."""
+    """Combine runs along the warp (m, n, 2) and the weft (n, m, 2) into out (m, n, slots, 2)."""
     block = 64
     for i0 in range(0, cells.shape[0], block):
         for j0 in range(0, cells.shape[1], block):
@@ -152,13 +154,14 @@ def _share_out(cells, by_end, by_pick, out):
 
 @njit(cache=True)
 def _fill_runs(lines, out):
-    """(r, n) cells along r threads -> out (r, n, 2): place in its run, length of the run.
+    """Compute place and length of the runs, out (r, n, 2), from `lines`: (r, n) cells of r threads.
 
-    Runs wrap round the repeat; a run without end is one repeat, counted from its border.
+    Runs wrap around the repeat. A run without end is one repeat long, counted from the border of
+    the repeat.
     """
     n = lines.shape[1]
     for r in range(lines.shape[0]):
-        # Start where a run starts, so that the one that wraps is met whole.
+        # Start at the start of a run, so that the run that wraps around is met as a whole.
         first = 0
         while first < n and lines[r, first] == lines[r, first - 1]:
             first += 1
@@ -177,14 +180,14 @@ def _fill_runs(lines, out):
 
 
 def _half_thickness(fabric: Fabric, share: Coverage, pitch: NDArray[np.float64]) -> Reals:
-    """(2, k) half the thickness of each type in each set [m]."""
+    """(2, k) half the thickness [m] of each type in each set."""
     stated = np.array([t.thickness for t in fabric.thread_list])
     visible = np.maximum(share.width, np.where(np.arange(2) == share.under, 1.0, 0.0)) * pitch
     return 0.5 * np.where(stated > 0, stated, visible[:, None])
 
 
 def _curve_tables(fabric: Fabric) -> dict[str, NDArray[np.float64]]:
-    """The linear pieces of every type's curve, padded to a power of two by unreachable starts."""
+    """The linear pieces of every type's curve, padded to a power of two with unreachable starts."""
     found = [pieces(t.curve) for t in fabric.thread_list]
     longest = max(len(p.start) for p in found)
     shape = (len(found), 1 << (longest - 1).bit_length())

@@ -1,9 +1,9 @@
-"""What each thread set covers of the cloth: coverage wins over the grid.
+"""Compute the share of the cloth that each thread set covers, from the coverage and the grid.
 
-The grid says which set is on top in a cell, the coverage says how much of the cloth a set shows.
-Where they disagree the coverage is right, `docs/model.md` section 3: a set that covers less than
-its cells takes the middle of their width; what it leaves goes first to the set that covers more
-than its cells, which is seen beside it running underneath; the rest is gap.
+The grid says which set is on top in a cell; the coverage says how much of the cloth a set shows.
+Where they disagree, the coverage takes precedence (`docs/model.md` section 3). A set that covers
+less than its cells takes the middle of their width. The space that it leaves goes first to the set
+that covers more than its cells, which is seen beside it, running underneath. The rest is gap.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ __all__ = ["GAP", "WARP", "WEFT", "Coverage", "coverage", "sets"]
 Floats = NDArray[np.float64]
 
 GAP = 2
-"""Beside WEFT and WARP: where no thread is seen."""
+"""In place of WEFT or WARP: no thread is seen."""
 
 
 class Coverage(NamedTuple):
-    """How the cloth's area is shared. Indices of sets are WEFT and WARP.
+    """The division of the cloth's area. Sets are indexed by WEFT and WARP.
 
     cells : (2,) float - share `c_j` of the cells with set j on top
     area : (2,) float - share `a_j` of the cloth that set j covers
-    type_area : (2, k) float - the same for each thread type; a row sums to `area[j]`
+    type_area : (2, k) float - the same for each thread type; row j sums to `area[j]`
     gap : float - 1 - sum of `area`
     width : (2,) float - share of its cells' width that set j takes where it is on top
-    under : int - the set that is seen beside the other, running underneath, or GAP if none
-    under_width : float - share of its width that it shows there
+    under : int - the set that is seen beside the other, running underneath, or GAP if there is none
+    under_width : float - share of its own width that this set shows there
     """
 
     cells: Floats
@@ -52,11 +52,11 @@ def sets(fabric: Fabric) -> tuple[ThreadSet, ThreadSet]:
 
 
 def coverage(fabric: Fabric) -> Coverage:
-    """How the area of `fabric` is shared between its sets, its thread types, and the gap.
+    """The division of the area of `fabric` between its sets, its thread types, and the gap.
 
-    A set without an authored coverage takes `c_j thickness/pitch` (mean over its visible threads),
-    at most `c_j` and at most what the other set's authored coverage leaves; a thread of unknown
-    thickness fills its pitch.
+    A set without an authored coverage takes `c_j thickness/pitch` (the mean over its visible
+    threads), limited to `c_j` and to what the authored coverage of the other set leaves. A thread
+    of unknown thickness fills its pitch.
     """
     shown, hidden = _type_cells(fabric)
     c = shown.sum(axis=1)
@@ -73,7 +73,7 @@ def coverage(fabric: Fabric) -> Coverage:
     excess = a - c
     under, under_width = GAP, 0.0
     j = int(np.argmax(excess))
-    # Below 1e-12 the excess is rounding of c, not something that a strip could show.
+    # An excess below 1e-12 is a rounding error of c, not a visible strip.
     if excess[j] > 1e-12:
         under = j
         under_width = min(1.0, float(excess[j] / (c[1 - j] * (1.0 - width[1 - j]))))
@@ -85,11 +85,11 @@ def coverage(fabric: Fabric) -> Coverage:
 
 
 def _type_cells(fabric: Fabric) -> tuple[Floats, Floats]:
-    """(2, k) share of cells where type k of set j is on top, and where it runs underneath.
+    """(2, k) shares of the cells in which type k of set j is on top, and in which it is underneath.
 
-    The true repeat is the least common multiple of grid and sequence; in it a place of the grid
-    meets every place of the sequence with the same remainder by their greatest common divisor
-    equally often, so sums over remainders are exact and small.
+    The true repeat is the least common multiple of grid and sequence. In it, a place of the grid
+    meets equally often every place of the sequence that has the same remainder modulo their
+    greatest common divisor, so sums over the remainders are exact and short.
     """
     shown = np.zeros((2, len(fabric.threads)))
     hidden = np.zeros_like(shown)

@@ -1,7 +1,7 @@
-"""The tangent curve along one visible run of a thread: angle and height.
+"""Evaluate the tangent curve along a visible run of a thread: its angle and its height.
 
-Everything is per unit of the run's length: a position `s` goes from 0 to 1 over the run, a height
-is in run lengths. A segment of zero length is a jump; it has no weight, and the curve is
+All lengths are relative to the length of the run: a position `s` goes from 0 to 1 over the run, and
+heights are in run lengths. A segment of zero length is a jump; it has no weight, and the curve is
 right-continuous there. Source: [Bisker2011] section 5.2.1; `docs/model.md` section 3.
 """
 
@@ -17,17 +17,18 @@ from fabricusd.fabric import PILE_ANGLE, TangentCurve
 Floats = NDArray[np.float64]
 
 CLOSING_ERROR = 1e-3
-"""Share of its own height by which a curve may fail to come back to 0 before it counts as pile.
-Curves typed with two decimals miss by less; a thread that really climbs misses by all of it."""
+"""Largest closing error of a curve that is not pile, as a fraction of the sum of its rises and
+falls. Curves typed with two decimals stay below it; a thread that really climbs fails to close by
+its whole height."""
 
 
 class Pieces(NamedTuple):
-    """The linear pieces of a curve, those of zero length left out.
+    """The linear pieces of a curve, without those of zero length.
 
-    start, length : (p,) float - of each piece along the run, in run lengths; they tile [0, 1]
+    start, length : (p,) float - start and length of each piece, in run lengths; they tile [0, 1]
     first, last : (p,) float - tangent angle at both ends of the piece [rad]
-    height : (p,) float - height at the start of the piece, in run lengths; 0 for a curve that is
-        too steep to have one
+    height : (p,) float - height at the start of the piece, in run lengths; 0 if the curve is too
+        steep to have a height
     """
 
     start: Floats
@@ -54,9 +55,9 @@ def pieces(curve: TangentCurve) -> Pieces:
 def _rise(first: Floats, last: Floats, length: Floats) -> Floats:
     """Minus the integral of tan(angle) over pieces whose angle goes from `first` to `last`.
 
-    `d/da log cos a = -tan a`, so it is `length (log cos last - log cos first)/(last - first)`,
-    written with log1p so that it stays exact where the angle hardly changes. Only for angles of
-    less than 90 degrees; the callers leave pile out.
+    Since `d/da log cos a = -tan a`, it is `length (log cos last - log cos first)/(last - first)`,
+    written with log1p to stay exact where the angle hardly changes. The angles must be below 90
+    degrees; callers leave out pile.
     """
     change = last - first
     middle = 0.5 * (first + last)
@@ -81,7 +82,8 @@ def angle_at(curve: TangentCurve, s: ArrayLike) -> Floats:
 def height_at(curve: TangentCurve, s: ArrayLike) -> Floats:
     """Height at positions `s` (...), in run lengths: minus the integral of tan(angle) from 0 to s.
 
-    Zero for pile, which has no height field. Its derivative is `-tan(angle_at(curve, s))`.
+    The derivative of the height is `-tan(angle_at(curve, s))`. Pile has no height field; its height
+    is 0.
     """
     s = np.asarray(s, np.float64)
     if is_pile(curve):
@@ -94,19 +96,20 @@ def height_at(curve: TangentCurve, s: ArrayLike) -> Floats:
 
 
 def peak(curve: TangentCurve) -> float:
-    """The highest height along the run, in run lengths; 0 for pile."""
+    """The greatest height along the run, in run lengths; 0 for pile."""
     return float(height_at(curve, crest(curve)).max())
 
 
 def crest(curve: TangentCurve) -> Floats:
-    """(q, 2) stretches of the run, first and last position, where its height is the greatest.
+    """(q, 2) first and last positions of the intervals of the run where its height is greatest.
 
-    A hump has a crest of one point. Pile, like a straight thread, is one crest from end to end.
+    The crest of a hump is a single point. Pile, like a straight thread, is one crest from end to
+    end.
     """
     if is_pile(curve):
         return np.array([[0.0, 1.0]])
     p = pieces(curve)
-    # The height turns where the angle passes 0, inside a piece, or at a piece's border.
+    # The height has an extremum where the angle passes 0: inside a piece or at the border of one.
     change = np.where(p.last == p.first, 1.0, p.last - p.first)
     turn = p.start + p.length * np.clip(-p.first / change, 0.0, 1.0)
     level = (p.first == 0.0) & (p.last == 0.0)
@@ -123,7 +126,8 @@ def crest(curve: TangentCurve) -> Floats:
 
 
 def is_pile(curve: TangentCurve) -> bool:
-    """Whether the curve stands up from the cloth: steeper than 85 degrees, or not closing at 0."""
+    """Whether the curve stands up from the cloth: it is steeper than 85 degrees or does not close
+    at height 0."""
     if curve.steepest > PILE_ANGLE:
         return True
     p = pieces(curve)

@@ -1,9 +1,9 @@
-"""The weave under a point: which thread, where on its run, where across it, at which angle.
+"""Look up the thread under a point: its set, type, position along and across it, and angle.
 
-Weave coordinates count threads: u in ends along +U, v in picks along +V, float64. They are split
-into cell and fraction, and the cell reduced modulo the repeat, before anything is float32: at 10^4
-repeats a float32 coordinate would miss the place inside the thread. Rules: `docs/model.md`
-sections 1 and 3.
+Weave coordinates count threads in float64: u in ends along +U, v in picks along +V. They are split
+into cell and fraction, and the cell is reduced modulo the repeat, before anything is converted to
+float32: at 10^4 repeats a float32 coordinate would not resolve the place inside a thread. The rules
+are in `docs/model.md`, sections 1 and 3.
 """
 
 from __future__ import annotations
@@ -23,15 +23,16 @@ from fabricusd.fabric import Fabric, ThreadSet, Weave
 from fabricusd.kernels.real import INLINE, KERNEL, PART, index
 
 FARTHEST = 2.0**52
-"""Weave coordinates beyond this have no fraction left in float64."""
+"""Weave coordinates beyond this have no fractional part in float64."""
 
 
 BLOCK = 512
-"""Places that a worker looks up at a time: what it notes about them stays in its nearest cache."""
+"""Number of places that a worker looks up at a time: their intermediate results stay in its
+first-level cache."""
 
 
 class WeaveHit(NamedTuple):
-    """What lies under each point. GAP and non-finite places hold zeros and NaN respectively.
+    """What lies under each point. The entries of GAP places are 0, those of non-finite places NaN.
 
     set : (n,) uint8 - WEFT, WARP or GAP
     thread : (n,) int32 - index into `Fabric.threads`
@@ -39,9 +40,9 @@ class WeaveHit(NamedTuple):
     across : (n,) float - w on the visible width, from -1 to 1, growing along `b = n_t x t`: along
         +V on the weft and along -U on the warp
     angle : (n,) float - tangent angle psi0 [rad]
-    height : (n,) float - of the thread's axis over its ends [m]
-    crown : (n,) float - what the thread's round adds to it at `across` [m]
-    gap : (n,) bool - where no thread is seen
+    height : (n,) float - height of the thread's axis above the ends of the run [m]
+    crown : (n,) float - height of the round thread's surface above its axis at `across` [m]
+    gap : (n,) bool - whether no thread is seen
     """
 
     set: NDArray[np.uint8]
@@ -56,10 +57,10 @@ class WeaveHit(NamedTuple):
 
 @njit(**INLINE)
 def wrap(x, period):
-    """Whole number `x` (float64) modulo `period`, non-negative, as an integer."""
+    """Whole number `x` (float64) modulo `period`, as a non-negative integer."""
     p = float(period)
     r = x - p * np.floor(x / p)
-    # The quotient is rounded: one period off either way where x is a multiple of it.
+    # The quotient is rounded, so r can be off by one period if x is a multiple of the period.
     r = r + p if r < 0.0 else r
     r = r - p if r >= p else r
     return np.int32(r)
@@ -67,14 +68,17 @@ def wrap(x, period):
 
 @njit(**INLINE)
 def whole_threads(u, v):
-    """(end, pick, sound): whole parts of weave coordinates, float64; 0 where they are not sound."""
+    """(end, pick, sound): whole parts of weave coordinates (float64); 0 if they are not sound.
+
+    Coordinates are sound if they are finite and at most FARTHEST.
+    """
     sound = (abs(u) <= FARTHEST) & (abs(v) <= FARTHEST)
     return np.floor(u if sound else 0.0), np.floor(v if sound else 0.0), sound
 
 
 @njit(**INLINE)
 def cell_of(R, cloth, u, v):
-    """(i, j, x, y): the cell of the grid and the place in it, as `split` gives them."""
+    """(i, j, x, y): the cell of the grid and the place in it, as in `split`."""
     end, pick, sound = whole_threads(u, v)
     return (
         wrap(end, cloth.grid.shape[0]),
@@ -86,10 +90,11 @@ def cell_of(R, cloth, u, v):
 
 @njit(**INLINE)
 def split(R, cloth, u, v):
-    """Weave coordinates, float64, as what `thread_at` asks for: (i, j, end, pick, x, y).
+    """Weave coordinates (float64) split into the arguments of `thread_at`: (i, j, end, pick, x, y).
 
-    i, j : cell of the grid; end, pick : places in the sequences of threads; x, y : in the cell, of
-    precision R, NaN where the coordinates are not finite or have no fraction.
+    i, j : cell of the grid
+    end, pick : places in the sequences of threads
+    x, y : place in the cell, of precision R; x is NaN if the coordinates are not sound
     """
     i, j, x, y = cell_of(R, cloth, u, v)
     end, pick, _ = whole_threads(u, v)
@@ -100,10 +105,10 @@ def split(R, cloth, u, v):
 
 @njit(**INLINE)
 def piece_of(R, cloth, thread, s):
-    """Index of the linear piece of the thread's curve at `s`, the later one at a jump.
+    """Index of the linear piece of the thread's curve at `s`, and of the later one at a jump.
 
-    Counting every start up to `s` beats a search on curves of a few pieces: it has no branches to
-    mispredict. The table is padded to a power of two by starts beyond 1.
+    On curves of a few pieces, counting the starts up to `s` is faster than a binary search, because
+    it has no branches to mispredict. Starts beyond 1 pad the table to a power of two.
     """
     k, pieces = 0, cloth.curve_start.shape[1]
     if pieces <= 32:
@@ -157,7 +162,8 @@ def height_on(R, cloth, thread, s, length):
 
 @njit(**INLINE)
 def crown_on(R, cloth, thread_set, thread, w):
-    """Height [m] that the round of the thread adds at `w`: half the thickness, sqrt(1 - w^2)."""
+    """Height [m] of a round thread above its axis at `w`: half the thickness times sqrt(1 -
+    w^2)."""
     return cloth.half_thickness[thread_set, thread] * math.sqrt(max(R(0), R(1) - w * w))
 
 
@@ -165,9 +171,12 @@ def crown_on(R, cloth, thread_set, thread, w):
 def place_on(R, cloth, top, width, upper_place, upper_cells, lower_place, lower_cells, x, y):
     """(set or GAP, s, w, length in cells) of the thread seen at (x, y) in a cell with `top` above.
 
-    width : visible width of the set on top; place and cells of the run above and of that below
+    width : visible width of the set on top
+    upper_place, upper_cells : place of the cell in the run on top, and the length of that run
+    lower_place, lower_cells : the same for the run underneath
 
-    Selections instead of branches: which thread a point meets cannot be predicted.
+    The code selects instead of branching, because it cannot be predicted which thread a point
+    meets.
     """
     warp = top == WARP
     over, along = (x, y) if warp else (y, x)
@@ -175,20 +184,21 @@ def place_on(R, cloth, top, width, upper_place, upper_cells, lower_place, lower_
     on_top = abs(offset) <= R(0.5) * width and width > R(0)
     beside = cloth.under == 1 - top and abs(along - R(0.5)) <= R(0.5) * cloth.under_width
     hit = top if on_top else 1 - top
-    # Beside the thread on top, the visible stretches put together carry the whole curve.
+    # The curve of the thread underneath runs over its visible parts beside the threads on top,
+    # joined together.
     share = R(1) if on_top else R(1) - width
     seen = along if on_top else (over if offset < R(0) else over - width) / max(share, cloth.tiny)
     w = R(2) * (offset if on_top else along - R(0.5)) / (width if on_top else cloth.under_width)
     place, cells = (upper_place, upper_cells) if on_top else (lower_place, lower_cells)
     s = max(R(0), min((place + seen) / cells, cloth.last))
-    # b, and with it w, runs along -U on the warp.
+    # On the warp, b and therefore w point along -U.
     w = max(R(-1), min(-w if hit == WARP else w, R(1)))
     return hit if on_top or beside else GAP, s, w, cells * share
 
 
 @njit(**INLINE)
 def thread_at(R, cloth, i, j, end, pick, x, y):
-    """The thread at a place that `split` has found; the answer is `find`'s."""
+    """The result of `find` for coordinates that `split` has split."""
     none = R(0)
     if not x >= none:
         nan = R(np.nan)
@@ -208,11 +218,12 @@ def thread_at(R, cloth, i, j, end, pick, x, y):
 
 @njit(**INLINE)
 def find(R, cloth, u, v):
-    """Thread under weave coordinates (u, v), float64.
+    """The thread under weave coordinates (u, v), float64.
 
-    Returns (set, thread, s, w, angle, length): `length` is the visible run's own length [m], which
-    `height_on` asks for. In a gap the set is GAP and the rest 0. Coordinates that are not finite,
-    or that have no fraction, come back as set WEFT with NaN everywhere, so that nothing hides them.
+    Returns (set, thread, s, w, angle, length); `length` is the length of the visible run [m], which
+    `height_on` needs. In a gap the set is GAP and the other values are 0. Coordinates that are not
+    finite, or that have no fractional part, give the set WEFT with NaN in all real values, so that
+    the fault stays visible.
     """
     i, j, end, pick, x, y = split(R, cloth, u, v)
     return thread_at(R, cloth, i, j, end, pick, x, y)
@@ -220,9 +231,9 @@ def find(R, cloth, u, v):
 
 @njit(**PART)
 def split_block(R, cloth, uv, begin, cells, x, y):
-    """`split` of as many places from `begin` on as cells (4, b) int32, x and y (b,) hold.
+    """`split` of the places from `begin` on, into cells (4, b) int32 and x, y (b,).
 
-    A loop of its own, which LLVM vectorises; the lookup behind it is all gathers.
+    This is a separate loop because LLVM vectorises it; the lookup that follows consists of gathers.
     """
     for k in range(x.size):
         p = index(begin, k)
@@ -233,7 +244,7 @@ def split_block(R, cloth, uv, begin, cells, x, y):
 
 @njit(parallel=True, **KERNEL)
 def find_all(R, cloth, uv, sets, threads, s, w, angle, length):
-    """`find` at each of uv (n, 2) float64, into the arrays behind it."""
+    """`find` at each of uv (n, 2) float64, into the (n,) arrays that follow."""
     n = uv.shape[0]
     for b in prange((n + BLOCK - 1) // BLOCK):
         begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
@@ -249,7 +260,7 @@ def find_all(R, cloth, uv, sets, threads, s, w, angle, length):
 
 @njit(parallel=True, **KERNEL)
 def heights_all(R, cloth, sets, threads, s, w, length, height, crown):
-    """`height_on` and `crown_on` at each hit, 0 in gaps, into `height` and `crown`."""
+    """`height_on` and `crown_on` at each hit, into `height` and `crown`; 0 in gaps."""
     for k in prange(sets.shape[0]):
         if sets[k] == GAP:
             height[k] = R(0)
@@ -262,9 +273,10 @@ def heights_all(R, cloth, sets, threads, s, w, length, height, crown):
 def lookup(cloth: Fabric | CompiledFabric, uv_threads: ArrayLike) -> WeaveHit:
     """The thread under each of (n, 2) weave coordinates, in threads.
 
-    A `Fabric` is compiled for float64; a `CompiledFabric` answers in its own precision. The grain's
-    rotation comes before: `Binding.weave_coordinates`. Raises `FabricError` for coordinates that
-    are not finite or lie farther than 2^52 threads out, where float64 has no fraction left.
+    A `Fabric` is compiled for float64; with a `CompiledFabric` the result has its precision. The
+    coordinates must already include the rotation of the grain: `Binding.weave_coordinates`. Raises
+    `FabricError` for coordinates that are not finite or lie beyond 2^52 threads, where float64 has
+    no fractional part.
     """
     if isinstance(cloth, Fabric):
         cloth = compile_fabric(cloth, precision=np.float64)
@@ -289,17 +301,17 @@ def lookup(cloth: Fabric | CompiledFabric, uv_threads: ArrayLike) -> WeaveHit:
 
 
 NO_THREAD = -1
-"""Number of a place where no thread is seen, or none alone."""
+"""Thread number of a place where no thread, or not exactly one, is seen."""
 
 
 def thread_number(which: NDArray[Any], thread: NDArray[Any], types: int) -> NDArray[np.int64]:
-    """(n,) number of the thread that is seen: the index of its type for weft, that plus `types` for
-    warp, NO_THREAD for a gap. It tells the sets apart where they share a yarn.
+    """(n,) number of the visible thread: its type for weft, type + `types` for warp, or NO_THREAD.
 
-    which, thread : (n,) set and type, as `WeaveHit` has them
-    types : how many threads the fabric on that side has
+    The number distinguishes the sets even if they share a yarn. The map `thread_id` of a bake and
+    the layer `thread` of a picture hold it. In a gap it is NO_THREAD.
 
-    Map `thread_id` of a bake and layer `thread` of a picture hold this number.
+    which, thread : (n,) set and type, as in `WeaveHit`
+    types : number of thread types of the fabric on that side
     """
     number = thread.astype(np.int64) + types * (which == WARP)
     return np.where(which == GAP, NO_THREAD, number)
@@ -308,9 +320,9 @@ def thread_number(which: NDArray[Any], thread: NDArray[Any], types: int) -> NDAr
 def back_of(fabric: Fabric) -> Fabric:
     """The other side of the cloth, as a fabric that is looked up at (u, -v).
 
-    The fabric's own `back` where it names one. Otherwise the same threads on a grid mirrored in V
-    and complemented, with the picks counted the other way. What the two sets cover is exchanged
-    with the cells that they show, so that the gap is the same from both sides: a hole is a hole.
+    This is the fabric's own `back` if it names one. Otherwise it has the same threads on a grid
+    that is mirrored in V and complemented, with the picks in reverse order. The coverages of the
+    two sets are exchanged together with their cells, so that the gap is the same from both sides.
     """
     if fabric.back is not None:
         return fabric.back

@@ -1,11 +1,11 @@
-"""Nodes over the tangent curves of a fabric, and which rule meets a bound at the least cost.
+"""Place quadrature nodes on the tangent curves of a fabric, and choose the rule that places them.
 
-Two rules. `POINTS` puts Gauss-Legendre points on each linear piece of a curve, at most some number
-of surface lobe widths apart: the integrand is smooth but for the masking's corners, and the error
-falls five to ten times below that of as many midpoints. `CELLS` puts midpoints whose lobes are
-averaged over the node's own stretch of angle by the error function: one such node costs as much as
-`ERF_COST` points, and its stretch may be many lobe widths, so it pays where lobes are narrow.
-Source: `docs/model.md` section 4; both rules are measured by `bench/far_quadrature.py`.
+There are two forms of rule. `POINTS` puts Gauss-Legendre points on each linear piece of a curve, at
+most a given number of surface lobe widths apart. The integrand is smooth except at the corners of
+the masking, and the error is five to ten times smaller than with the same number of midpoints.
+`CELLS` puts midpoints whose lobes are averaged over the node's range of angles by the error
+function. Such a node costs as much as `ERF_COST` points, but its range may be many lobe widths, so
+it pays off for narrow lobes. Source: `docs/model.md` section 4.
 """
 
 from __future__ import annotations
@@ -26,15 +26,16 @@ Floats = NDArray[np.float64]
 POINTS, CELLS = "points", "cells"
 
 ERF_COST = 1.8
-"""Time of a node with error functions over that of one without, measured on both precisions."""
+"""Cost of a node with error functions relative to one without, measured in both precisions."""
 
 
 class Rule(NamedTuple):
     """A quadrature rule.
 
     form : POINTS or CELLS
-    spacing : how far apart nodes are in tangent angle, at most: in widths of the thread's surface
-        lobe for POINTS, in radians for CELLS, whose lobes are exact and whose other factors are not
+    spacing : largest distance between nodes in tangent angle: in widths of the thread's surface
+        lobe for POINTS; in radians for CELLS, whose lobes are integrated exactly, unlike the other
+        factors
     """
 
     form: str
@@ -42,11 +43,12 @@ class Rule(NamedTuple):
 
 
 DEFAULT = Rule(POINTS, 1.0)
-"""Mean error 0.5 % on the widest lobes (linen), below 0.12 % on the other published fabrics."""
+"""Its mean error is 0.5 % on the widest lobes (linen), below 0.12 % on the other published
+fabrics."""
 
 NARROW = Rule(CELLS, math.radians(5.0))
-"""What a fabric takes whose lobes are so narrow that it would take more than MOST_NODES points:
-mean error below 0.3 %."""
+"""The rule for fabrics with lobes so narrow that DEFAULT takes more than MOST_NODES points. Its
+mean error is below 0.3 %."""
 
 MOST_NODES = 96
 
@@ -54,26 +56,28 @@ CANDIDATES = (
     *(Rule(CELLS, math.radians(x)) for x in (20.0, 10.0, 5.0, 2.5, 1.25, 0.6, 0.3)),
     *(Rule(POINTS, x) for x in (3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.1, 0.05)),
 )
-"""Rules that a bound on the error chooses from, see `accuracy`."""
+"""Rules that `accuracy.choose_rule` chooses from."""
 
 MOST_POINTS = 16
-"""Points that one Gauss-Legendre panel has at most; making more takes longer than they save."""
+"""Largest number of points in a Gauss-Legendre panel: computing more takes longer than they
+save."""
 
 MOST_NODES_EVER = 1024
-"""Narrow lobes ask for points without end; no rule with more nodes than this is tried."""
+"""Rules with more nodes than this are not tried: very narrow lobes would need points without
+end."""
 
 REFERENCES = (Rule(POINTS, 0.03), Rule(CELLS, math.radians(0.1)))
-"""Rules that the others are measured against: the points, unless they are too many."""
+"""Rules against which the others are measured: the points, unless there are too many of them."""
 
 
 class CurveNodes(NamedTuple):
-    """Nodes of every thread type in every set that covers anything, weft first.
+    """The nodes of every thread type in every set where it covers anything, weft first.
 
     psi0 : (q,) - tangent angle [rad]
-    weight : (q,) - share of the cloth's area; they sum to 1 - gap
-    half : (q,) - half the stretch of angle that the node stands for [rad]; 0 for a point
+    weight : (q,) - share of the cloth's area; the weights sum to 1 - gap
+    half : (q,) - half the range of angles that the node represents [rad]; 0 for a point
     thread : (q,) int32 - index into `Fabric.threads`
-    warp_start : int - nodes before it are weft, from it on warp
+    warp_start : int - nodes before this index are weft, the others warp
     """
 
     psi0: Floats
@@ -84,12 +88,12 @@ class CurveNodes(NamedTuple):
 
     @property
     def cost(self) -> float:
-        """In evaluations of a thread's two lobes."""
+        """Cost in evaluations of a thread's two lobes."""
         return len(self.psi0) + (ERF_COST - 1.0) * float(np.count_nonzero(self.half))
 
 
 def curve_nodes(fabric: Fabric, rule: Rule = DEFAULT) -> CurveNodes:
-    """The nodes of `rule` over the fabric's curves. Pieces of one angle take one node."""
+    """The nodes of `rule` on the fabric's curves. A piece of constant angle takes one node."""
     area = coverage(fabric).type_area
     found: list[tuple[Floats, Floats, Floats]] = []
     owner: list[NDArray[np.int32]] = []
@@ -109,7 +113,7 @@ def curve_nodes(fabric: Fabric, rule: Rule = DEFAULT) -> CurveNodes:
 
 
 def count_nodes(fabric: Fabric, rule: Rule) -> int:
-    """How many nodes `curve_nodes` would make, without making them: lobes may be very narrow."""
+    """The number of nodes that `curve_nodes` would make; narrow lobes may need too many to make."""
     area = coverage(fabric).type_area
     return sum(
         int(_counts(pieces(t.curve), t.gamma_surface, rule).sum())
@@ -120,9 +124,10 @@ def count_nodes(fabric: Fabric, rule: Rule) -> int:
 
 
 def default_rule(fabric: Fabric, *, cells: bool = True) -> Rule:
-    """`DEFAULT`, or `NARROW` where points would be too many.
+    """`DEFAULT`, or `NARROW` if there would be too many points.
 
-    cells : whether the threads' lobes have means over cells; without them points lie farther apart
+    cells : whether the threads' lobes have means over cells; if not, points are spaced farther
+        apart
     """
     if cells:
         return DEFAULT if count_nodes(fabric, DEFAULT) <= MOST_NODES else NARROW
@@ -130,7 +135,7 @@ def default_rule(fabric: Fabric, *, cells: bool = True) -> Rule:
 
 
 def fewer_points(fabric: Fabric, spacing: float, most: int) -> Rule:
-    """Points `spacing` lobe widths apart, or as much farther as it takes for at most `most`."""
+    """Points `spacing` lobe widths apart, or farther apart so that there are at most `most`."""
     while count_nodes(fabric, Rule(POINTS, spacing)) > most and spacing < 1e9:
         spacing *= 1.5
     return Rule(POINTS, spacing)
@@ -138,7 +143,7 @@ def fewer_points(fabric: Fabric, spacing: float, most: int) -> Rule:
 
 def _counts(p: Pieces, width: float, rule: Rule) -> NDArray[np.int64]:
     step = rule.spacing * width if rule.form == POINTS else rule.spacing
-    # A piece of exactly `step` takes one node, whatever rounding says.
+    # The tolerance gives a piece of exactly `step` one node, in spite of rounding.
     count = np.maximum(np.ceil(np.abs(p.last - p.first) / step - 1e-9), 1)
     if rule.form == POINTS:
         panels = np.ceil(count / MOST_POINTS)
@@ -148,7 +153,7 @@ def _counts(p: Pieces, width: float, rule: Rule) -> NDArray[np.int64]:
 
 @lru_cache(maxsize=256)
 def _gauss(count: int) -> tuple[Floats, Floats]:
-    """Points and weights over [-1, 1], in panels of equally many points, at most MOST_POINTS."""
+    """Points and weights on [-1, 1], in panels of equally many points, at most MOST_POINTS each."""
     panels = math.ceil(count / MOST_POINTS)
     x, w = np.polynomial.legendre.leggauss(count // panels)
     centre = (2 * np.arange(panels) + 1) / panels - 1

@@ -1,6 +1,7 @@
-"""The thread models: one module each, named as in `fabric.MODELS`, which numbers them.
+"""The registry of thread models: one module per model, named and numbered by `fabric.MODELS`.
 
-To add one: a module here with a `MODEL`, its name at the end of `fabric.MODELS`, `make schema`.
+To add a model, write a module here that defines `MODEL`, append its name to `fabric.MODELS`, and
+run `make schema`.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from fabricusd.fabric import MODELS, Fabric, Thread
 REGISTRY: tuple[ThreadModel, ...] = tuple(
     import_module(f"{__name__}.{name}").MODEL for name in MODELS
 )
-"""The models in the order of `fabric.MODELS`: an index here is what the column MODEL holds."""
+"""The models in the order of `fabric.MODELS`; the column MODEL holds an index into this tuple."""
 
 PUBLISHED_MODELS = tuple(k for k, model in enumerate(REGISTRY) if model.law == PUBLISHED)
 CONSERVING_MODELS = tuple(k for k, model in enumerate(REGISTRY) if model.law == CONSERVING)
@@ -25,20 +26,20 @@ def named(name: str) -> ThreadModel:
 
 
 def names(law: int) -> tuple[str, ...]:
-    """Names of the models whose threads follow a surface law."""
+    """Names of the models whose threads follow `law`, PUBLISHED or CONSERVING."""
     return tuple(n for n, model in zip(MODELS, REGISTRY, strict=True) if model.law == law)
 
 
 def model_of(fabric: Fabric, thread: Thread) -> ThreadModel:
-    """The model by which a thread of a fabric is evaluated."""
+    """The model with which a thread of a fabric is evaluated."""
     return named(fabric.model_of(thread))
 
 
 def any_conserving(fabric: Fabric) -> bool:
-    """Whether some thread follows the conserving law."""
+    """Whether any thread follows the conserving law."""
     return any(model_of(fabric, t).law == CONSERVING for t in fabric.thread_list)
 
 
 def any_published(fabric: Fabric) -> bool:
-    """Whether some thread follows the published law."""
+    """Whether any thread follows the published law."""
     return any(model_of(fabric, t).law == PUBLISHED for t in fabric.thread_list)

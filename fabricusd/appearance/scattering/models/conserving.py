@@ -1,4 +1,4 @@
-"""`conserving`: reciprocal, and of directional albedo E + A (1 - E) for every `A` up to 1.
+"""The `conserving` model: reciprocal, with the directional albedo E + A (1 - E) for every `A` <= 1.
 
     surface = min(1, ks F_r(eta, cos theta_d cos(phi_d/2))) cos(phi_d/2)/4
               K(theta_i, theta_o; 2 gs)/max(cos theta_i, cos theta_o)
@@ -7,11 +7,11 @@
               + x(theta_i) x(theta_o)/(2 pi X)
 
 K is the longitudinal kernel of [dEon2011]. T = 1 - E, where E(theta) is the directional albedo of
-the surface term, from a table per thread. K/max(cos_i, cos_o) integrates to at most 1 against
-cos^2, so the first two terms are passive: at A = 1 they return E + V and lose 8 to 11 % of the light.
-The last term gives it back, as [KullaConty2017] does for a surface, in one dimension:
-x = max(0, 1 - E - V) and X = integral x cos^2(theta) dtheta over +-90 degrees, of the table as it is
-interpolated. Source: MODEL sections 2 and 13.
+the surface term, tabulated per thread. K/max(cos_i, cos_o) integrates to at most 1 against cos^2,
+so the first two terms are passive. At A = 1 they scatter E + V and lose 8 to 11 % of the light. The
+last term returns it, as [KullaConty2017] does for a surface, here in one dimension:
+x = max(0, 1 - E - V), and X is the integral of x cos^2(theta) dtheta over +-90 degrees of the table
+as it is interpolated. Source: MODEL sections 2 and 13.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ from fabricusd.fabric import Thread
 from fabricusd.kernels.real import INLINE, KERNEL
 
 _PIECES = 6
-"""Intervals on each side of the mirror cone, each of _NODES Gauss-Legendre points."""
+"""Subdivisions of each interval of the quadrature, each with _NODES Gauss-Legendre points."""
 _NODES = 12
 _AZIMUTHS = 24
 _REACH = 9.0
@@ -80,16 +80,17 @@ def lobes(R, row, sin_i, cos_i, sin_o, cos_o):
 
 
 def lobe_constants(gamma: float) -> tuple[float, float]:
-    """K is as wide in theta_i as a Gaussian in theta_h: twice."""
+    """Constants of K; like a Gaussian in theta_h, it is twice as wide in theta_i as `gamma`."""
     return longitudinal_constants(2.0 * gamma)
 
 
 @njit(**INLINE)
 def tabulated(R, row, cos_theta):
-    """(T, x/sqrt(2 pi X)) at an inclination: what the surface lets through, and what is lost.
+    """(T, x/sqrt(2 pi X)): the transmittance of the surface, and the light that is lost.
 
-    The entries are uniform in sqrt(cos theta): both are even in theta, so smooth in the cosine, and
-    all their steep part lies within the lobe's width of 90 degrees, where this spacing is finest.
+    The entries are uniform in sqrt(cos theta). Both are even in theta and therefore smooth in the
+    cosine, and they are steep only within the lobe's width of 90 degrees, where this spacing is
+    finest.
     """
     position = math.sqrt(cos_theta) * R(TRANSMISSION_ENTRIES - 1)
     index = np.int32(min(position, R(TRANSMISSION_ENTRIES - 1)))
@@ -110,9 +111,9 @@ def looked_up(R, row, cos_i, cos_o):
 
 @njit(**INLINE)
 def energies(R, row, cos_o, transmitted, around, narrow_s, narrow_v):
-    """See `ThreadModel.energies`: E by the table, and what it leaves.
+    """See `ThreadModel.energies`; they follow from E, which is read from the table.
 
-    The last term has no lobe of its own: even directions serve it.
+    The last term has no lobe of its own; the isotropic lobe samples it.
     """
     through, lost = tabulated(R, row, cos_o)
     whole = through * through * row[INVERSE_T_MAX] * row[BRIGHTNESS]
@@ -123,15 +124,16 @@ def energies(R, row, cos_o, transmitted, around, narrow_s, narrow_v):
 
 
 def thread_transmission(thread: Thread) -> Floats:
-    """(TRANSMISSION_ENTRIES,) T at sqrt(cos theta) uniform from 0 to 1."""
+    """(TRANSMISSION_ENTRIES,) T at uniformly spaced sqrt(cos theta) from 0 to 1."""
     gs = max(thread.gamma_surface, NARROWEST)
     return np.asarray(1.0 - surface_albedo(gs, thread.ior, thread.surface_gain))
 
 
 @lru_cache(maxsize=256)
 def surface_albedo(gamma_surface: float, ior: float, surface_gain: float) -> Floats:
-    """(TRANSMISSION_ENTRIES,) directional albedo `E(theta)` of the surface term, at most 1:
-    `integral f_surface cos(theta_o) dwo` at sqrt(cos theta) uniform from 0 to 1.
+    """(TRANSMISSION_ENTRIES,) directional albedo `E(theta)` of the surface term, at most 1.
+
+    E is `integral f_surface cos(theta_o) dwo`, at uniformly spaced sqrt(cos theta) from 0 to 1.
     """
     row = np.zeros(COLUMNS)
     ior, gamma_surface = min(ior, LARGEST_IOR), max(gamma_surface, NARROWEST)
@@ -150,7 +152,7 @@ def surface_albedo(gamma_surface: float, ior: float, surface_gain: float) -> Flo
 
 @njit(**KERNEL)
 def _integrate_surface(row, x, x_weight, phi, phi_weight, out):
-    """`out[k]` = E at sqrt(cos theta) = k/(n-1); the nodes follow the lobe, however narrow."""
+    """`out[k]` = E at sqrt(cos theta) = k/(n-1), with nodes that follow the lobe however narrow."""
     R = np.float64
     reach = 2.0 * _REACH * row[GAMMA_SURFACE]
     for k in range(out.size):
@@ -158,7 +160,8 @@ def _integrate_surface(row, x, x_weight, phi, phi_weight, out):
         sin_theta = math.sqrt(1.0 - cos_theta * cos_theta)
         theta = math.acos(cos_theta)
         high = min(-theta + reach, 0.5 * math.pi)
-        # The larger of the two cosines has a kink where the inclinations are opposite or equal.
+        # Split the integral where the larger of the two cosines has a kink: where the inclinations
+        # are opposite or equal.
         bounds = (
             max(-theta - reach, -0.5 * math.pi), -theta, min(theta, high), high,
         )  # fmt: skip
@@ -284,8 +287,8 @@ def plain_surface(thread: Thread, i: plain.Angles, o: plain.Angles) -> Floats:
 
 @lru_cache(maxsize=64)
 def plain_albedo(thread: Thread, count: int = 721) -> tuple[Floats, Floats]:
-    """(|theta|, E) in plain NumPy: directional albedo of the surface term, clamped to 1."""
-    # Denser towards 90 degrees, where narrow lobes make it steep.
+    """(|theta|, E) in plain NumPy: the directional albedo of the surface term, at most 1."""
+    # Denser towards 90 degrees, where narrow lobes make E steep.
     theta = math.pi / 2 * np.sin(np.linspace(0, math.pi / 2, count))
     x, x_weight = np.polynomial.legendre.leggauss(200)
     y, y_weight = np.polynomial.legendre.leggauss(64)
@@ -295,7 +298,7 @@ def plain_albedo(thread: Thread, count: int = 721) -> tuple[Floats, Floats]:
     narrow = 2 * thread.gamma_surface
     albedo = np.empty(count)
     for k, t in enumerate(theta):
-        # The nodes follow the lobe, which narrow threads squeeze between any fixed grid.
+        # The nodes follow the lobe, because a narrow lobe falls between the points of a fixed grid.
         lo, hi = max(-math.pi / 2, -t - 9 * narrow), min(math.pi / 2, -t + 9 * narrow)
         out = np.broadcast_to((lo + (hi - lo) * (x + 1) / 2)[:, None], shape)
         i = plain.Angles(theta=np.full(shape, t), phi=still, psi=still)

@@ -1,9 +1,9 @@
-"""`microcylinder`: [Sadeghi2013], the default.
+"""The `microcylinder` model of [Sadeghi2013], the default.
 
     surface = F_r cos(phi_d/2) g(gs, theta_h)/cos^2 theta_d
     volume  = F_t^2 ((1-kd) g(gv, theta_h) + kd)/(cos theta_i + cos theta_o)/cos^2 theta_d
 
-with Fresnel at the cosine cos theta_d cos(phi_d/2).
+with the Fresnel terms at the incidence cosine cos theta_d cos(phi_d/2).
 """
 
 from __future__ import annotations

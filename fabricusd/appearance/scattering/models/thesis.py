@@ -1,11 +1,11 @@
-"""`thesis`: [Bisker2011] eqs. 4.4-4.6, as printed.
+"""The `thesis` model: [Bisker2011] eqs. 4.4-4.6, as printed.
 
     surface = F_r(eta, cos theta_h cos(phi_d/2)) cos(phi_d/2) g(gs, theta_h)/cos^2 theta_d
     volume  = F_t(eta, cos theta_i) F_t(eta, cos theta_o) ((1-kd) g(gv, theta_h) + kd)
               / (cos theta_i + cos theta_o)/cos^2 theta_d
 
-theta_h in Fresnel's angle looks like an erratum: it is 0 in the mirror direction, where the
-inclination so drops out. It stays, to reproduce what was printed.
+The theta_h in the angle of the surface's Fresnel term looks like an erratum: it is 0 in the mirror
+direction, so the inclination drops out there. It is kept to reproduce the printed formula.
 """
 
 from __future__ import annotations
