@@ -217,12 +217,12 @@ def _direct_loop(R, model, row, ix, iy, iz, ox, oy, oz, r, g, b):
 
 
 @njit(**INLINE)
-def _table_loop(R, model, row, through, ix, iy, iz, ox, oy, oz, r, g, b):
+def _table_loop(R, model, row, scale, added, ix, iy, iz, ox, oy, oz, r, g, b):
     for k in range(ix.size):
         cos_i, cos_o, cos_half = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
         surface, volume = factors(R, model, row, ix[k], cos_i, ox[k], cos_o, cos_half)
         on_surface, on_volume = lobes(R, model, row, ix[k], cos_i, ox[k], cos_o)
-        surface, volume = surface * on_surface, volume * on_volume * through[k]
+        surface, volume = surface * on_surface, volume * on_volume * scale[k] + added[k]
         r[k] = surface + volume * row[ALBEDO_R]
         g[k] = surface + volume * row[ALBEDO_G]
         b[k] = surface + volume * row[ALBEDO_B]
@@ -238,17 +238,17 @@ def _direct_block(R, model, row, ix, iy, iz, ox, oy, oz, r, g, b):
 
 
 @njit(**KERNEL)
-def _table_block(R, model, row, through, ix, iy, iz, ox, oy, oz, r, g, b):
-    _by_table(R, model, row, through, ix, iy, iz, ox, oy, oz, r, g, b)
+def _table_block(R, model, row, scale, added, ix, iy, iz, ox, oy, oz, r, g, b):
+    _by_table(R, model, row, scale, added, ix, iy, iz, ox, oy, oz, r, g, b)
 
 
 @njit(**KERNEL)
-def _through_block(R, model, row, iy, iz, oy, oz, out):
-    """The factors that models look up in tables, in a loop of their own: the loops above then
+def _looked_up_block(R, model, row, iy, iz, oy, oz, scale, added):
+    """The values that models look up in tables, in a loop of their own: the loops above then
     contain no gathers."""
-    for k in range(out.size):
+    for k in range(scale.size):
         cos_i, cos_o, _ = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
-        out[k] = looked_up(R, model, row, cos_i, cos_o)
+        scale[k], added[k] = looked_up(R, model, row, cos_i, cos_o)
 
 
 @njit(**KERNEL, parallel=True)
@@ -262,9 +262,9 @@ def _evaluate_soa(R, row, wi, wo, out):
         ox, oy, oz = wo[0, s], wo[1, s], wo[2, s]
         r, g, b = out[0, s], out[1, s], out[2, s]
         if _HAS_TABLE[model]:
-            through = np.empty(ix.size, R)
-            _through_block(R, model, row, iy, iz, oy, oz, through)
-            _table_block(R, model, constants, through, ix, iy, iz, ox, oy, oz, r, g, b)
+            scale, added = np.empty(ix.size, R), np.empty(ix.size, R)
+            _looked_up_block(R, model, row, iy, iz, oy, oz, scale, added)
+            _table_block(R, model, constants, scale, added, ix, iy, iz, ox, oy, oz, r, g, b)
         else:
             _direct_block(R, model, constants, ix, iy, iz, ox, oy, oz, r, g, b)
 

@@ -56,7 +56,9 @@ def _albedo(t, model, theta_i, pieces=48):
     widths = (t.gamma_surface, t.gamma_volume)
     edges = [np.linspace(-math.pi / 2, math.pi / 2, pieces)]
     edges += [-theta_i + 2 * s * np.linspace(-9, 9, pieces) for s in widths]
-    theta = np.unique(np.clip(np.concatenate((*edges, [theta_i])), -math.pi / 2, math.pi / 2))
+    # The larger of the two cosines has a kink at either inclination.
+    edges.append(np.array([-theta_i, theta_i]))
+    theta = np.unique(np.clip(np.concatenate(edges), -math.pi / 2, math.pi / 2))
     x, wx = np.polynomial.legendre.leggauss(8)
     y, wy = np.polynomial.legendre.leggauss(24)
     half = np.diff(theta)[:, None] / 2

@@ -20,13 +20,15 @@ POINT_COLUMNS : the number of these columns; the vectorised loops over points co
 """
 
 (
-    SURFACE_GAIN, LAW, SURFACE_WIDTH, VOLUME_WIDTH, BRIGHTNESS, INVERSE_T_MAX, TRANSMISSION,
-) = range(POINT_COLUMNS, POINT_COLUMNS + 7)  # fmt: skip
+    SURFACE_GAIN, LAW, SURFACE_WIDTH, VOLUME_WIDTH, BRIGHTNESS, INVERSE_T_MAX, COMPLETION_SCALE,
+    TRANSMISSION,
+) = range(POINT_COLUMNS, POINT_COLUMNS + 8)  # fmt: skip
 """SURFACE_GAIN : ks
 LAW : `model.PUBLISHED` or `model.CONSERVING`
 SURFACE_WIDTH, VOLUME_WIDTH : standard deviations of theta_i in the samplers' two lobes [rad]
 BRIGHTNESS : mean of the albedo's channels, for sampling
 INVERSE_T_MAX : 1/T_max, for models with a table
+COMPLETION_SCALE : sqrt(2 pi X), by which an entry of the table at COMPLETION becomes x(theta)
 TRANSMISSION : first of TRANSMISSION_ENTRIES + 1 columns: T at sqrt(cos theta) from 0 to 1, with the
     last entry repeated; 0 for models without this table
 """
@@ -34,5 +36,10 @@ TRANSMISSION : first of TRANSMISSION_ENTRIES + 1 columns: T at sqrt(cos theta) f
 CONSTANTS = TRANSMISSION
 """Number of columns before the table."""
 
-TRANSMISSION_ENTRIES = 361
-COLUMNS = TRANSMISSION + TRANSMISSION_ENTRIES + 1
+TRANSMISSION_ENTRIES = 721
+
+COMPLETION = TRANSMISSION + TRANSMISSION_ENTRIES + 1
+"""First column of a table like that at TRANSMISSION: x/sqrt(2 pi X), what the other two terms lose
+of the energy at A = 1; 0 for models without it."""
+
+COLUMNS = COMPLETION + TRANSMISSION_ENTRIES + 1

@@ -3,8 +3,8 @@
 In every model `f_s = surface + volume A` per channel, in 1/sr, without a cosine. It is the
 scattering function of a curve, so `L_o = integral f_s L_i cos(theta_i) dwi` with the cosine of the
 *inclination*. Each of the two terms is a factor times a lobe in the inclinations; the published
-surface law can average the lobes over a stretch of the curve and evaluate the factors once. Neither
-term is ever negative.
+surface law can average the lobes over a stretch of the curve and evaluate the factors once. A model
+may scale its volume term, and add to it, by values from tables. Neither term is ever negative.
 """
 
 from __future__ import annotations
@@ -53,8 +53,10 @@ class ThreadModel:
     cell_lobes : (R, row, half, sin_i, cos_i, cos_phi_i, sin_o, cos_o, cos_phi_o) -> `lobes`,
         averaged over tangent angles up to `half` [rad] to each side; None if no closed form is
         known, in which case curves are integrated by points only
-    looked_up : (R, row, cos_i, cos_o) -> a factor of the volume term, read from a table; None for 1
+    looked_up : (R, row, cos_i, cos_o) -> (factor, addend) of the volume term, read from tables;
+        None for (1, 0)
     transmission : thread -> T for the columns from TRANSMISSION on; None without this table
+    completion : thread -> (x for the columns from COMPLETION on, X); None without this table
     widths : gs, gv -> the standard deviations of theta_i [rad] that samplers use for the surface
         and the volume lobe around the mirror inclination
     most_albedo : `A` is clamped to this value, which is 1 if `A` is an albedo
@@ -70,5 +72,6 @@ class ThreadModel:
     cell_lobes: Kernel = None
     looked_up: Kernel = None
     transmission: Callable[[Thread], Floats] | None = None
+    completion: Callable[[Thread], tuple[Floats, float]] | None = None
     widths: Callable[[float, float], tuple[float, float]] = mirror_widths
     most_albedo: float = math.inf

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -40,9 +41,18 @@ def thread_row(thread: Thread, name: str) -> NDArray[np.float64]:
         row[first : first + 2] = model.lobe_constants(deviation)
     if model.transmission is not None:
         through = model.transmission(thread)
-        row[column.TRANSMISSION : -1] = through
-        row[-1] = through[-1]
+        _fill(row, column.TRANSMISSION, through)
         # A surface that reflects everything transmits nothing; T/T_max is then 0 instead of 0/0.
         largest = float(through.max())
         row[column.INVERSE_T_MAX] = 1.0 / largest if largest > 0 else 0.0
+    if model.completion is not None:
+        lost, norm = model.completion(thread)
+        row[column.COMPLETION_SCALE] = scale = (2.0 * math.pi * norm) ** 0.5
+        _fill(row, column.COMPLETION, lost / scale if scale > 0 else lost)
     return row
+
+
+def _fill(row: NDArray[np.float64], first: int, entries: NDArray[np.float64]) -> None:
+    """Write a table of TRANSMISSION_ENTRIES values, the last one twice."""
+    row[first : first + len(entries)] = entries
+    row[first + len(entries)] = entries[-1]

@@ -22,14 +22,14 @@ CELL_MODELS = tuple(k for k in PUBLISHED_MODELS if REGISTRY[k].cell_lobes is not
 
 
 @njit(**INLINE)
-def _one(R, row, cos_i, cos_o):
-    return R(1)
+def _no_table(R, row, cos_i, cos_o):
+    return R(1), R(0)
 
 
 def _parts(name: str, numbers: Iterable[int]) -> Any:
     """A kernel (R, model, row, ...) that selects one field of `ThreadModel` by the model's
     number."""
-    return by_number({k: getattr(REGISTRY[k], name) or _one for k in numbers})
+    return by_number({k: getattr(REGISTRY[k], name) or _no_table for k in numbers})
 
 
 factors, lobes = _parts("factors", ALL), _parts("lobes", ALL)
@@ -54,8 +54,8 @@ def terms_at(R, row, sin_i, cos_i, sin_o, cos_o, cos_half):
     model = int(row[MODEL])
     surface, volume = factors(R, model, row, sin_i, cos_i, sin_o, cos_o, cos_half)
     on_surface, on_volume = lobes(R, model, row, sin_i, cos_i, sin_o, cos_o)
-    through = looked_up(R, model, row, cos_i, cos_o)
-    return surface * on_surface, volume * on_volume * through
+    scale, added = looked_up(R, model, row, cos_i, cos_o)
+    return surface * on_surface, volume * on_volume * scale + added
 
 
 @njit(**INLINE)
@@ -83,5 +83,5 @@ def conserving_terms(R, row, ix, iy, iz, ox, oy, oz):
     cos_i, cos_o, cos_half = pair_angles(R, iy, iz, oy, oz)
     surface, volume = _conserving_factors(R, model, row, ix, cos_i, ox, cos_o, cos_half)
     on_surface, on_volume = _conserving_lobes(R, model, row, ix, cos_i, ox, cos_o)
-    through = _conserving_looked_up(R, model, row, cos_i, cos_o)
-    return surface * on_surface, volume * on_volume * through
+    scale, added = _conserving_looked_up(R, model, row, cos_i, cos_o)
+    return surface * on_surface, volume * on_volume * scale + added

@@ -1,13 +1,17 @@
-"""The `conserving` model: reciprocal, and passive for every albedo `A` up to 1. MODEL section 2.
+"""The `conserving` model: reciprocal, with the directional albedo E + A (1 - E) for every `A` <= 1.
 
     surface = min(1, ks F_r(eta, cos theta_d cos(phi_d/2))) cos(phi_d/2)/4
               K(theta_i, theta_o; 2 gs)/max(cos theta_i, cos theta_o)
     volume  = T(theta_i) T(theta_o)/T_max
               ((1-kd) K(theta_i, theta_o; 2 gv)/(2 pi max(cos theta_i, cos theta_o)) + kd/pi^2)
+              + x(theta_i) x(theta_o)/(2 pi X)
 
 K is the longitudinal kernel of [dEon2011]. T = 1 - E, where E(theta) is the directional albedo of
 the surface term, tabulated per thread. K/max(cos_i, cos_o) integrates to at most 1 against cos^2,
-so the volume term scatters at most T/T_max <= 1 of the light that the surface transmits.
+so the first two terms are passive. At A = 1 they scatter E + V and lose 8 to 11 % of the light. The
+last term returns it, as [KullaConty2017] does for a surface, here in one dimension:
+x = max(0, 1 - E - V), and X is the integral of x cos^2(theta) dtheta over +-90 degrees of the table
+as it is interpolated. Source: MODEL sections 2 and 13.
 """
 
 from __future__ import annotations
@@ -24,6 +28,8 @@ from fabricusd.appearance.scattering import plain_lobes as plain
 from fabricusd.appearance.scattering.columns import (
     BRIGHTNESS,
     COLUMNS,
+    COMPLETION,
+    COMPLETION_SCALE,
     GAMMA_SURFACE,
     INVERSE_T_MAX,
     IOR_EXCESS,
@@ -79,33 +85,42 @@ def lobe_constants(gamma: float) -> tuple[float, float]:
 
 
 @njit(**INLINE)
-def transmission(R, row, cos_theta):
-    """T(theta) = 1 - E(theta), the transmittance of the surface, from the thread's table.
+def tabulated(R, row, cos_theta):
+    """(T, x/sqrt(2 pi X)): the transmittance of the surface, and the light that is lost.
 
-    The entries are uniform in sqrt(cos theta). E is even in theta and therefore smooth in the
-    cosine, and it is steep only within the lobe's width of 90 degrees, where this spacing is
+    The entries are uniform in sqrt(cos theta). Both are even in theta and therefore smooth in the
+    cosine, and they are steep only within the lobe's width of 90 degrees, where this spacing is
     finest.
     """
     position = math.sqrt(cos_theta) * R(TRANSMISSION_ENTRIES - 1)
     index = np.int32(min(position, R(TRANSMISSION_ENTRIES - 1)))
-    low = row[TRANSMISSION + index]
-    high = row[TRANSMISSION + 1 + index]
-    return low + (position - R(index)) * (high - low)
+    part = position - R(index)
+    through, lost = row[TRANSMISSION + index], row[COMPLETION + index]
+    through += part * (row[TRANSMISSION + 1 + index] - through)
+    lost += part * (row[COMPLETION + 1 + index] - lost)
+    return through, lost
 
 
 @njit(**INLINE)
 def looked_up(R, row, cos_i, cos_o):
-    """T(theta_i) T(theta_o)/T_max."""
-    return transmission(R, row, cos_i) * transmission(R, row, cos_o) * row[INVERSE_T_MAX]
+    """(T(theta_i) T(theta_o)/T_max, x(theta_i) x(theta_o)/(2 pi X))."""
+    through_i, lost_i = tabulated(R, row, cos_i)
+    through_o, lost_o = tabulated(R, row, cos_o)
+    return through_i * through_o * row[INVERSE_T_MAX], lost_i * lost_o
 
 
 @njit(**INLINE)
 def energies(R, row, cos_o, transmitted, around, narrow_s, narrow_v):
-    """See `ThreadModel.energies`; they follow from E, which is read from the table."""
-    through = transmission(R, row, cos_o)
+    """See `ThreadModel.energies`; they follow from E, which is read from the table.
+
+    The last term has no lobe of its own; the isotropic lobe samples it.
+    """
+    through, lost = tabulated(R, row, cos_o)
     whole = through * through * row[INVERSE_T_MAX] * row[BRIGHTNESS]
+    completed = lost * row[COMPLETION_SCALE] * row[BRIGHTNESS]
     kd = row[ISOTROPIC]
-    return (R(1) - through) / max(around, R(1e-30)), (R(1) - kd) * whole, kd * whole
+    surface = (R(1) - through) / max(around, R(1e-30))
+    return surface, (R(1) - kd) * whole, kd * whole + completed
 
 
 def thread_transmission(thread: Thread) -> Floats:
@@ -168,6 +183,99 @@ def _integrate_surface(row, x, x_weight, phi, phi_weight, out):
         out[k] = total
 
 
+def thread_completion(thread: Thread) -> tuple[Floats, float]:
+    """((TRANSMISSION_ENTRIES,) x at sqrt(cos theta) uniform from 0 to 1, X)."""
+    gs, gv = max(thread.gamma_surface, NARROWEST), max(thread.gamma_volume, NARROWEST)
+    return lost_energy(gs, thread.ior, thread.surface_gain, gv, thread.isotropic)
+
+
+LEAST_NORM = 1e-9
+"""Below this X nothing is lost but rounding; the last term is left out."""
+
+
+@lru_cache(maxsize=256)
+def lost_energy(
+    gamma_surface: float, ior: float, surface_gain: float, gamma_volume: float, isotropic: float
+) -> tuple[Floats, float]:
+    """(x, X): what the surface and the volume term lose of the light at A = 1, by inclination.
+
+    x : (TRANSMISSION_ENTRIES,) max(0, 1 - E - V) at sqrt(cos theta) uniform from 0 to 1
+    X : integral of x cos^2 theta over +-90 degrees, of x interpolated linearly in sqrt(cos theta);
+        0, and x with it, where that is below LEAST_NORM
+    """
+    through = 1.0 - surface_albedo(gamma_surface, ior, surface_gain)
+    volume = np.zeros_like(through)
+    largest = float(through.max())
+    if largest > 0.0:
+        x, x_weight = np.polynomial.legendre.leggauss(_NODES)
+        constants = np.array(lobe_constants(gamma_volume))
+        reach = 2.0 * _REACH * gamma_volume
+        _integrate_volume(through, constants, reach, x, x_weight, volume)
+        even = 2.0 / math.pi * cosine_square_integral(through)
+        volume = through / largest * ((1.0 - isotropic) * volume + isotropic * even)
+    lost = np.maximum(0.0, through - volume)
+    norm = cosine_square_integral(lost)
+    if norm < LEAST_NORM:
+        lost, norm = np.zeros_like(lost), 0.0
+    lost.flags.writeable = False
+    return lost, norm
+
+
+def cosine_square_integral(entries: Floats) -> float:
+    """Integral of f cos^2 theta dtheta over +-90 degrees, f interpolated between `entries`.
+
+    entries : (n,) f at sqrt(cos theta) uniform from 0 to 1, even in theta
+    """
+    knots = np.linspace(0.0, 1.0, len(entries))
+    # In t = sqrt(1 - sqrt(cos theta)) the integrand is smooth up to theta = 0.
+    t = np.sqrt(1.0 - knots)
+    x, weight = np.polynomial.legendre.leggauss(6)
+    half = 0.5 * (t[:-1] - t[1:])
+    at = t[1:, None] + half[:, None] * (x + 1.0)
+    root = 1.0 - at * at
+    f = np.interp(root, knots, entries)
+    slope = 4.0 * root / np.sqrt((1.0 + root) * (1.0 + root * root))
+    return 2.0 * float((f * root**4 * slope * half[:, None] * weight).sum())
+
+
+@njit(**INLINE)
+def _interpolated(entries, cos_theta):
+    """An entry of a table over sqrt(cos theta)."""
+    position = math.sqrt(cos_theta) * (entries.size - 1)
+    index = min(int(position), entries.size - 2)
+    return entries[index] + (position - index) * (entries[index + 1] - entries[index])
+
+
+@njit(**KERNEL)
+def _integrate_volume(through, constants, reach, x, x_weight, out):
+    """`out[k]` = integral T K/max(cos, cos) cos^2 over the inclinations, for sqrt(cos) = k/(n-1).
+
+    constants, reach : of the lobe; how far from the mirror inclination it is integrated [rad]
+    """
+    R = np.float64
+    for k in range(out.size):
+        cos_theta = (k / (out.size - 1)) ** 2
+        sin_theta = math.sqrt(1.0 - cos_theta * cos_theta)
+        theta = math.acos(cos_theta)
+        high = min(-theta + reach, 0.5 * math.pi)
+        # The larger cosine has kinks at -theta and theta.
+        bounds = (max(-theta - reach, -0.5 * math.pi), -theta, min(theta, high), high)
+        total = 0.0
+        for part in range(3):
+            step = (bounds[part + 1] - bounds[part]) / _PIECES
+            for node in range(_PIECES * x.size):
+                piece, a = divmod(node, x.size)
+                o = bounds[part] + step * (piece + 0.5 * (x[a] + 1.0))
+                sin_o, cos_o = math.sin(o), max(math.cos(o), 0.0)
+                lobe = longitudinal(
+                    R, constants[0], constants[1], sin_theta, cos_theta, sin_o, cos_o
+                )
+                widest = max(cos_theta, cos_o, COS_MINIMUM)
+                weight = 0.5 * step * x_weight[a] * cos_o * cos_o / widest
+                total += weight * lobe * _interpolated(through, cos_o)
+        out[k] = total
+
+
 def plain_surface(thread: Thread, i: plain.Angles, o: plain.Angles) -> Floats:
     """(n,) surface term [1/sr], in plain NumPy."""
     cos_half = plain.half_azimuth(i, o)
@@ -178,9 +286,10 @@ def plain_surface(thread: Thread, i: plain.Angles, o: plain.Angles) -> Floats:
 
 
 @lru_cache(maxsize=64)
-def plain_albedo(thread: Thread, count: int = 181) -> tuple[Floats, Floats]:
+def plain_albedo(thread: Thread, count: int = 721) -> tuple[Floats, Floats]:
     """(|theta|, E) in plain NumPy: the directional albedo of the surface term, at most 1."""
-    theta = np.linspace(0, math.pi / 2, count)
+    # Denser towards 90 degrees, where narrow lobes make E steep.
+    theta = math.pi / 2 * np.sin(np.linspace(0, math.pi / 2, count))
     x, x_weight = np.polynomial.legendre.leggauss(200)
     y, y_weight = np.polynomial.legendre.leggauss(64)
     shape = (len(x), len(y))
@@ -208,7 +317,35 @@ def plain_terms(thread: Thread, i: plain.Angles, o: plain.Angles) -> tuple[Float
     widest = np.maximum(np.maximum(np.cos(i.theta), np.cos(o.theta)), 1e-6)
     lobe = (1 - thread.isotropic) * k / (2 * math.pi * widest)
     volume = t_i * t_o / kept.max() * (lobe + thread.isotropic / math.pi**2)
-    return plain_surface(thread, i, o), volume
+    lost = plain_lost(thread)
+    x_i, x_o = np.interp(abs(i.theta), table, lost), np.interp(abs(o.theta), table, lost)
+    fine = np.linspace(0, math.pi / 2, 20001)
+    norm = 2 * np.trapezoid(np.interp(fine, table, lost) * np.cos(fine) ** 2, fine)
+    completed = x_i * x_o / (2 * math.pi * norm) if norm > LEAST_NORM else 0.0
+    return plain_surface(thread, i, o), volume + completed
+
+
+@lru_cache(maxsize=64)
+def plain_lost(thread: Thread) -> Floats:
+    """x at the inclinations of `plain_albedo`, in plain NumPy."""
+    table, albedo = plain_albedo(thread)
+    kept = 1 - albedo
+    x, weight = np.polynomial.legendre.leggauss(400)
+    narrow = 2 * thread.gamma_volume
+    wide = x * math.pi / 2
+    around = weight * math.pi / 2 @ (np.interp(abs(wide), table, kept) * np.cos(wide) ** 2)
+    lost = np.empty(len(table))
+    for n, t in enumerate(table):
+        lo, hi = max(-math.pi / 2, -t - 9 * narrow), min(math.pi / 2, -t + 9 * narrow)
+        out = lo + (hi - lo) * (x + 1) / 2
+        k = plain.longitudinal(np.full_like(out, t), out, narrow)
+        widest = np.maximum(np.maximum(np.cos(out), math.cos(t)), 1e-6)
+        through = np.interp(abs(out), table, kept) * np.cos(out) ** 2
+        lobe = weight * (hi - lo) / 2 @ (through * k / widest)
+        diffuse = 2 / math.pi * around
+        volume = (1 - thread.isotropic) * lobe + thread.isotropic * diffuse
+        lost[n] = max(0, kept[n] * (1 - volume / kept.max()))
+    return lost
 
 
 MODEL = ThreadModel(
@@ -219,6 +356,7 @@ MODEL = ThreadModel(
     lobe_constants=lobe_constants,
     looked_up=looked_up,
     transmission=thread_transmission,
+    completion=thread_completion,
     energies=energies,
     plain=plain_terms,
     most_albedo=1.0,
