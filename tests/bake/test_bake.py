@@ -229,7 +229,7 @@ def test_a_folder_that_is_a_file_or_not_ours_is_refused(square, linen, tmp_path)
     file.write_text("")
     with pytest.raises(FabricError, match="is a file"):
         bake(square, file, SMALL, fabric=linen)
-    with pytest.raises(FabricError, match="cannot be made"):
+    with pytest.raises(FabricError, match="cannot be created"):
         bake(square, file / "below", SMALL, fabric=linen)
 
 

@@ -58,7 +58,7 @@ def test_a_dry_run_refuses_overlaps_and_folders_that_cannot_be(tmp_path):
         plan(twice, settings, fabric="linen_plain", out=tmp_path / "out")
     assert not list(tmp_path.glob("*.png"))
     square = write_quad(tmp_path / "square.obj")
-    for out, words in ((square, "is a file"), (square / "below", "cannot be made")):
+    for out, words in ((square, "is a file"), (square / "below", "cannot be created")):
         with pytest.raises(FabricError, match=words):
             plan(square, settings, fabric="linen_plain", out=out)
 

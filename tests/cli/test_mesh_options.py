@@ -52,7 +52,7 @@ def test_dry_runs_print_size_threads_and_texels(tmp_path, capsys):
     assert main(["bake", *common]) == 0
     shown = capsys.readouterr()
     assert "1024 x 1024, 0.853 texels per thread; " + threads in shown.out
-    assert "0.85 texels per thread; threads resolve from 2" in shown.err
+    assert "0.85 texels per thread; threads are resolved from 2" in shown.err
     assert list(tmp_path.iterdir()) == []
 
 
