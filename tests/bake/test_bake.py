@@ -93,7 +93,7 @@ def test_a_set_is_relit_from_its_folder(square, linen, tmp_path):
     assert picture.shape == (32, 32, 3)
     assert picture.min() >= 0
     assert picture.mean() > 0.01
-    with pytest.raises(FabricError, match="holds no map"):
+    with pytest.raises(FabricError, match="has no map"):
         baked.read(name, "nothing")
 
 

@@ -1,8 +1,9 @@
-"""A baked set under any light and view: the loader of our own maps.
+"""Load a bake and re-light its textures under any pair of light and view directions.
 
-Each thread set of a texel is re-lit from the share that it covers, its `A`, and the mean and
-standard deviation of its tangent angle, about which the angles lie as in the fabric. So a fine
-level gives the appearance level `weave`, the coarsest `far`.
+Each thread set of a texel is re-lit from the share of the texel that it covers, its `A`, and the
+mean and standard deviation of its tangent angle. The angles are distributed about the mean as they
+are in the fabric. A fine mip level therefore reproduces appearance level `weave`, and the coarsest
+one level `far`.
 """
 
 from __future__ import annotations
@@ -36,22 +37,22 @@ from fabricusd.kernels.real import KERNEL
 Floats = NDArray[np.float64]
 
 PER_SET = (("thread", "lean"), ("thread", "share", "angle"), ("thread", "share", "angle", "spread"))
-"""Maps of each thread set that suffice to re-light, cheapest first. Without shares of parts a set
-has one mean angle and one spread; without spreads a part has one angle."""
+"""Maps of each thread set that suffice to re-light it, cheapest choice first. Without the shares of
+its parts a set has one mean angle and one spread; without spreads a part has one angle."""
 
 RELIT = tuple(
     ("thread_id", *(f"{noun}_{what}" for noun in ("weft", "warp") for what in per_set))
     for per_set in PER_SET
 )
-"""Maps that are re-lit, cheapest choice first."""
+"""Maps to re-light from, cheapest choice first."""
 
 NEEDED = RELIT[-1]
-"""Those that lose least."""
+"""The most accurate choice."""
 
 
 @dataclass(frozen=True, eq=False)
 class BakedSet:
-    """A folder of textures, by its manifest."""
+    """A folder of baked textures, read by its manifest."""
 
     folder: Path
     manifest: dict[str, Any]
@@ -59,16 +60,16 @@ class BakedSet:
     @classmethod
     @reads("a bake")
     def load(cls, folder: str | Path) -> BakedSet:
-        """Read the manifest of `folder`; FabricError where there is none, or a faulty one."""
+        """Read the manifest of `folder`; raise FabricError if it is missing or invalid."""
         return cls(Path(folder), read_manifest(Path(folder)))
 
     def read(self, garment: str, name: str, level: int = 0, tile: int = 1001) -> NDArray[Any]:
-        """(h, w, c) float32 of one map's level."""
+        """(h, w, c) float32 pixels of one level of a map."""
         files = self.manifest["garments"].get(garment, {}).get("files", {})
         if str(tile) not in files.get(name, {}):
             raise FabricError(
                 str(self.folder),
-                f"holds no map '{name}' of '{garment}' in tile {tile}; it must be one of "
+                f"has no map '{name}' of '{garment}' in tile {tile}; it must be one of "
                 f"{', '.join(files) or 'none'}",
             )
         said = files[name][str(tile)]
@@ -86,15 +87,16 @@ class BakedSet:
         level: int = 0,
         tile: int = 1001,
     ) -> Floats:
-        """(h, w, 3) radiance per unit `L_i dwi` towards wo, black outside the layout.
+        """(h, w, 3) radiance per unit `L_i dwi` towards wo, black outside the UV layout.
 
-        fabrics : of each lay, as the manifest counts them
+        fabrics : of each lay, in the order of the manifest
         wi, wo : (3,) unit vectors in UV axes: x along u, y along v, z out of the cloth
         """
         known = self.manifest["garments"]
         if garment not in known:
             raise FabricError(
-                str(self.folder), f"has no garment '{garment}'; it must be of {', '.join(known)}"
+                str(self.folder),
+                f"has no garment '{garment}'; it must be one of {', '.join(known)}",
             )
         maps = {
             name: self.read(garment, name, level, tile)
@@ -119,8 +121,9 @@ class BakedSet:
 def relight(
     maps: Mapping[str, NDArray[Any]], fabric: Fabric, wi: ArrayLike, wo: ArrayLike
 ) -> Floats:
-    """(n, 3) radiance per unit `L_i dwi` of texels whose maps, one of RELIT, are (n, channels).
+    """(n, 3) radiance per unit `L_i dwi` of texels.
 
+    maps : (n, channels) by name, one of the choices in RELIT
     wi, wo : (3,) unit vectors in the weave's frame, x along U, y along V
     """
     types = len(fabric.threads)
@@ -130,9 +133,9 @@ def relight(
     sets = np.stack([_set_of(maps, noun) for noun in ("weft", "warp")], axis=1)
     shapes = angle_shapes(fabric)
     if "weft_share" not in maps:
-        # The one part is the whole set.
+        # The single part is the whole set.
         shapes = np.repeat(shapes[:, PARTS:], PARTS + 1, axis=1)
-    # Bakes of earlier versions have 255 for none.
+    # Earlier versions stored 255 for texels without a thread.
     kinds = np.where((ids >= 0) & (ids < 2 * types), ids, NO_THREAD).astype(np.int64)
     out = np.zeros((len(ids), 3))
     i, o = (np.asarray(w, np.float64) for w in (wi, wo))
@@ -141,17 +144,17 @@ def relight(
 
 
 def best_choice(names: Collection[str]) -> tuple[str, ...]:
-    """The one of RELIT that loses least among maps of these names, NEEDED where there is none."""
+    """Return the most accurate choice in RELIT that these maps allow, or NEEDED if none does."""
     return next((c for c in reversed(RELIT) if set(c) <= set(names)), NEEDED)
 
 
 def _set_of(maps: Mapping[str, NDArray[Any]], noun: str) -> Floats:
-    """(n, 16): `A` and share; shares, mean angles and deviations of the parts of a thread set."""
+    """(n, 16) values of a thread set: `A` and share; shares, mean angles and deviations by part."""
     thread = maps[f"{noun}_thread"]
     found = np.zeros((len(thread), 4 + 3 * PARTS))
     found[:, :4] = thread
     if f"{noun}_share" not in maps:
-        # One part is the whole set.
+        # The first part stands for the whole set.
         found[:, 4] = thread[:, 3]
         found[:, 4 + PARTS], found[:, 4 + 2 * PARTS] = maps[f"{noun}_lean"].T
         return found
@@ -165,9 +168,10 @@ def _set_of(maps: Mapping[str, NDArray[Any]], noun: str) -> Floats:
 def _relight(  # type: ignore[no-untyped-def]
     tables, share, shapes, types, sets, kinds, wi, wo, out
 ):
-    """sets (n, 2, 16): `A` and share; shares, angles and deviations of the parts.
+    """Add the radiance of each texel to out (n, 3).
 
-    kinds (n,) : thread ids, -1 for none
+    sets : (n, 2, 16) `A` and share; shares, mean angles and deviations by part
+    kinds : (n,) thread ids, -1 for none
     """
     R = np.float64
     precision = tables.overlap_precision
@@ -182,7 +186,7 @@ def _relight(  # type: ignore[no-untyped-def]
                 R, j, precision, wi[0], wi[1], wi[2], wo[0], wo[1], wo[2]
             )
             for kind in range(types):
-                # The thread under the centre speaks for its set where there is one.
+                # If a thread lies under the texel's centre, it stands for its whole set.
                 weight = share[j, kind]
                 if kinds[k] >= 0 and kinds[k] // types == j:
                     weight = 1.0 if kinds[k] % types == kind else 0.0
@@ -205,7 +209,11 @@ def _relight(  # type: ignore[no-untyped-def]
 def _stretch(  # type: ignore[no-untyped-def]
     R, tables, row, middle, spread, shape, a_i, b_i, iz, s_i, a_o, b_o, oz, s_o, u
 ):
-    """Surface and volume term of a thread whose angles have this mean, deviation and shape."""
+    """Return the surface and volume terms of a thread, integrated over its tangent angles.
+
+    middle, spread : mean and standard deviation of the angles [rad]
+    shape : angles of mean 0 and deviation 1, see `angle_shapes`
+    """
     fewest = 3.0 * math.sqrt(3.0) * spread / row[GAMMA_SURFACE]
     kind = 0
     while kind < len(COUNTS) - 1 and COUNTS[kind] < fewest:

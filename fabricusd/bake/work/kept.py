@@ -1,8 +1,8 @@
-"""What is kept of a block until the textures are put together.
+"""Checkpoint the blocks of a bake on disk until the textures are assembled.
 
-Of a sheet whose lays all have a table the layout alone is kept, and each texture looks its texels
-up when it is written: that costs less than writing all maps and reading them again. Of any other
-sheet all maps are. Either way a killed bake goes on where it stopped.
+If all lays of a sheet have a cell table, only the layout of each block is stored, and each texture
+looks up its texels when it is written: that costs less than writing all maps and reading them back.
+For any other sheet all maps are stored. In both cases a killed bake resumes where it stopped.
 """
 
 from __future__ import annotations
@@ -24,40 +24,41 @@ from fabricusd.bake.texels.sheet import Sheet
 from fabricusd.files import whole_file
 
 DIGEST = 16
-"""Bytes of a checksum at a file's end; the block's top is before it."""
+"""Bytes of the checksum at a file's end; the block's top precedes it."""
 
 MOST = np.float32(1e12)
-"""Greatest value of a map or plane: sums of squares of it are within single precision."""
+"""Largest magnitude of a map's or plane's value, so that sums of its squares fit single precision.
+"""
 
 Floats = NDArray[np.float32]
 
 
 class Kept(Protocol):
-    """How the blocks of one sheet are kept in files, and the maps read from them."""
+    """How the blocks of one sheet are stored in files, and how maps are read back from them."""
 
     @property
     def bytes_needed(self) -> int:
-        """Of all blocks, at most."""
+        """Upper bound on the size of all blocks [bytes]."""
 
     def write(self, path: Path, bx: int, by: int) -> None:
-        """Keep a block."""
+        """Compute a block and store it."""
 
     def is_sound(self, path: Path) -> bool:
-        """Whether a block's file is there and can be what was written."""
+        """Whether a block's file exists and its checksum and contents are valid."""
 
     def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
-        """(h, w, channels) of map `k` in a block."""
+        """(h, w, channels) values of map `k` in a block."""
 
 
 def kept(sheet: Sheet, maps: Sequence[TextureMap]) -> Kept:
-    """The way that suits a sheet."""
+    """Choose how to store a sheet's blocks."""
     if all(table is not None for table in sheet.tables):
         return KeptLayout(sheet, maps)
     return KeptValues(sheet, maps)
 
 
 class KeptValues:
-    """All levels of all maps."""
+    """Stores all levels of all maps."""
 
     def __init__(self, sheet: Sheet, maps: Sequence[TextureMap]) -> None:
         self.sheet, self.maps = sheet, maps
@@ -73,7 +74,7 @@ class KeptValues:
         self.bytes_needed = int(ends[-1]) * sheet.across**2
 
     def write(self, path: Path, bx: int, by: int) -> None:
-        """Keep a block."""
+        """Compute a block and store it."""
         found, planes, share = bake_block(self.sheet, self.maps, bx, by)
         write_block(path, [*(level for one in found for level in one), planes, share])
 
@@ -100,10 +101,11 @@ class KeptValues:
 
 
 class KeptLayout:
-    """Whose each texel is, and the planes of texels that are owned in part.
+    """Stores the owner of each texel, and the planes of texels that are only partly owned.
 
-    A file holds owners (h, w) int16, one number where all are alike; then of each lay in it, by
-    number, and each level from the second, planes (PLANES, n) of the n cut texels.
+    A file holds the owners (h, w) int16, or a single number if all are equal. Then, for each lay in
+    increasing order and each level from the second, follow the planes (PLANES, n) of the n texels
+    that the lay owns in part.
     """
 
     def __init__(self, sheet: Sheet, maps: Sequence[TextureMap]) -> None:
@@ -111,7 +113,7 @@ class KeptLayout:
         self.bytes_needed = 2 * sheet.resolution**2
 
     def write(self, path: Path, bx: int, by: int) -> None:
-        """Keep a block."""
+        """Compute a block and store it."""
         n = self.sheet.block
         levels = list(layers_of(self.sheet, bx, by))
         owner = np.full((n, n), NOBODY, np.int16)
@@ -127,10 +129,10 @@ class KeptLayout:
         write_block(path, [*parts, *top(self.sheet, levels[-1])])
 
     def is_sound(self, path: Path) -> bool:
-        """Whether a block's file is whole, and its owners are lays of the sheet."""
+        """Whether a block's file is complete and its owners are lays of the sheet."""
         n, lays = self.sheet.block, len(self.sheet.garment.lays)
         tail = top_bytes(self.sheet) + DIGEST
-        # Lays that share a texel have a texel each below it, so a level has at most n * n parts.
+        # Lays that share a texel each own a finer texel in it: at most n * n parts per level.
         planes = 4 * PLANES * n * n * self.sheet.levels
         data = sound_data(path, 2 + tail, 2 * n * n + planes + tail)
         if data is None:
@@ -149,7 +151,7 @@ class KeptLayout:
         return are_values(np.frombuffer(data[2 * n * n : -tail], np.float32))
 
     def _cut(self, owner: NDArray[np.int16]) -> int:
-        """Texels of all levels and lays that are owned in part."""
+        """Count the partly owned texels of all levels and lays."""
         count = 0
         for number in np.unique(owner[owner != NOBODY]).tolist():
             owned = (owner == number).astype(np.float32)
@@ -193,7 +195,7 @@ class KeptLayout:
 
 
 def write_block(path: Path, parts: Sequence[NDArray[Any]]) -> None:
-    """A block's file, whole or not at all, its checksum at the end."""
+    """Write a block's file atomically, with its checksum at the end."""
     digest = hashlib.blake2b(digest_size=DIGEST)
     with whole_file(path, durable=False) as temporary, temporary.open("wb") as stream:
         for part in parts:
@@ -204,8 +206,11 @@ def write_block(path: Path, parts: Sequence[NDArray[Any]]) -> None:
 
 
 def sound_data(path: Path, least: int, most: int) -> bytes | None:
-    """What a block's file holds; None where it is not there, its size is not between `least` and
-    `most`, or its checksum is wrong."""
+    """Return the contents of a block's file.
+
+    None if the file does not exist, if its size is not from `least` to `most`, or if its checksum
+    is wrong.
+    """
     try:
         if not path.is_file() or not least <= path.stat().st_size <= most:
             return None
@@ -217,17 +222,17 @@ def sound_data(path: Path, least: int, most: int) -> bytes | None:
 
 
 def are_values(numbers: NDArray[Any]) -> bool:
-    """Whether all could be values of maps or planes, finite and not out of all bounds."""
+    """Whether all numbers are finite and small enough to be values of maps or planes."""
     return bool((np.abs(numbers) <= MOST).all())
 
 
 def top_bytes(sheet: Sheet) -> int:
-    """Bytes of a block's top before its checksum, see `read_top`."""
+    """Return the bytes of a block's top, which precedes its checksum, see `read_top`."""
     return 4 * len(sheet.garment.lays) * (PLANES + 1)
 
 
 def read_top(path: Path, sheet: Sheet) -> tuple[Floats, Floats]:
-    """(lays, PLANES) planes and (lays,) owned share of the texel that a block shrinks to."""
+    """Read the (lays, PLANES) planes and (lays,) owned shares of a block's coarsest texel."""
     lays = len(sheet.garment.lays)
     with path.open("rb") as stream:
         stream.seek(-DIGEST - top_bytes(sheet), 2)
