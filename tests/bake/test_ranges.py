@@ -19,9 +19,9 @@ from tests.bake.meshes import write_quad
 COMMANDS = [
     (["--light", "nan,nan,1"], "--light nan,nan,1.0 is no direction"),
     (["--light", "0,0,inf"], "three finite numbers"),
-    (["--light", "0,0,0"], "does not stand over the cloth"),
-    (["--light", "1e308,0,1"], "does not stand over the cloth"),
-    (["--light=0,0,-1"], "does not stand over the cloth"),
+    (["--light", "0,0,0"], "is not above the cloth"),
+    (["--light", "1e308,0,1"], "is not above the cloth"),
+    (["--light=0,0,-1"], "is not above the cloth"),
     (["--resolution", "0"], "--resolution is 0; it must be a power of two from 64"),
     (["--resolution", "-64"], "--resolution is -64"),
     (["--resolution", "65536"], "--resolution is 65536"),

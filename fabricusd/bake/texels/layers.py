@@ -1,7 +1,7 @@
-"""A square of texels as one lay of a fabric sees it, level by level.
+"""Compute a square of texels of one lay, level by level.
 
-Two layers with the same face: one computes every texel, the other looks texels up by their phase
-and computes those alone that the layout's border cuts.
+There are two implementations of one interface. One computes every texel. The other looks texels up
+by their phase, and computes only those that are cut by the border of the UV layout.
 """
 
 from __future__ import annotations
@@ -26,30 +26,36 @@ from fabricusd.kernels.real import LEAN
 Planes = NDArray[np.float32]
 
 LOOKED_UP = -1
-"""Instead of a column of own planes: the table holds the texel."""
+"""Stands for a column of own planes if the table holds the texel."""
 
 NONE: Planes = np.empty((PLANES, 0), np.float32)
 
 
 class Layer(Protocol):
-    """Texels of one lay at one level. owned : (h, w) float32 - share of each that is the lay's."""
+    """Texels of one lay at one mip level.
+
+    owned : (h, w) float32 - share of each texel that belongs to the lay
+    """
 
     owned: NDArray[np.float32]
 
     def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
-        """(n, channels) of a map, of the texels in `mine` (h, w), or of all."""
+        """(n, channels) values of a map for the texels in the mask `mine` (h, w), or for all."""
 
     def halved(self) -> Layer:
-        """The next coarser level."""
+        """Return the next coarser level."""
 
     def planes_at(self, j: int, i: int) -> Planes:
-        """(PLANES,) of one texel."""
+        """(PLANES,) planes of one texel."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Centres:
-    """What lies at the texels' centres: weave coordinates (h, w, 2) modulo the repeat, set and
-    thread type (h, w) there."""
+    """The weave at the texels' centres.
+
+    weave : (h, w, 2) weave coordinates, modulo the repeat
+    sets, threads : (h, w) thread set and thread type
+    """
 
     weave: NDArray[np.float64]
     sets: NDArray[np.uint8]
@@ -58,7 +64,11 @@ class Centres:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Place:
-    """Which texels, and which lay's."""
+    """A square of texels of one lay.
+
+    window : the texels at the finest level
+    level : mip level, 0 the finest
+    """
 
     sheet: Sheet
     lay: int
@@ -67,16 +77,16 @@ class Place:
 
     @property
     def size(self) -> int:
-        """Texels along a side."""
+        """Number of texels along a side."""
         return (self.window[2] - self.window[0]) >> self.level
 
     def halved(self) -> Place:
-        """The same place one level coarser."""
+        """Return the same place one level coarser."""
         return Place(sheet=self.sheet, lay=self.lay, window=self.window, level=self.level + 1)
 
     @cached_property
     def centres(self) -> Centres:
-        """What lies at the texels' centres."""
+        """The weave at the texels' centres."""
         n = self.size
         found = Centres(
             weave=np.empty((n, n, 2)),
@@ -90,7 +100,7 @@ class Place:
         return found
 
     def phases(self, counts: tuple[int, int]) -> NDArray[np.int32]:
-        """(h, w) entries of a table with `counts` phases along U and V."""
+        """(h, w) entries of a cell table with `counts` phases along U and V."""
         found = np.empty((self.size, self.size), np.int32)
         _phases(*self._raster(), *counts, found)
         return found
@@ -104,7 +114,10 @@ class Place:
         )
 
     def texels(self, planes: Planes, mine: NDArray[np.bool_] | None) -> Texels:
-        """What a map is a function of. planes : (PLANES, n) of the texels in `mine`, or of all"""
+        """Return the input of the maps' functions for the texels in the mask `mine`, or for all.
+
+        planes : (PLANES, n) of these texels
+        """
         lay = self.sheet.garment.lays[self.lay]
         chosen: Any = slice(None) if mine is None else mine
         return Texels(
@@ -119,14 +132,14 @@ class Place:
 
 
 class ComputedLayer:
-    """Every texel has planes of its own, (PLANES, h, w)."""
+    """A layer that stores the planes of every texel, (PLANES, h, w)."""
 
     def __init__(self, place: Place, planes: Planes, owned: NDArray[np.float32]) -> None:
         self.place, self.planes, self.owned = place, planes, owned
 
     @classmethod
     def finest(cls, place: Place, owned: NDArray[np.float32]) -> ComputedLayer:
-        """Planes from samples of the weave, where `owned` is not 0."""
+        """Compute the planes from samples of the weave wherever `owned` is not 0."""
         sheet, lay = place.sheet, place.lay
         planes = np.zeros((PLANES, *owned.shape), np.float32)
         step = texel_step(sheet, lay)
@@ -153,9 +166,9 @@ class ComputedLayer:
 
 
 class TableLayer:
-    """Texels looked up by phase; those that are owned in part have planes of their own.
+    """A layer whose texels are looked up by phase; partly owned texels have planes of their own.
 
-    own : (PLANES, n) - of the texels whose owned share is neither 0 nor 1, row by row
+    own : (PLANES, n) planes of the texels whose owned share is neither 0 nor 1, row by row
     """
 
     def __init__(
@@ -165,17 +178,17 @@ class TableLayer:
 
     @cached_property
     def phases(self) -> NDArray[np.int32]:
-        """(h, w) entries of the table."""
+        """(h, w) entries of the cell table."""
         return self.place.phases(self.cell.counts)
 
     @cached_property
     def rows(self) -> NDArray[np.int32]:
-        """(h, w) columns of `own`, LOOKED_UP where a texel has none."""
+        """(h, w) columns of `own`, LOOKED_UP for texels without one."""
         return numbered(cut_texels(self.owned))
 
     @property
     def cell(self) -> CellLevel:
-        """The table's level."""
+        """The level of the cell table."""
         return self.table.levels[self.place.level]
 
     def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
@@ -213,7 +226,10 @@ class TableLayer:
 
 
 def layer_of(place: Place, owned: NDArray[np.float32]) -> Layer:
-    """The finest layer of a lay. owned : (h, w) float32, 1 where it lies and 0 elsewhere"""
+    """Return the finest layer of a lay.
+
+    owned : (h, w) float32 - 1 for the lay's texels, 0 elsewhere
+    """
     table = place.sheet.tables[place.lay]
     if table is None:
         return ComputedLayer.finest(place, owned)
@@ -221,25 +237,25 @@ def layer_of(place: Place, owned: NDArray[np.float32]) -> Layer:
 
 
 def _gathered(known: NDArray[Any], phases: NDArray[np.int32]) -> NDArray[Any]:
-    """(n, channels) rows of `known` (phases, channels), a row copied as one number."""
+    """(n, channels) rows of `known` (phases, channels); each row is copied as a single item."""
     channels = known.shape[1]
     packed = known.view(np.dtype((np.void, known.itemsize * channels))).ravel()
     return packed.take(phases).view(known.dtype).reshape(-1, channels)
 
 
 def shares(owned: NDArray[np.float32], levels: int) -> NDArray[np.float32]:
-    """(h, w) owned shares so many levels coarser; exact, being multiples of a power of 1/4."""
+    """(h, w) owned shares `levels` levels coarser; exact, since they are multiples of 1/4**k."""
     n, size = owned.shape[0] >> levels, 1 << levels
     return owned.reshape(n, size, n, size).mean(axis=(1, 3), dtype=np.float32)
 
 
 def cut_texels(owned: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Where a texel is owned in part."""
+    """(h, w) mask of the texels that are partly owned."""
     return (owned > 0) & (owned < 1)
 
 
 def numbered(cut: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """(h, w) number of each texel in `cut`, row by row, LOOKED_UP elsewhere."""
+    """(h, w) running number of each texel in `cut`, row by row; LOOKED_UP elsewhere."""
     rows = np.full(cut.shape, LOOKED_UP, np.int32)
     rows[cut] = np.arange(np.count_nonzero(cut))
     return rows
@@ -247,7 +263,10 @@ def numbered(cut: NDArray[np.bool_]) -> NDArray[np.int32]:
 
 @njit(**LEAN)
 def _phases(start, step, repeat, along, down, out):  # type: ignore[no-untyped-def]
-    """Phases, `along` of them along U and `down` along V, of texels; see `_centres`."""
+    """Write the phases of texels to out (h, w), for `along` phases along U and `down` along V.
+
+    start, step, repeat : see `_centres`
+    """
     for j in range(out.shape[0]):
         for i in range(out.shape[1]):
             u = (start[0] + step[0, 0] * (i + 0.5) + step[0, 1] * (j + 0.5)) / repeat[0]
@@ -259,7 +278,10 @@ def _phases(start, step, repeat, along, down, out):  # type: ignore[no-untyped-d
 
 @njit(**LEAN)
 def _centres(cloth, start, step, repeat, weave, sets, threads):  # type: ignore[no-untyped-def]
-    """Fill what `Centres` holds; start, step as `moments.texels`, repeat (2,) float64."""
+    """Fill the arrays of `Centres`.
+
+    start, step : as for `moments.texels`; repeat : (2,) float64
+    """
     for j in range(sets.shape[0]):
         for i in range(sets.shape[1]):
             u = start[0] + step[0, 0] * (i + 0.5) + step[0, 1] * (j + 0.5)
@@ -272,7 +294,7 @@ def _centres(cloth, start, step, repeat, weave, sets, threads):  # type: ignore[
 
 @njit(**LEAN)
 def _cut_planes(places, owned, rows, own, phases, table, out):  # type: ignore[no-untyped-def]
-    """Planes of texels (n, 2) from what is owned of their four texels one level finer."""
+    """Compute planes of texels `places` (n, 2) from the owned parts of their four finer texels."""
     R = np.float32
     for k in range(places.shape[0]):
         weight = R(0)

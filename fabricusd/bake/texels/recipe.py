@@ -1,4 +1,4 @@
-"""What a fabric's texels are computed from: its tables for the kernels of `moments`."""
+"""Compile a fabric into the tables from which the kernels of `moments` compute its texels."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from fabricusd.fabric import Fabric
 
 
 class Recipe(NamedTuple):
-    """What a fabric's texels are computed from.
+    """The tables of a fabric.
 
-    cloth, shadow : compiled for float32; `shadow` answers for the chosen light, by `light`
+    cloth, shadow : compiled for float32; `shadow` is evaluated for the direction `light`
     table : horizon table of `compile_shadow(..., "horizon")`
     rows, heights : see `angle_rows`
-    rounded : int - 1 where threads are round across their width
+    rounded : int - 1 if threads are round across their width
     light : (3,) float32 - unit vector to the light in the weave's frame; zero for none
-    mean : (PLANES,) float32 - of the whole repeat
+    mean : (PLANES,) float32 - planes of the whole repeat
     """
 
     cloth: CompiledFabric
@@ -44,10 +44,11 @@ def recipe(
     light: tuple[float, float, float] | None = None,
     method: str = "peak",
 ) -> Recipe:
-    """Tables of `fabric` for the kernels.
+    """Compile the tables of `fabric`.
 
-    level : "weave" or "thread", whether threads are flat or round across their width
-    light : direction to the light in the surface frame, for the shadow mask by `method`
+    level : "weave" for threads that are flat across their width, "thread" for round ones
+    light : direction to the light in the surface frame, for the shadow mask
+    method : method of the shadow mask
     """
     cloth = compile_fabric(fabric, precision=np.float32)
     horizon = compile_shadow(fabric, "horizon", level=level)
@@ -67,7 +68,7 @@ def recipe(
 
 
 def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:
-    """(PLANES,) over one repeat, from about 16 samples a thread each way."""
+    """(PLANES,) means over one repeat, from about 16 samples per thread along each axis."""
     repeat = true_repeat(fabric)
     count = [min(max(16 * n, 256), 2048) for n in repeat]
     planes = np.empty((PLANES, count[1], 1), np.float32)
