@@ -4,8 +4,8 @@ AZIMUTHS = 16
 PARTS = 4
 
 # A trailing comment starts with the number of planes if there are several. Planes of a thread set
-# come twice, weft first. Planes are means over the whole texel, so that they stay linear; gaps count
-# as 0, and as lit in LIT. Maps that describe the threads alone divide by COVER.
+# come twice, weft first. Planes are means over the whole texel, so that they stay linear; gaps
+# count as 0, but as lit in LIT. Maps that describe the threads alone divide by COVER.
 COVER = 0
 SHARE = 1  # 8: cover of each set in PARTS by its tangent angle: falling gently or steeply along its
 #            axis, rising gently or steeply. A hump has all four; their mean angle is none of them.

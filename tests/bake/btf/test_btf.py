@@ -88,7 +88,7 @@ def test_what_is_written_as_btf_is_read_back(small, tmp_path, joint):
 def test_a_damaged_btf_is_refused(small, tmp_path):
     path = tmp_path / "a.btf"
     path.write_bytes(b"not one")
-    with pytest.raises(FabricError, match=r"no \.btf"):
+    with pytest.raises(FabricError, match=r"not a \.btf"):
         read_ubo(path)
     write_ubo(path, small, factors(small, joint=True, rank=2))
     path.write_bytes(path.read_bytes()[:400])
