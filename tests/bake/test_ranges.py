@@ -17,7 +17,7 @@ from fabricusd.errors import FabricError
 from tests.bake.meshes import write_quad
 
 COMMANDS = [
-    (["--light", "nan,nan,1"], "--light nan,nan,1.0 is no direction"),
+    (["--light", "nan,nan,1"], "--light nan,nan,1.0 is not a direction"),
     (["--light", "0,0,inf"], "three finite numbers"),
     (["--light", "0,0,0"], "is not above the cloth"),
     (["--light", "1e308,0,1"], "is not above the cloth"),
