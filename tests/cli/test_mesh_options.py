@@ -111,8 +111,8 @@ def test_two_primitives_keep_their_names(tmp_path, capsys):
         given = ["bake", path, "--fabric", "linen_plain", "--mesh", "nosuch", "-o", str(tmp_path)]
         assert main(given) == 2
         assert capsys.readouterr().err == (
-            "fabricusd: nosuch is not a mesh of the scene; it must be one of two_prims.glb:Shirt_a, "
-            "two_prims.glb:Shirt_b\n"
+            "fabricusd: nosuch is not a mesh of the scene; it must be one of "
+            "two_prims.glb:Shirt_a, two_prims.glb:Shirt_b\n"
         )
 
 

@@ -255,7 +255,7 @@ def test_a_map_that_has_lost_a_tile_is_no_map(tiled, tmp_path):
     (tmp_path / "bake" / "Body.base_color.1002.exr").unlink()
     made = write_materials(tmp_path / "bake", None, PLAIN)
     assert len(made.notes) == 1
-    assert "Body.base_color.1002.exr is missing; a constant stands in for it" in made.notes[0]
+    assert "Body.base_color.1002.exr is missing; a constant replaces it" in made.notes[0]
 
 
 def places_of(value: object, place: tuple = ()) -> list[tuple]:
