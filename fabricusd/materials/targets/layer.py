@@ -1,7 +1,7 @@
-"""The look layer: a garment, by reference, with the variant set `fabricLook` over it.
+"""Write the look's layer: it references a garment and adds the variant set `fabricLook`.
 
-Variants are stronger than references and weaker than sublayers. The garment is therefore
-referenced, prim by root prim, and not a sublayer, whose own material bindings would win.
+Variants are stronger than references but weaker than sublayers. The layer therefore references each
+root prim of the garment instead of sublayering its file, whose own material bindings would win.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from fabricusd.schema.source import usd_errors
 
 VARIANT_SET = "fabricLook"
 VARIANTS = ("baked", "procedural", "off")
-"""Textures; the fabric itself, with constants for tools that do not know it; neither."""
+"""Textures; the fabric itself, with constants for tools that cannot render it; neither."""
 
 SCOPE = "FabricLooks"
 
 
 @dataclass(frozen=True, kw_only=True)
 class MaterialRecipe:
-    """A material to be written: its name, networks by name prefix, and own inputs."""
+    """A material to write: its name, its networks with their name prefixes, and its inputs."""
 
     name: str
     graphs: tuple[tuple[str, Graph], ...]
@@ -47,13 +47,13 @@ class MaterialRecipe:
 
 
 Recipes = Mapping[tuple[str, int, str], MaterialRecipe]
-"""By garment, number of the lay and variant, "baked" or "procedural"."""
+"""Materials by garment, lay number and variant, "baked" or "procedural"."""
 
 
 def write_baked_look(
     path: Path, sets: Sequence[MapSet], recipes: Recipes, custom: Mapping[str, Any], up_axis: str
 ) -> None:
-    """A look over the meshes that the bake wrote, for garments of any file."""
+    """Write a look for the meshes that the bake wrote, whatever the scene's file format was."""
     with _new_layer(path, custom, up_axis, 1.0) as stage:
         root = UsdGeom.Xform.Define(stage, "/Garment").GetPrim()
         stage.SetDefaultPrim(root)
@@ -79,9 +79,9 @@ def write_baked_look(
 def write_scene_look(
     path: Path, scene: Path, dressed: Dressed, recipes: Recipes, custom: Mapping[str, Any]
 ) -> None:
-    """A look over the prims of a scene; the scene's own file is not touched.
+    """Write a look for the prims of a scene; the scene's file is not modified.
 
-    Moved UVs go into `<name>.uv.usdc` beside the layer.
+    Moved UVs are written to `<name>.uv.usdc` beside the layer.
     """
     source = dressed.stage
     if dressed.uv:
@@ -106,9 +106,9 @@ def write_scene_look(
 def _new_layer(
     path: Path, custom: Mapping[str, Any], up_axis: str, metres: float
 ) -> Iterator[Usd.Stage]:
-    """A stage whose layer becomes `path` when the block succeeds.
+    """Open a stage whose layer becomes `path` when the block succeeds.
 
-    The layer is in `path`'s folder from the start, so relative paths resolve while it is made.
+    The layer is in the folder of `path` from the start, so that relative paths resolve meanwhile.
     """
     with usd_errors(str(path), "written"), whole_file(path) as temporary:
         layer = Sdf.Layer.CreateNew(str(temporary))
@@ -116,7 +116,7 @@ def _new_layer(
         UsdGeom.SetStageUpAxis(stage, up_axis)
         UsdGeom.SetStageMetersPerUnit(stage, metres)
         yield stage
-        layer.documentation = f"Look of a baked fabric, made by fabricusd {__version__}"
+        layer.documentation = f"Look of a baked fabric, written by fabricusd {__version__}"
         layer.customLayerData = {"fabricusd": dict(custom)}
         layer.Save()
 
@@ -124,7 +124,7 @@ def _new_layer(
 def _dress(
     stage: Usd.Stage, path: Path, wearers: Sequence[Wearer], uv: Sequence[NewUV], recipes: Recipes
 ) -> None:
-    """Materials and fabrics under each root, and the variants that bind them."""
+    """Write materials and fabrics under each root prim, and the variants that bind them."""
     roots = {str(Sdf.Path(w.path).GetPrefixes()[0]) for w in wearers}
     for root in sorted(roots):
         prim = stage.GetPrimAtPath(root)
@@ -163,7 +163,7 @@ def _write_looks(
 def _fill(
     stage: Usd.Stage, variant: str, wearer: Wearer, scope: Sdf.Path, recipes: Recipes
 ) -> None:
-    """One prim in one variant: `off` is the garment as any tool shows it without fabrics."""
+    """Write one prim in one variant; `off` is the garment as tools show it without fabrics."""
     prim = stage.OverridePrim(wearer.path)
     lay = wearer.maps.lays[wearer.lay]
     if variant == "procedural":
@@ -183,7 +183,7 @@ def _fill(
 
 
 def binding_of(lay: BakedLay) -> Binding:
-    """The binding whose weave coordinates are `lay.matrix @ uv + lay.offset`."""
+    """Return the binding whose weave coordinates are `lay.matrix @ uv + lay.offset`."""
     assert lay.fabric is not None
     scale = np.linalg.norm(lay.matrix, axis=1)
     return Binding(
@@ -195,7 +195,7 @@ def binding_of(lay: BakedLay) -> Binding:
 
 
 def _write_uv(path: Path, uv: Sequence[NewUV]) -> None:
-    """A crate with one root prim a mesh, holding primvar `st`."""
+    """Write a crate file with one root prim per mesh, which holds the primvar `st`."""
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     stage = Usd.Stage.Open(layer)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
