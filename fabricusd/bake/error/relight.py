@@ -12,7 +12,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -164,6 +164,37 @@ def _set_of(maps: Mapping[str, NDArray[Any]], noun: str) -> Floats:
     return found
 
 
+class _Directions(NamedTuple):
+    """Light and view relative to the axis of a thread set, see `along_set`.
+
+    a, b, z : components along the axis, across it, and along the surface normal
+    scale : 1/sqrt(a^2 + z^2)
+    overlap : `u` of the two azimuths
+    """
+
+    a_i: Any
+    b_i: Any
+    z_i: Any
+    scale_i: Any
+    a_o: Any
+    b_o: Any
+    z_o: Any
+    scale_o: Any
+    overlap: Any
+
+
+class _Angles(NamedTuple):
+    """The distribution of tangent angles in one part of a thread set.
+
+    mean, deviation : [rad]
+    shape : angles of mean 0 and deviation 1 by count, see `angle_shapes`
+    """
+
+    mean: Any
+    deviation: Any
+    shape: Any
+
+
 @njit(parallel=True, **KERNEL)
 def _relight(  # type: ignore[no-untyped-def]
     tables, share, shapes, types, sets, kinds, wi, wo, out
@@ -185,6 +216,7 @@ def _relight(  # type: ignore[no-untyped-def]
             a_i, b_i, s_i, a_o, b_o, s_o, u = along_set(
                 R, j, precision, wi[0], wi[1], wi[2], wo[0], wo[1], wo[2]
             )
+            directions = _Directions(a_i, b_i, wi[2], s_i, a_o, b_o, wo[2], s_o, u)
             for kind in range(types):
                 # If a thread lies under the texel's centre, it stands for its whole set.
                 weight = share[j, kind]
@@ -195,40 +227,37 @@ def _relight(  # type: ignore[no-untyped-def]
                     covered = weight * sets[k, j, 4 + part]
                     if covered <= 0.0:
                         continue
-                    middle, spread = sets[k, j, 8 + part], sets[k, j, 12 + part]
-                    surface, volume = _stretch(
-                        R, tables, row, middle, spread, shapes[j, part],
-                        a_i, b_i, wi[2], s_i, a_o, b_o, wo[2], s_o, u,
-                    )  # fmt: skip
+                    angles = _Angles(sets[k, j, 8 + part], sets[k, j, 12 + part], shapes[j, part])
+                    surface, volume = _part_terms(R, precision, row, angles, directions)
                     for channel in range(3):
                         value = surface + volume * sets[k, j, channel]
                         out[k, channel] += covered / q * value
 
 
 @njit(**KERNEL)
-def _stretch(  # type: ignore[no-untyped-def]
-    R, tables, row, middle, spread, shape, a_i, b_i, iz, s_i, a_o, b_o, oz, s_o, u
-):
-    """Return the surface and volume terms of a thread, integrated over its tangent angles.
+def _part_terms(R, precision, row, angles, w):  # type: ignore[no-untyped-def]
+    """Return the surface and volume terms of a thread, averaged over its tangent angles.
 
-    middle, spread : mean and standard deviation of the angles [rad]
-    shape : angles of mean 0 and deviation 1, see `angle_shapes`
+    angles : `_Angles`; w : `_Directions`
+    precision : see `overlap`
     """
-    fewest = 3.0 * math.sqrt(3.0) * spread / row[GAMMA_SURFACE]
+    fewest = 3.0 * math.sqrt(3.0) * angles.deviation / row[GAMMA_SURFACE]
     kind = 0
     while kind < len(COUNTS) - 1 and COUNTS[kind] < fewest:
         kind += 1
     nodes = COUNTS[kind]
     first, second = 0.0, 0.0
     for node in range(nodes):
-        angle = middle + spread * shape[kind, node]
+        angle = angles.mean + angles.deviation * angles.shape[kind, node]
         angle = min(max(angle, -0.5 * math.pi), 0.5 * math.pi)
         c, s = math.cos(angle), math.sin(angle)
         surface, volume = segment(
-            R, int(row[MODEL]), row, tables.overlap_precision,
-            c, s, a_i, b_i, iz, a_o, b_o, oz,
+            R, int(row[MODEL]), row, precision,
+            c, s, w.a_i, w.b_i, w.z_i, w.a_o, w.b_o, w.z_o,
         )  # fmt: skip
-        p = seen_along(R, c, s, a_i, iz, s_i, a_o, oz, s_o, u) / nodes
+        p = seen_along(
+            R, c, s, w.a_i, w.z_i, w.scale_i, w.a_o, w.z_o, w.scale_o, w.overlap
+        ) / nodes  # fmt: skip
         first += p * surface
         second += p * volume
     return first, second
