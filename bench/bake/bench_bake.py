@@ -134,13 +134,13 @@ def against_numpy() -> None:
             for by in range(sheet.across):
                 layers = next(layers_of(sheet, bx, by))
                 for texture in maps:
-                    composed(texture, layers, sheet.block)
+                    composed(texture, layers, sheet.block_side)
 
     def plain() -> None:
         sheet = sheets_of(one, (made,), {1001: (0, 0)}, size, 0)[0]
         step = np.abs(texel_step(sheet, 0))
         for _ in range(sheet.across**2):
-            found = plain_planes(made, fabric, step, sheet.block)
+            found = plain_planes(made, fabric, step, sheet.block_side)
             texels = Texels.of_planes(found.reshape(planes.PLANES, -1), made, one.lays[0])
             for texture in maps:
                 if not texture.exact:

@@ -38,7 +38,7 @@ from fabricusd.bake.texels.maps import TextureMap, chosen_maps
 from fabricusd.bake.texels.recipe import Recipe, recipe
 from fabricusd.bake.texels.sheet import LARGEST, SMALLEST, Sheet, sheets_of
 from fabricusd.bake.work.assemble import Files, Progress, Work, assemble, compute
-from fabricusd.bake.work.kept import kept
+from fabricusd.bake.work.checkpoint import checkpoint_of
 from fabricusd.bake.work.lock import locked
 from fabricusd.bake.work.scratch import Scratch
 from fabricusd.errors import FabricError
@@ -155,7 +155,7 @@ def _bake(
         notes=[*job.notes, *(n for g in found for n in g.notes), *_coarse(found, resolution)],
     )
     scratch = Scratch(folder, _key(found, settings, resolution, maps), resume=resume)
-    _check_space(folder, sum(kept(sheet, maps).bytes_needed for sheet in sheets))
+    _check_space(folder, sum(checkpoint_of(sheet, maps).bytes_needed for sheet in sheets))
     files = Files(folder=folder, udim=settings.udim, file_format=settings.file_format)
     work = Work(
         scratch=scratch, sheets=sheets, maps=maps, files=files, workers=workers, progress=progress

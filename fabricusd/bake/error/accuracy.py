@@ -85,7 +85,7 @@ def fullest_block(sheet: Sheet) -> tuple[int, int, int]:
         counts = np.bincount(owner[owner != NOBODY], minlength=len(sheet.garment.lays))
         if counts.max() > best:
             best, found = int(counts.max()), (x, y, int(counts.argmax()))
-        if best == sheet.block**2:
+        if best == sheet.block_side**2:
             break
     return found
 
@@ -163,7 +163,7 @@ def swatch_errors(
     rng = np.random.default_rng(seed)
     chosen = swatch.texels(rng)
     step = texel_step(sheet, swatch.lay, 1 << level)
-    start = texel_start(sheet, swatch.lay, *(k * sheet.block for k in swatch.block))
+    start = texel_start(sheet, swatch.lay, *(k * sheet.block_side for k in swatch.block))
     corner = chosen[:, None, ::-1]
     points = start + (corner + rng.random((TEXELS, 1, 2))) @ step.T
     strata = np.stack(np.meshgrid(np.arange(INSIDE), np.arange(INSIDE)), axis=-1).reshape(-1, 2)

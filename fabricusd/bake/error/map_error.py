@@ -91,7 +91,7 @@ def map_errors(
         return {}
     rng = np.random.default_rng(0)
     places, lay = inside[rng.integers(0, len(inside), TEXELS)], swatch.lay
-    corner = np.array(swatch.block[::-1]) * sheet.block
+    corner = np.array(swatch.block[::-1]) * sheet.block_side
     y, x = places.T + 0.5 + corner[:, None]
     moved = rng.uniform(-0.5, 0.5, (2, len(places)))
     texel = exact(sheet, lay, x, y, 1.0)
@@ -100,9 +100,9 @@ def map_errors(
     found = {}
     for one in maps:
         true, there = (np.asarray(one.function(t), np.float64) for t in (texel, point))
-        kept = stored(one, swatch.maps[one.name])
-        read = kept[places[:, 0], places[:, 1]].astype(np.float64)
-        between = read if one.exact else linear(kept, places, moved)
+        written = stored(one, swatch.maps[one.name])
+        read = written[places[:, 0], places[:, 1]].astype(np.float64)
+        between = read if one.exact else linear(written, places, moved)
         weight = _weights(one, point)
         middle = np.sum(weight * there, axis=0) / np.maximum(weight.sum(axis=0), 1e-12)
         middle = np.broadcast_to(middle, there.shape)

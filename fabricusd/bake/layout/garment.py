@@ -240,8 +240,8 @@ def garment_of(scene: Scene, mesh: Mesh) -> Garment | None:
     notes = []
     if flat.any():
         notes.append(f"{mesh.path} has {int(flat.sum())} triangles of zero area in UV, left out")
-        kept = ~flat
-        tri, uv, normals, lay, turn = tri[kept], uv[kept], normals[kept], lay[kept], turn[kept]
+        keep = ~flat
+        tri, uv, normals, lay, turn = tri[keep], uv[keep], normals[keep], lay[keep], turn[keep]
     return Garment(
         name="",
         points=mesh.points,

@@ -50,7 +50,7 @@ def bake_block(
     layers: Layers = {}
     for level, layers in enumerate(layers_of(sheet, bx, by)):
         for k, one in enumerate(maps):
-            found[k].append(composed(one, layers, sheet.block >> level))
+            found[k].append(composed(one, layers, sheet.block_side >> level))
     return found, *top(sheet, layers)
 
 

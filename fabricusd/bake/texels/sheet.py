@@ -17,7 +17,7 @@ from fabricusd.bake.texels.recipe import Recipe
 SMALLEST, LARGEST = 64, 32768
 """Texels along a side of a texture. Most tools cannot open larger ones; use more UDIM tiles."""
 
-BLOCK = 256
+BLOCK_SIDE = 256
 """Texels along a block's side: 12 MB of planes."""
 
 Window = tuple[int, int, int, int]
@@ -45,23 +45,23 @@ class Sheet:
     tables: tuple[CellTable | None, ...] = ()
 
     @property
-    def block(self) -> int:
+    def block_side(self) -> int:
         """Texels along a block's side."""
-        return min(BLOCK, self.resolution)
+        return min(BLOCK_SIDE, self.resolution)
 
     @property
     def across(self) -> int:
         """Blocks along the sheet's side."""
-        return self.resolution // self.block
+        return self.resolution // self.block_side
 
     @property
     def levels(self) -> int:
         """Mip levels inside a block, down to one texel."""
-        return self.block.bit_length()
+        return self.block_side.bit_length()
 
     def window(self, bx: int, by: int) -> Window:
         """Return the texels of a block."""
-        size = self.block
+        size = self.block_side
         return bx * size, by * size, (bx + 1) * size, (by + 1) * size
 
 

@@ -19,7 +19,7 @@ from fabricusd.bake.texels.layers import ComputedLayer, Place
 from fabricusd.bake.texels.maps import TextureMap
 from fabricusd.bake.texels.planes import PLANES
 from fabricusd.bake.texels.sheet import Sheet
-from fabricusd.bake.work.kept import Kept, kept, read_top
+from fabricusd.bake.work.checkpoint import Checkpoint, checkpoint_of, read_top
 from fabricusd.bake.work.scratch import Scratch
 from fabricusd.images.files import write_16_bit, write_mip_exr
 from fabricusd.run.workers import Batches
@@ -71,14 +71,14 @@ def compute(work: Work) -> bool:
     for sheet in work.sheets:
         if work.missing(sheet):
             jobs += [(sheet, x, y) for y in range(sheet.across) for x in range(sheet.across)]
-    ways = {id(sheet): kept(sheet, work.maps) for sheet in work.sheets}
+    checkpoints = {id(sheet): checkpoint_of(sheet, work.maps) for sheet in work.sheets}
 
     def one_block(_: int, k: int) -> None:
         sheet, x, y = jobs[k]
         path = work.scratch.block(sheet, x, y)
-        way = ways[id(sheet)]
-        if not way.is_sound(path):
-            way.write(path, x, y)
+        checkpoint = checkpoints[id(sheet)]
+        if not checkpoint.is_sound(path):
+            checkpoint.write(path, x, y)
 
     return work.run(one_block, len(jobs), "blocks")
 
@@ -101,10 +101,10 @@ def _write_texture(
 ) -> None:
     """Write one texture from its blocks and from the mip levels coarser than a block."""
     k = todo[job]
-    files, one, way = work.files, work.maps[k], kept(sheet, work.maps)
+    files, one, checkpoint = work.files, work.maps[k], checkpoint_of(sheet, work.maps)
     path, encoding = files.path(sheet, one), None
     levels: list[Any] = [
-        partial(bands, work.scratch, sheet, way, k, level) for level in range(sheet.levels)
+        partial(bands, work.scratch, sheet, checkpoint, k, level) for level in range(sheet.levels)
     ]
     metadata = {
         "fabricusd:map": one.name,
@@ -128,15 +128,18 @@ def _whole(level: np.ndarray[Any, Any]) -> Any:
     return iter((level,))
 
 
-def bands(scratch: Scratch, sheet: Sheet, way: Kept, k: int, level: int) -> Iterator[NDArray[Any]]:
+def bands(
+    scratch: Scratch, sheet: Sheet, checkpoint: Checkpoint, k: int, level: int
+) -> Iterator[NDArray[Any]]:
     """Yield a mip level of a map in bands of rows, from the top, each high enough for EXR tiles."""
     waiting: list[NDArray[Any]] = []
     for by in range(sheet.across):
         row = [
-            way.values(scratch.block(sheet, x, by), x, by, k, level) for x in range(sheet.across)
+            checkpoint.values(scratch.block(sheet, x, by), x, by, k, level)
+            for x in range(sheet.across)
         ]
         waiting.append(np.concatenate(row, axis=1))
-        if len(waiting) * (sheet.block >> level) >= 64 or by == sheet.across - 1:
+        if len(waiting) * (sheet.block_side >> level) >= 64 or by == sheet.across - 1:
             yield np.ascontiguousarray(np.concatenate(waiting))
             waiting = []
 

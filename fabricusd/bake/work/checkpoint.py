@@ -33,7 +33,7 @@ MOST = np.float32(1e12)
 Floats = NDArray[np.float32]
 
 
-class Kept(Protocol):
+class Checkpoint(Protocol):
     """How the blocks of one sheet are stored in files, and how maps are read back from them."""
 
     @property
@@ -50,21 +50,21 @@ class Kept(Protocol):
         """(h, w, channels) values of map `k` in a block."""
 
 
-def kept(sheet: Sheet, maps: Sequence[TextureMap]) -> Kept:
+def checkpoint_of(sheet: Sheet, maps: Sequence[TextureMap]) -> Checkpoint:
     """Choose how to store a sheet's blocks."""
     if all(table is not None for table in sheet.tables):
-        return KeptLayout(sheet, maps)
-    return KeptValues(sheet, maps)
+        return LayoutCheckpoint(sheet, maps)
+    return ValuesCheckpoint(sheet, maps)
 
 
-class KeptValues:
+class ValuesCheckpoint:
     """Stores all levels of all maps."""
 
     def __init__(self, sheet: Sheet, maps: Sequence[TextureMap]) -> None:
         self.sheet, self.maps = sheet, maps
         self.places = [
             [
-                (sheet.block >> level) ** 2 * len(one.channels) * np.dtype(one.kind).itemsize
+                (sheet.block_side >> level) ** 2 * len(one.channels) * np.dtype(one.kind).itemsize
                 for level in range(sheet.levels)
             ]
             for one in maps
@@ -93,14 +93,14 @@ class KeptValues:
 
     def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
         """(h, w, channels) of a map."""
-        one, side = self.maps[k], self.sheet.block >> level
+        one, side = self.maps[k], self.sheet.block_side >> level
         with path.open("rb") as stream:
             stream.seek(self.offsets[k, level])
             data = stream.read(self.places[k][level])
         return np.frombuffer(data, one.kind).reshape(side, side, len(one.channels))
 
 
-class KeptLayout:
+class LayoutCheckpoint:
     """Stores the owner of each texel, and the planes of texels that are only partly owned.
 
     A file holds the owners (h, w) int16, or a single number if all are equal. Then, for each lay in
@@ -114,7 +114,7 @@ class KeptLayout:
 
     def write(self, path: Path, bx: int, by: int) -> None:
         """Compute a block and store it."""
-        n = self.sheet.block
+        n = self.sheet.block_side
         levels = list(layers_of(self.sheet, bx, by))
         owner = np.full((n, n), NOBODY, np.int16)
         for k, layer in levels[0].items():
@@ -130,7 +130,7 @@ class KeptLayout:
 
     def is_sound(self, path: Path) -> bool:
         """Whether a block's file is complete and its owners are lays of the sheet."""
-        n, lays = self.sheet.block, len(self.sheet.garment.lays)
+        n, lays = self.sheet.block_side, len(self.sheet.garment.lays)
         tail = top_bytes(self.sheet) + DIGEST
         # Lays that share a texel each own a finer texel in it: at most n * n parts per level.
         planes = 4 * PLANES * n * n * self.sheet.levels
@@ -162,10 +162,12 @@ class KeptLayout:
 
     def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
         """(h, w, channels) of a map."""
-        return composed(self.maps[k], self._layers(path, bx, by, level), self.sheet.block >> level)
+        return composed(
+            self.maps[k], self._layers(path, bx, by, level), self.sheet.block_side >> level
+        )
 
     def _layers(self, path: Path, bx: int, by: int, level: int) -> Layers:
-        n, tail = self.sheet.block, top_bytes(self.sheet) + DIGEST
+        n, tail = self.sheet.block_side, top_bytes(self.sheet) + DIGEST
         data = path.read_bytes()
         if len(data) == 2 + tail:
             number = int(np.frombuffer(data, np.int16, 1)[0])
