@@ -16,13 +16,13 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.files import remove_partial_files, write_json
 from fabricusd.materials.bake_folder import BakeFolder, read_bake_folder
+from fabricusd.materials.bound_prims import BoundScene, find_bound_prims
 from fabricusd.materials.networks.surfaces import GRAPHS, MAPS
 from fabricusd.materials.recipes import Progress, Settings, Written, recipes
 from fabricusd.materials.targets import Job, chosen
 from fabricusd.materials.targets.layer import write_baked_look, write_scene_look
 from fabricusd.materials.targets.mtlx import write_mtlx
 from fabricusd.materials.targets.paths import asset_path
-from fabricusd.materials.wearers import Dressed, find_wearers
 
 
 def write_materials(
@@ -59,8 +59,8 @@ def write_materials(
     made = Written()
     for name, file in folder.missing:
         made.notes.append(f"{folder.path / file} is missing; {_without(name)}")
-    dressed = find_wearers(Path(scene), folder.garments) if scene is not None else None
-    made.notes += dressed.notes if dressed else ()
+    bound = find_bound_prims(Path(scene), folder.garments) if scene is not None else None
+    made.notes += bound.notes if bound else ()
     if dry_run:
         made.files = [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
         return made
@@ -68,7 +68,7 @@ def write_materials(
         for place in _written_folders(path, settings):
             locks.enter_context(locked(place))
         remove_partial_files(path.with_name(f"{path.stem}_maps"))
-        _write(folder, path, settings, made, dressed, scene, clobber, progress)
+        _write(folder, path, settings, made, bound, scene, clobber, progress)
     return made
 
 
@@ -77,7 +77,7 @@ def _write(
     path: Path,
     settings: Settings,
     made: Written,
-    dressed: Dressed | None,
+    bound: BoundScene | None,
     scene: str | os.PathLike[str] | None,
     clobber: bool,
     progress: Progress | None,
@@ -88,10 +88,10 @@ def _write(
         "version": __version__,
         "bake": asset_path(folder.path / "manifest.json", path.parent),
     }
-    if dressed is not None:
+    if bound is not None:
         assert scene is not None
-        write_scene_look(path, Path(scene), dressed, made_of, custom)
-        made.files += [path.with_suffix(".uv.usdc")] if dressed.uv else []
+        write_scene_look(path, Path(scene), bound, made_of, custom)
+        made.files += [path.with_suffix(".uv.usdc")] if bound.uv else []
     else:
         write_baked_look(path, folder.garments, made_of, custom, _up_axis(folder))
     write_mtlx(path.with_suffix(".mtlx"), documents)

@@ -21,10 +21,10 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
 from fabricusd.files import whole_file
 from fabricusd.materials.bake_folder import BakedLay, MapSet
+from fabricusd.materials.bound_prims import BoundPrim, BoundScene, NewUV
 from fabricusd.materials.networks.graph import Graph, Value
 from fabricusd.materials.targets.paths import asset_path
 from fabricusd.materials.targets.write_usd import write_material
-from fabricusd.materials.wearers import Dressed, NewUV, Wearer
 from fabricusd.schema import export, write_binding, write_fabric
 from fabricusd.schema.access import BINDING_API
 from fabricusd.schema.names import prim_name
@@ -58,7 +58,7 @@ def write_baked_look(
         root = UsdGeom.Xform.Define(stage, "/Garment").GetPrim()
         stage.SetDefaultPrim(root)
         Usd.ModelAPI(root).SetKind("component")
-        wearers = []
+        bound = []
         for one in sets:
             mesh = root.GetPath().AppendChild(prim_name(one.name))
             prim = stage.OverridePrim(mesh)
@@ -70,22 +70,23 @@ def write_baked_look(
                     str(one.mesh),
                     f"has {len(places)} parts; the manifest says {len(one.lays)} lays, bake again",
                 )
-            wearers += [
-                Wearer(path=place, maps=one, lay=k, worn=False) for k, place in enumerate(places)
+            bound += [
+                BoundPrim(path=place, maps=one, lay=k, binds_fabric=False)
+                for k, place in enumerate(places)
             ]
-        _dress(stage, path, wearers, (), recipes)
+        _bind_materials(stage, path, bound, (), recipes)
 
 
 def write_scene_look(
-    path: Path, scene: Path, dressed: Dressed, recipes: Recipes, custom: Mapping[str, Any]
+    path: Path, scene: Path, bound: BoundScene, recipes: Recipes, custom: Mapping[str, Any]
 ) -> None:
     """Write a look for the prims of a scene; the scene's file is not modified.
 
     Moved UVs are written to `<name>.uv.usdc` beside the layer.
     """
-    source = dressed.stage
-    if dressed.uv:
-        _write_uv(path.with_suffix(".uv.usdc"), dressed.uv)
+    source = bound.stage
+    if bound.uv:
+        _write_uv(path.with_suffix(".uv.usdc"), bound.uv)
     axis, metres = UsdGeom.GetStageUpAxis(source), UsdGeom.GetStageMetersPerUnit(source)
     with _new_layer(path, custom, axis, metres) as stage:
         for prim in source.GetPseudoRoot().GetAllChildren():
@@ -97,9 +98,9 @@ def write_scene_look(
             if source.HasAuthoredMetadata(name):
                 stage.SetMetadata(name, source.GetMetadata(name))
         if not stage.HasDefaultPrim():
-            first = Sdf.Path(dressed.wearers[0].path).GetPrefixes()[0]
+            first = Sdf.Path(bound.prims[0].path).GetPrefixes()[0]
             stage.SetDefaultPrim(stage.GetPrimAtPath(first))
-        _dress(stage, path, dressed.wearers, dressed.uv, recipes)
+        _bind_materials(stage, path, bound.prims, bound.uv, recipes)
 
 
 @contextmanager
@@ -121,14 +122,14 @@ def _new_layer(
         layer.Save()
 
 
-def _dress(
-    stage: Usd.Stage, path: Path, wearers: Sequence[Wearer], uv: Sequence[NewUV], recipes: Recipes
+def _bind_materials(
+    stage: Usd.Stage, path: Path, bound: Sequence[BoundPrim], uv: Sequence[NewUV], recipes: Recipes
 ) -> None:
     """Write materials and fabrics under each root prim, and the variants that bind them."""
-    roots = {str(Sdf.Path(w.path).GetPrefixes()[0]) for w in wearers}
+    roots = {str(Sdf.Path(w.path).GetPrefixes()[0]) for w in bound}
     for root in sorted(roots):
         prim = stage.GetPrimAtPath(root)
-        mine = [w for w in wearers if Sdf.Path(w.path).HasPrefix(root)]
+        mine = [w for w in bound if Sdf.Path(w.path).HasPrefix(root)]
         scope = Sdf.Path(root).AppendChild(SCOPE)
         UsdGeom.Scope.Define(stage, scope)
         _write_looks(stage, scope, mine, recipes, path.parent)
@@ -137,47 +138,47 @@ def _dress(
             variants.AddVariant(name)
             variants.SetVariantSelection(name)
             with variants.GetVariantEditContext():
-                for wearer in mine:
-                    _fill(stage, name, wearer, scope, recipes)
+                for one in mine:
+                    _fill(stage, name, one, scope, recipes)
                 if name == "baked":
                     _refer_uv(stage, path, [u for u in uv if Sdf.Path(u.path).HasPrefix(root)])
         variants.SetVariantSelection("baked")
 
 
 def _write_looks(
-    stage: Usd.Stage, scope: Sdf.Path, wearers: Sequence[Wearer], recipes: Recipes, folder: Path
+    stage: Usd.Stage, scope: Sdf.Path, bound: Sequence[BoundPrim], recipes: Recipes, folder: Path
 ) -> None:
-    for wearer in wearers:
+    for one in bound:
         for variant in ("baked", "procedural"):
-            recipe = recipes[wearer.maps.name, wearer.lay, variant]
+            recipe = recipes[one.maps.name, one.lay, variant]
             where = scope.AppendChild(recipe.name)
             if not stage.GetPrimAtPath(where):
                 write_material(stage, where, list(recipe.graphs), dict(recipe.parameters), folder)
-        fabric = wearer.maps.lays[wearer.lay].fabric
-        if fabric is not None and not wearer.worn:
+        fabric = one.maps.lays[one.lay].fabric
+        if fabric is not None and not one.binds_fabric:
             where = scope.AppendChild(prim_name(fabric.name))
             if not stage.GetPrimAtPath(where):
                 write_fabric(stage, where, fabric)
 
 
 def _fill(
-    stage: Usd.Stage, variant: str, wearer: Wearer, scope: Sdf.Path, recipes: Recipes
+    stage: Usd.Stage, variant: str, one: BoundPrim, scope: Sdf.Path, recipes: Recipes
 ) -> None:
     """Write one prim in one variant; `off` is the garment as tools show it without fabrics."""
-    prim = stage.OverridePrim(wearer.path)
-    lay = wearer.maps.lays[wearer.lay]
+    prim = stage.OverridePrim(one.path)
+    lay = one.maps.lays[one.lay]
     if variant == "procedural":
-        if not wearer.worn and lay.fabric is not None:
+        if not one.binds_fabric and lay.fabric is not None:
             write_binding(prim, scope.AppendChild(prim_name(lay.fabric.name)), binding_of(lay))
-    elif wearer.worn:
+    elif one.binds_fabric:
         prim.RemoveAppliedSchema(BINDING_API)
         prim.CreateRelationship("fabric:binding", custom=False).SetTargets([])
     if variant != "off":
-        recipe = recipes[wearer.maps.name, wearer.lay, variant]
+        recipe = recipes[one.maps.name, one.lay, variant]
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(
             UsdShade.Material(stage.GetPrimAtPath(scope.AppendChild(recipe.name))),
             UsdShade.Tokens.strongerThanDescendants
-            if wearer.forced
+            if one.forced
             else UsdShade.Tokens.fallbackStrength,
         )
 

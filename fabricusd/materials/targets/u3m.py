@@ -92,8 +92,8 @@ def write_u3m(
         codes = np.rint(np.clip(pixels, 0.0, 1.0) * 65535).astype(np.uint16)
         write_png(target, codes, color_space="sRGB" if name == "basecolor" else "raw")
         written.append(target)
-    sheet = _Sheet(folder_name, size, resolution)
-    write_json(path, material(fabric, images, look, depth, sheet))
+    swatch = _SwatchImages(folder_name, size, resolution)
+    write_json(path, material(fabric, images, look, depth, swatch))
     return [path, *written]
 
 
@@ -150,7 +150,7 @@ def pictures(maps: MapSet, look: Look) -> tuple[dict[str, NDArray[np.float64]], 
     return found, depth
 
 
-class _Sheet:
+class _SwatchImages:
     """Formats values as the U3M schema requires, with the common size of the images."""
 
     def __init__(self, folder: str, size: tuple[float, float], resolution: int) -> None:
@@ -177,14 +177,18 @@ class _Sheet:
 
 
 def material(
-    fabric: Fabric, images: dict[str, NDArray[np.float64]], look: Look, depth: float, sheet: _Sheet
+    fabric: Fabric,
+    images: dict[str, NDArray[np.float64]],
+    look: Look,
+    depth: float,
+    swatch: _SwatchImages,
 ) -> dict[str, Any]:
     """Return the document in version 1.1 of the schema.
 
     depth : depth of the relief [mm]
     """
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    digest = hashlib.sha256(repr((fabric.name, fabric.threads, sheet.size)).encode()).digest()
+    digest = hashlib.sha256(repr((fabric.name, fabric.threads, swatch.size)).encode()).digest()
     return {
         "schema": "1.1",
         "custom": None,
@@ -192,14 +196,14 @@ def material(
             "id": str(uuid.UUID(bytes=digest[:16], version=4)),
             "name": fabric.name, "description": fabric.documentation,
             "created": now, "modified": now,
-            "front": _front(images, look, depth, sheet), "back": None, "side": None,
+            "front": _front(images, look, depth, swatch), "back": None, "side": None,
             "physics": physics(fabric), "metadata": None,
         },
     }  # fmt: skip
 
 
 def _front(
-    images: dict[str, NDArray[np.float64]], look: Look, depth: float, sheet: _Sheet
+    images: dict[str, NDArray[np.float64]], look: Look, depth: float, swatch: _SwatchImages
 ) -> dict[str, Any]:
     mean = {name: values.mean(axis=(0, 1)) for name, values in images.items()}
     up = {"x": 0.0, "y": 0.0, "z": 1.0}
@@ -216,14 +220,16 @@ def _front(
     }  # fmt: skip
     return {
         "shader": "principled",
-        "basecolor": sheet.color(mean["basecolor"], "basecolor"),
-        "normal": {"constant": up, "texture": {"scale": 1.0, "image": sheet.image("normal")}},
-        **{key: sheet.number(float(mean[name][0]), name) for key, name in pictured.items()},
+        "basecolor": swatch.color(mean["basecolor"], "basecolor"),
+        "normal": {"constant": up, "texture": {"scale": 1.0, "image": swatch.image("normal")}},
+        **{key: swatch.number(float(mean[name][0]), name) for key, name in pictured.items()},
         # The displacement is a length, and the format's lengths are in millimetres.
-        "displacement": sheet.number(depth * float(mean["displacement"][0]), "displacement", depth),
-        **{key: sheet.number(value) for key, value in plain.items()},
+        "displacement": swatch.number(
+            depth * float(mean["displacement"][0]), "displacement", depth
+        ),
+        **{key: swatch.number(value) for key, value in plain.items()},
         "clearcoat_normal": {"constant": up, "texture": None},
-        "subsurface_color": sheet.color((0.0, 0.0, 0.0)),
+        "subsurface_color": swatch.color((0.0, 0.0, 0.0)),
         "preview": None,
     }
 

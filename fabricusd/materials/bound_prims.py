@@ -21,19 +21,19 @@ from fabricusd.schema.access import applies_binding, targets, value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Wearer:
+class BoundPrim:
     """A mesh or subset that a baked material is bound to.
 
     path : of the prim in the scene
     maps : its textures; lay : index of its fabric in `maps.lays`
-    worn : whether the scene itself binds the fabric to the prim
+    binds_fabric : whether the scene itself binds the fabric to the prim
     forced : the binding must be stronger than those of descendants: `path` is an instance's root
     """
 
     path: str
     maps: MapSet
     lay: int
-    worn: bool
+    binds_fabric: bool
     forced: bool = False
 
 
@@ -48,16 +48,16 @@ class NewUV:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Dressed:
+class BoundScene:
     """A scene and the prims in it that a look binds materials to."""
 
     stage: Usd.Stage
-    wearers: tuple[Wearer, ...]
+    prims: tuple[BoundPrim, ...]
     uv: tuple[NewUV, ...]
     notes: tuple[str, ...]
 
 
-def find_wearers(scene: Path, sets: tuple[MapSet, ...]) -> Dressed:
+def find_bound_prims(scene: Path, sets: tuple[MapSet, ...]) -> BoundScene:
     """Find the prims of `scene` that the textures belong to.
 
     Raises FabricError if the scene is not a USD layer, has none of the baked prims, or was baked
@@ -70,7 +70,7 @@ def find_wearers(scene: Path, sets: tuple[MapSet, ...]) -> Dressed:
         )
     stage, _ = open_stage(scene)
     now = _garments(scene, sets)
-    wearers: list[Wearer] = []
+    bound: list[BoundPrim] = []
     uv: list[NewUV] = []
     notes: list[str] = []
     for maps in sets:
@@ -82,13 +82,13 @@ def find_wearers(scene: Path, sets: tuple[MapSet, ...]) -> Dressed:
                 notes.append(f"{path} is no longer in {scene.name}; it gets no look")
                 continue
             _compare(maps, now.get(path), [now[k] for k in maps.prims if k in now], path, notes)
-            wearers += _of(prim, maps, notes)
+            bound += _of(prim, maps, notes)
             name = _uv_name(prim)
             if path in now and not (maps.own_uv and name == "st"):
                 uv.append(_moved(prim, name, maps, now[path]))
-    if not wearers:
+    if not bound:
         raise FabricError(str(scene), "has none of the prims that were baked; bake again")
-    return Dressed(stage=stage, wearers=tuple(wearers), uv=tuple(uv), notes=tuple(notes))
+    return BoundScene(stage=stage, prims=tuple(bound), uv=tuple(uv), notes=tuple(notes))
 
 
 def _garments(scene: Path, sets: tuple[MapSet, ...]) -> dict[str, Garment]:
@@ -128,7 +128,7 @@ def _compare(
     )
 
 
-def _of(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
+def _of(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[BoundPrim]:
     """Return the mesh itself, or those of its subsets that bind fabrics of their own."""
     if prim.IsInstanceProxy():
         return _instance(prim, maps, notes)
@@ -139,11 +139,11 @@ def _of(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
             found_at = targets(one, "fabric:binding")
             name = found_at[0].name if found_at else ""
             lay = next((k for k, lay in enumerate(maps.lays) if lay.name == name), 0)
-            found.append(Wearer(path=str(one.GetPath()), maps=maps, lay=lay, worn=True))
-    return found or [Wearer(path=str(prim.GetPath()), maps=maps, lay=0, worn=False)]
+            found.append(BoundPrim(path=str(one.GetPath()), maps=maps, lay=lay, binds_fabric=True))
+    return found or [BoundPrim(path=str(prim.GetPath()), maps=maps, lay=0, binds_fabric=False)]
 
 
-def _instance(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
+def _instance(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[BoundPrim]:
     root = prim
     while root.IsInstanceProxy():
         root = root.GetParent()
@@ -154,7 +154,7 @@ def _instance(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
             "be changed individually; bake the prim that the instance refers to"
         )
         return []
-    return [Wearer(path=str(root.GetPath()), maps=maps, lay=0, worn=False, forced=True)]
+    return [BoundPrim(path=str(root.GetPath()), maps=maps, lay=0, binds_fabric=False, forced=True)]
 
 
 def _uv_name(prim: Usd.Prim) -> str:
