@@ -19,8 +19,8 @@ from scipy.ndimage import binary_erosion
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.bake.error.accuracy import TEXELS, swatch_of
 from fabricusd.bake.texels.maps import Texels, TextureMap
+from fabricusd.bake.texels.moment_indices import COVER, MOMENTS
 from fabricusd.bake.texels.moments import texels, threads_under
-from fabricusd.bake.texels.planes import COVER, PLANES
 from fabricusd.bake.texels.sheet import Sheet, texel_start, texel_step
 
 Floats = NDArray[np.float64]
@@ -54,19 +54,19 @@ def exact(
     With `size` 0 they are points.
     """
     one, made = sheet.garment.lays[lay], sheet.recipes[lay]
-    planes = np.zeros((PLANES, len(x)), np.float32)
-    sums, owner = np.empty(PLANES, np.float32), np.zeros((1, 1), np.int32)
+    moments = np.zeros((MOMENTS, len(x)), np.float32)
+    sums, owner = np.empty(MOMENTS, np.float32), np.zeros((1, 1), np.int32)
     step, weave = texel_step(sheet, lay) * size, np.empty((len(x), 2))
-    out = np.empty((PLANES, 1, 1), np.float32)
+    out = np.empty((MOMENTS, 1, 1), np.float32)
     for k in range(len(x)):
         weave[k] = texel_start(sheet, lay, x[k], y[k])
         start = weave[k] - step @ np.full(2, 0.5)
         texels(made, step, step, start, (k, 0), owner, 0, samples if size else 1, sums, out)
-        planes[:, k] = out[:, 0, 0]
+        moments[:, k] = out[:, 0, 0]
     sets, threads = np.empty(len(x), np.uint8), np.empty(len(x), np.int32)
     threads_under(made.cloth, weave, sets, threads)
     return Texels(
-        planes=planes,
+        moments=moments,
         usual=made.mean,
         along=one.along,
         weave=weave,
@@ -138,7 +138,7 @@ def linear(values: NDArray[Any], places: NDArray[np.int64], moved: Floats) -> Fl
 
 def _weights(one: TextureMap, t: Texels) -> Floats:
     """(n, 1) or (n, channels) weight of each value."""
-    weight = t.planes[COVER] if one.weight is None else one.weight(t)
+    weight = t.moments[COVER] if one.weight is None else one.weight(t)
     return np.asarray(weight, np.float64).reshape(len(t.weave), -1)
 
 

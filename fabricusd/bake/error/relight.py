@@ -28,7 +28,7 @@ from fabricusd.appearance.weave.lookup import NO_THREAD
 from fabricusd.bake.manifest_file import file_in, read_manifest
 from fabricusd.bake.texels.angle_shape import COUNTS, angle_shapes
 from fabricusd.bake.texels.encoding import Encoding
-from fabricusd.bake.texels.planes import PARTS
+from fabricusd.bake.texels.moment_indices import PARTS
 from fabricusd.errors import FabricError, reads
 from fabricusd.fabric import Fabric
 from fabricusd.images.files import read_mip_level

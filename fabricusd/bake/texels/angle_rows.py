@@ -1,4 +1,4 @@
-"""Tabulate what a sample adds to the planes by thread and tangent angle, except height and light.
+"""Tabulate what a sample adds to the moments by thread and tangent angle, except height and light.
 
 Each row of the table is contiguous, so the processor's vector unit adds it; computing the numbers
 for each sample took twice as long.
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.appearance.weave.curve import height_at
 from fabricusd.appearance.weave.quadrature import CELLS, Rule, curve_nodes
-from fabricusd.bake.texels import planes as p
+from fabricusd.bake.texels import moment_indices as p
 from fabricusd.bake.texels.reflectance import ANGLES, reflectance_table
 from fabricusd.fabric import PILE_ANGLE, Fabric
 
@@ -58,7 +58,7 @@ def part_of(psi: NDArray[np.float64], split: float) -> NDArray[np.int64]:
 
 
 def angle_rows(fabric: Fabric) -> NDArray[np.float32]:
-    """(2, k, STEPS, LIT) planes before LIT, by thread set (weft, warp), thread type and angle.
+    """(2, k, STEPS, LIT) moments before LIT, by thread set (weft, warp), thread type and angle.
 
     The slope of an upright tangent, as in pile, is infinite; it is limited to that of PILE_ANGLE.
     """

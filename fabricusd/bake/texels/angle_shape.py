@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.appearance.weave.quadrature import curve_nodes
 from fabricusd.bake.texels.angle_rows import FINE, part_of, steepness
-from fabricusd.bake.texels.planes import PARTS
+from fabricusd.bake.texels.moment_indices import PARTS
 from fabricusd.fabric import Fabric
 
 Floats = NDArray[np.float64]

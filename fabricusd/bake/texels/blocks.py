@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fabricusd.bake.layout.raster import NOBODY, owners
 from fabricusd.bake.texels.layers import Layer, Place, layer_of
 from fabricusd.bake.texels.maps import TextureMap
-from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.sheet import Sheet
 
 Layers = Mapping[int, Layer]
@@ -44,7 +44,7 @@ def bake_block(
 ) -> tuple[list[list[NDArray[Any]]], NDArray[np.float32], NDArray[np.float32]]:
     """Compute all levels of the maps (h, w, c) in a block, and the block's `top`.
 
-    Returns ([map][level] arrays, planes, owned share).
+    Returns ([map][level] arrays, moments, owned share).
     """
     found: list[list[NDArray[Any]]] = [[] for _ in maps]
     layers: Layers = {}
@@ -55,15 +55,15 @@ def bake_block(
 
 
 def top(sheet: Sheet, layers: Layers) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """(lays, PLANES) planes and (lays,) owned share of a block's coarsest level, a single texel.
+    """(lays, MOMENTS) moments and (lays,) owned share of a block's coarsest level, a single texel.
 
     The coarser levels of the sheet are computed from these.
     """
     lays = len(sheet.garment.lays)
-    planes, share = np.zeros((lays, PLANES), np.float32), np.zeros(lays, np.float32)
+    moments, share = np.zeros((lays, MOMENTS), np.float32), np.zeros(lays, np.float32)
     for k, layer in layers.items():
-        planes[k], share[k] = layer.planes_at(0, 0), layer.owned[0, 0]
-    return planes, share
+        moments[k], share[k] = layer.moments_at(0, 0), layer.owned[0, 0]
+    return moments, share
 
 
 def composed(one: TextureMap, layers: Layers, size: int) -> NDArray[Any]:

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.bake.layout.garment import Garment, Lay
 from fabricusd.bake.texels.maps import Texels, TextureMap
+from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.moments import samples_for, spans_repeats, texels
-from fabricusd.bake.texels.planes import PLANES
 from fabricusd.bake.texels.recipe import Recipe
 from fabricusd.kernels.real import LEAN
 
@@ -40,7 +40,7 @@ SAMPLES = 2**22
 """Samples of a table, unless FEWEST_SAMPLES require more: a third of a second."""
 
 MOST_PHASES = 2**19
-"""Largest number of phases in all tables of a garment: 210 MB of planes and maps."""
+"""Largest number of phases in all tables of a garment: 210 MB of moments and maps."""
 
 WORTH = 0.5
 """Largest cost of a table, relative to the samples of the sheet itself."""
@@ -51,17 +51,17 @@ class CellLevel:
     """Texels of one level by phase: entry `b * counts[0] + a` is centred at phase (a, b) + 1/2.
 
     counts : phases along U and V
-    planes : (PLANES, phases) float32
+    moments : (MOMENTS, phases) float32
     """
 
     counts: tuple[int, int]
-    planes: NDArray[np.float32]
+    moments: NDArray[np.float32]
     _values: dict[str, NDArray[Any]] = field(default_factory=dict)
 
     def values(self, one: TextureMap, recipe: Recipe, lay: Lay) -> NDArray[Any]:
-        """(phases, channels) values, cached, of a map that depends on the planes alone."""
+        """(phases, channels) values, cached, of a map that depends on the moments alone."""
         if one.name not in self._values:
-            texels = Texels.of_planes(self.planes, recipe, lay)
+            texels = Texels.of_moments(self.moments, recipe, lay)
             self._values[one.name] = np.ascontiguousarray(one.function(texels), one.kind)
         return self._values[one.name]
 
@@ -151,17 +151,17 @@ def cell_table(
 def _finest(
     recipe: Recipe, step: NDArray[np.float64], repeat: tuple[int, int], raster: Raster
 ) -> NDArray[np.float32]:
-    """(PLANES, phases) planes of the finest level, from samples of the weave."""
+    """(MOMENTS, phases) moments of the finest level, from samples of the weave."""
     counts = raster.counts
-    planes = np.empty((PLANES, counts[1], counts[0]), np.float32)
+    moments = np.empty((MOMENTS, counts[1], counts[0]), np.float32)
     apart = np.diag(np.array(repeat) / np.array(counts))
     start = apart @ np.full(2, 0.5) - step @ np.full(2, 0.5)
     side = 0 if spans_repeats(step, repeat) else raster.side
     texels(
         recipe, apart, step, start, (0, 0), np.zeros(counts[::-1], np.int32), 0, side,
-        np.empty(PLANES, np.float32), planes,
+        np.empty(MOMENTS, np.float32), moments,
     )  # fmt: skip
-    return planes.reshape(PLANES, -1)
+    return moments.reshape(MOMENTS, -1)
 
 
 def _coarser(
@@ -171,20 +171,20 @@ def _coarser(
     counts: tuple[int, int],
     recipe: Recipe,
 ) -> NDArray[np.float32]:
-    """(PLANES, phases) planes as means of four texels of the `finer` level, which span `step`."""
-    planes = np.empty((PLANES, counts[0] * counts[1]), np.float32)
+    """(MOMENTS, phases) moments as means of four texels of the `finer` level, which span `step`."""
+    moments = np.empty((MOMENTS, counts[0] * counts[1]), np.float32)
     if counts == (1, 1):
-        planes[:, 0] = recipe.mean
-        return planes
+        moments[:, 0] = recipe.mean
+        return moments
     # Positions on the finer raster of the four texels that make up this level's first phase.
     scale = np.array(finer.counts) / np.array(repeat)
     apart = np.array(finer.counts) / np.array(counts)
     corners = np.array([[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]])
     starts = (corners @ step.T) * scale + (0.5 * apart - 0.5)
     taps = [_taps(starts[:, k], apart[k], counts[k], finer.counts[k]) for k in range(2)]
-    below = finer.planes.reshape(PLANES, finer.counts[1], finer.counts[0])
-    _means_of_four(below, *taps[0], *taps[1], planes.reshape(PLANES, counts[1], counts[0]))
-    return planes
+    below = finer.moments.reshape(MOMENTS, finer.counts[1], finer.counts[0])
+    _means_of_four(below, *taps[0], *taps[1], moments.reshape(MOMENTS, counts[1], counts[0]))
+    return moments
 
 
 def _taps(

@@ -19,16 +19,16 @@ from fabricusd.appearance.weave.lookup import find
 from fabricusd.bake.texels import moments as m
 from fabricusd.bake.texels.cell_table import CellLevel, CellTable
 from fabricusd.bake.texels.maps import Texels, TextureMap
-from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.sheet import Sheet, Window, texel_start, texel_step
 from fabricusd.kernels.real import LEAN
 
-Planes = NDArray[np.float32]
+Moments = NDArray[np.float32]
 
 LOOKED_UP = -1
-"""Stands for a column of own planes if the table holds the texel."""
+"""Stands for a column of own moments if the table holds the texel."""
 
-NONE: Planes = np.empty((PLANES, 0), np.float32)
+NONE: Moments = np.empty((MOMENTS, 0), np.float32)
 
 
 class Layer(Protocol):
@@ -45,8 +45,8 @@ class Layer(Protocol):
     def halved(self) -> Layer:
         """Return the next coarser level."""
 
-    def planes_at(self, j: int, i: int) -> Planes:
-        """(PLANES,) planes of one texel."""
+    def moments_at(self, j: int, i: int) -> Moments:
+        """(MOMENTS,) moments of one texel."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,15 +113,15 @@ class Place:
             np.array(true_repeat(self.sheet.garment.lays[self.lay].fabric), np.float64),
         )
 
-    def texels(self, planes: Planes, mine: NDArray[np.bool_] | None) -> Texels:
+    def texels(self, moments: Moments, mine: NDArray[np.bool_] | None) -> Texels:
         """Return the input of the maps' functions for the texels in the mask `mine`, or for all.
 
-        planes : (PLANES, n) of these texels
+        moments : (MOMENTS, n) of these texels
         """
         lay = self.sheet.garment.lays[self.lay]
         chosen: Any = slice(None) if mine is None else mine
         return Texels(
-            planes=planes,
+            moments=moments,
             usual=self.sheet.recipes[self.lay].mean,
             along=lay.along,
             weave=self.centres.weave[chosen].reshape(-1, 2),
@@ -132,47 +132,47 @@ class Place:
 
 
 class ComputedLayer:
-    """A layer that stores the planes of every texel, (PLANES, h, w)."""
+    """A layer that stores the moments of every texel, (MOMENTS, h, w)."""
 
-    def __init__(self, place: Place, planes: Planes, owned: NDArray[np.float32]) -> None:
-        self.place, self.planes, self.owned = place, planes, owned
+    def __init__(self, place: Place, moments: Moments, owned: NDArray[np.float32]) -> None:
+        self.place, self.moments, self.owned = place, moments, owned
 
     @classmethod
     def finest(cls, place: Place, owned: NDArray[np.float32]) -> ComputedLayer:
-        """Compute the planes from samples of the weave wherever `owned` is not 0."""
+        """Compute the moments from samples of the weave wherever `owned` is not 0."""
         sheet, lay = place.sheet, place.lay
-        planes = np.zeros((PLANES, *owned.shape), np.float32)
+        moments = np.zeros((MOMENTS, *owned.shape), np.float32)
         step = texel_step(sheet, lay)
         side = m.samples_for(step, true_repeat(sheet.garment.lays[lay].fabric))
         start = texel_start(sheet, lay, *place.window[:2])
         m.texels(
             sheet.recipes[lay], step, step, start, place.window[:2], owned.astype(np.int32), 1,
-            side, np.empty(PLANES, np.float32), planes,
+            side, np.empty(MOMENTS, np.float32), moments,
         )  # fmt: skip
-        return cls(place, planes, owned)
+        return cls(place, moments, owned)
 
     def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
         """(n, channels) of a map."""
-        planes = self.planes.reshape(PLANES, -1) if mine is None else self.planes[:, mine]
-        return one.function(self.place.texels(planes, mine))
+        moments = self.moments.reshape(MOMENTS, -1) if mine is None else self.moments[:, mine]
+        return one.function(self.place.texels(moments, mine))
 
     def halved(self) -> ComputedLayer:
         """The next coarser level."""
-        return ComputedLayer(self.place.halved(), *m.halve(self.planes, self.owned))
+        return ComputedLayer(self.place.halved(), *m.halve(self.moments, self.owned))
 
-    def planes_at(self, j: int, i: int) -> Planes:
-        """(PLANES,) of one texel."""
-        return self.planes[:, j, i]
+    def moments_at(self, j: int, i: int) -> Moments:
+        """(MOMENTS,) of one texel."""
+        return self.moments[:, j, i]
 
 
 class TableLayer:
-    """A layer whose texels are looked up by phase; partly owned texels have planes of their own.
+    """A layer whose texels are looked up by phase; partly owned texels have moments of their own.
 
-    own : (PLANES, n) planes of the texels whose owned share is neither 0 nor 1, row by row
+    own : (MOMENTS, n) moments of the texels whose owned share is neither 0 nor 1, row by row
     """
 
     def __init__(
-        self, place: Place, table: CellTable, owned: NDArray[np.float32], own: Planes = NONE
+        self, place: Place, table: CellTable, owned: NDArray[np.float32], own: Moments = NONE
     ) -> None:
         self.place, self.table, self.owned, self.own = place, table, owned, own
 
@@ -202,7 +202,7 @@ class TableLayer:
         if self.own.shape[1]:
             rows = self.rows[chosen].ravel()
             cut = rows != LOOKED_UP
-            texels = Texels.of_planes(
+            texels = Texels.of_moments(
                 self.own[:, rows[cut]], sheet.recipes[lay], sheet.garment.lays[lay]
             )
             found[cut] = one.function(texels)
@@ -212,17 +212,19 @@ class TableLayer:
         """The next coarser level."""
         owned = shares(self.owned, 1)
         places = np.argwhere(cut_texels(owned))
-        own = np.empty((PLANES, len(places)), np.float32)
+        own = np.empty((MOMENTS, len(places)), np.float32)
         if len(places):
-            _cut_planes(places, self.owned, self.rows, self.own, self.phases, self.cell.planes, own)
+            _cut_moments(
+                places, self.owned, self.rows, self.own, self.phases, self.cell.moments, own
+            )
         return TableLayer(self.place.halved(), self.table, owned, own)
 
-    def planes_at(self, j: int, i: int) -> Planes:
-        """(PLANES,) of one texel."""
+    def moments_at(self, j: int, i: int) -> Moments:
+        """(MOMENTS,) of one texel."""
         row = self.rows[j, i]
         if row != LOOKED_UP:
             return self.own[:, row]
-        return self.cell.planes[:, self.phases[j, i]]
+        return self.cell.moments[:, self.phases[j, i]]
 
 
 def layer_of(place: Place, owned: NDArray[np.float32]) -> Layer:
@@ -293,8 +295,8 @@ def _centres(cloth, start, step, repeat, weave, sets, threads):  # type: ignore[
 
 
 @njit(**LEAN)
-def _cut_planes(places, owned, rows, own, phases, table, out):  # type: ignore[no-untyped-def]
-    """Compute planes of texels `places` (n, 2) from the owned parts of their four finer texels."""
+def _cut_moments(places, owned, rows, own, phases, table, out):  # type: ignore[no-untyped-def]
+    """Compute moments of texels `places` (n, 2) from the owned parts of their four finer texels."""
     R = np.float32
     for k in range(places.shape[0]):
         weight = R(0)

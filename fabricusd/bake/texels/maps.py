@@ -1,4 +1,4 @@
-"""Define the maps that can be baked: each is a registered function of a texel's planes.
+"""Define the maps that can be baked: each is a registered function of a texel's moments.
 
 Tangent-space maps are in the mesh's UV axes: x along increasing u, y along increasing v, z out of
 the cloth. This is the frame of MikkTSpace tangents, whether or not a shell is mirrored. To add a
@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.lookup import NO_THREAD, thread_number
 from fabricusd.bake.layout.garment import Lay
-from fabricusd.bake.texels import planes as m
+from fabricusd.bake.texels import moment_indices as m
 from fabricusd.bake.texels.recipe import Recipe
 from fabricusd.errors import FabricError
 
-Planes = NDArray[np.float32]
+Moments = NDArray[np.float32]
 
 NO_LAY = 255
 """Lay number of a texel outside the UV layout."""
@@ -32,10 +32,10 @@ NO_LAY = 255
 class Texels:
     """Texels of one lay at one mip level.
 
-    planes : (PLANES, n) float32
-    usual : (PLANES,) float32 - planes of the whole repeat; they replace those of a texel that shows
-        no thread at all, so that a lookup between a thread and a gap finds the thread's values on
-        both sides
+    moments : (MOMENTS, n) float32
+    usual : (MOMENTS,) float32 - moments of the whole repeat; they replace those of a texel that
+        shows no thread at all, so that a lookup between a thread and a gap finds the thread's
+        values on both sides
     along : (2, 2) float64 - unit directions in UV of increasing U and V, as columns
     weave : (n, 2) float64 - weave coordinates of the centres, modulo the repeat
     hit : (set, thread), each (n,) - the thread under the centre, GAP if there is none
@@ -43,8 +43,8 @@ class Texels:
     lay : number of the lay
     """
 
-    planes: Planes
-    usual: Planes
+    moments: Moments
+    usual: Moments
     along: NDArray[np.float64]
     weave: NDArray[np.float64]
     hit: tuple[NDArray[Any], NDArray[Any]]
@@ -52,11 +52,11 @@ class Texels:
     lay: int
 
     @classmethod
-    def of_planes(cls, planes: Planes, recipe: Recipe, lay: Lay) -> Texels:
-        """Return texels without weave coordinates, for maps that depend on the planes alone."""
+    def of_moments(cls, moments: Moments, recipe: Recipe, lay: Lay) -> Texels:
+        """Return texels without weave coordinates, for maps that depend on the moments alone."""
         nothing: NDArray[Any] = np.empty(0, np.int32)
         return cls(
-            planes=planes,
+            moments=moments,
             usual=recipe.mean,
             along=lay.along,
             weave=np.empty((0, 2)),
@@ -65,12 +65,12 @@ class Texels:
             lay=-1,
         )
 
-    def mean(self, plane: int, count: int = 1) -> Planes:
-        """(n, count) means of planes over the threads that show, without the gaps."""
-        chosen = slice(plane, plane + count)
-        cover, least = self.planes[m.COVER], np.float32(1e-6)
+    def mean(self, moment: int, count: int = 1) -> Moments:
+        """(n, count) moments relative to the area of the threads, without the gaps."""
+        chosen = slice(moment, moment + count)
+        cover, least = self.moments[m.COVER], np.float32(1e-6)
         usual = self.usual[chosen] / np.maximum(self.usual[m.COVER], least)
-        shown = self.planes[chosen] / np.maximum(cover, least)
+        shown = self.moments[chosen] / np.maximum(cover, least)
         return np.asarray(np.where(cover > least, shown, usual[:, None]).T)
 
 
@@ -159,7 +159,7 @@ def chosen_maps(names: Sequence[str] | None, *, light: bool) -> list[TextureMap]
 
 def _whole(t: Texels) -> NDArray[Any]:
     """Weight of maps whose values are meaningful in gaps as well."""
-    return np.ones(t.planes.shape[1])
+    return np.ones(t.moments.shape[1])
 
 
 @texture_map("thread_id", "Y", (NO_THREAD,), exact=True, kind_of="id", weight=_whole)
@@ -189,7 +189,7 @@ def base_color(t: Texels) -> NDArray[Any]:
 @texture_map("albedo", "R G B", (0.5,), color=True, weight=_whole)
 def albedo(t: Texels) -> NDArray[Any]:
     """Reflectance of the cloth seen from above, surface and volume terms; gaps are black"""
-    return np.asarray((t.planes[m.VOLUME : m.VOLUME + 3] + t.planes[m.SURFACE]).T)
+    return np.asarray((t.moments[m.VOLUME : m.VOLUME + 3] + t.moments[m.SURFACE]).T)
 
 
 @texture_map("specular_color", "R G B", (0.04,), color=True)
@@ -285,7 +285,7 @@ def height(t: Texels) -> NDArray[Any]:
 @texture_map("opacity", "Y", weight=_whole)
 def opacity(t: Texels) -> NDArray[Any]:
     """Share of the texel that is covered by threads; the rest is gap"""
-    return np.asarray(t.planes[m.COVER][:, None])
+    return np.asarray(t.moments[m.COVER][:, None])
 
 
 @texture_map("visibility", "Y", (1.0,))
@@ -329,7 +329,7 @@ def fuzz(t: Texels) -> NDArray[Any]:
 @texture_map("shadow", "Y", (1.0,), needs_light=True, weight=_whole)
 def shadow(t: Texels) -> NDArray[Any]:
     """Share of the given light that arrives; gaps are lit"""
-    return np.asarray(t.planes[m.LIT][:, None])
+    return np.asarray(t.moments[m.LIT][:, None])
 
 
 def _of_set(which: int, noun: str) -> None:
@@ -337,12 +337,12 @@ def _of_set(which: int, noun: str) -> None:
     least = np.float32(1e-6)
     first = m.TINT + 3 * which
 
-    def parts(t: Texels, plane: int) -> Planes:
-        return t.planes[plane + m.PARTS * which : plane + m.PARTS * (which + 1)]
+    def parts(t: Texels, moment: int) -> Moments:
+        return t.moments[moment + m.PARTS * which : moment + m.PARTS * (which + 1)]
 
     def thread(t: Texels) -> NDArray[Any]:
         share = parts(t, m.SHARE).sum(axis=0)
-        tint = t.planes[first : first + 3] / np.maximum(share, least)
+        tint = t.moments[first : first + 3] / np.maximum(share, least)
         return np.concatenate((tint, share[None])).T
 
     def share(t: Texels) -> NDArray[Any]:

@@ -1,7 +1,7 @@
-"""Compute a texel's planes, from which every map is made: moments of the weave over the texel.
+"""Compute the moments of the weave over a texel, from which every map is made.
 
-Moments are linear: the mean of four texels' planes is the plane of the coarser texel that contains
-them. Mip levels are therefore means of planes, and each map is computed from the planes of its own
+Moments are linear: the moments of a texel are the means of those of the four finer texels in it.
+Mip levels are therefore means of moments, and each map is computed from the moments of its own
 level, so that slopes, variances and directions are correct at every level. Tangent angles and
 slopes have second moments, after [Olano2010]. Horizons are stored as the mean of the squared sine,
 which is the share of a cosine-weighted sky that they hide.
@@ -19,7 +19,15 @@ from fabricusd.appearance.shadow.methods import lit
 from fabricusd.appearance.weave.coverage import GAP, WARP
 from fabricusd.appearance.weave.lookup import crown_on, find, wrap
 from fabricusd.bake.texels.angle_rows import HEIGHTS, STEPS
-from fabricusd.bake.texels.planes import AZIMUTHS, HEIGHT, HORIZON, LIT, PLANES, SLOPE, SLOPE_2
+from fabricusd.bake.texels.moment_indices import (
+    AZIMUTHS,
+    HEIGHT,
+    HORIZON,
+    LIT,
+    MOMENTS,
+    SLOPE,
+    SLOPE_2,
+)
 from fabricusd.kernels.real import INLINE, LEAN
 
 ROUNDEST = 0.95
@@ -54,14 +62,14 @@ def spans_repeats(step: NDArray[np.float64], repeat: tuple[int, int]) -> bool:
 def texels(  # type: ignore[no-untyped-def]
     made, apart, step, start, corner, owner, mine, side, sums, out
 ):
-    """Write the planes of the texels that `mine` owns to out (PLANES, h, w); leave the others.
+    """Write the moments of the texels that `mine` owns to out (MOMENTS, h, w); leave the others.
 
     apart : (2, 2) float64 - threads from one texel to the next: columns for right and for down
     step : (2, 2) float64 - threads that a texel spans; differs from `apart` if texels overlap
     start : (2,) float64 - weave coordinates of the first texel's outer corner
     corner : (x, y) of the first texel on its sheet
     side : samples along each side of a texel, 0 to take the repeat's mean
-    sums : (PLANES,) float32 - scratch space for the sums over samples
+    sums : (MOMENTS,) float32 - scratch space for the sums over samples
 
     Samples are stratified and jittered by a hash of the texel's position on the sheet: a regular
     raster would alias with a weave of the same pitch, and identically in all texels.
@@ -73,10 +81,10 @@ def texels(  # type: ignore[no-untyped-def]
             if owner[j, i] != mine:
                 continue
             if side == 0:
-                for p in range(PLANES):
+                for p in range(MOMENTS):
                     out[p, j, i] = made.mean[p]
                 continue
-            for p in range(PLANES):
+            for p in range(MOMENTS):
                 sums[p] = R(0)
             seed = _mixed(np.uint64(corner[0] + i) << np.uint64(32) | np.uint64(corner[1] + j))
             left = start[0] + apart[0, 0] * i + apart[0, 1] * j
@@ -90,7 +98,7 @@ def texels(  # type: ignore[no-untyped-def]
                     v = top + step[1, 0] * x + step[1, 1] * y
                     _add(made, u, v, sums)
             share = R(1.0 / (side * side))
-            for p in range(PLANES):
+            for p in range(MOMENTS):
                 out[p, j, i] = sums[p] * share
 
 
@@ -186,22 +194,22 @@ def _add_horizon(made, u, v, which, out):  # type: ignore[no-untyped-def]
 
 
 def halve(
-    planes: NDArray[np.float32], owned: NDArray[np.float32]
+    moments: NDArray[np.float32], owned: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the next mip level: means of 2 x 2 texels, weighted by their owned shares.
 
-    planes : (p, h, w)
+    moments : (p, h, w)
     owned : (h, w) share of each texel that belongs to the UV layout
     """
-    p, h, w = planes.shape
+    p, h, w = moments.shape
     half = np.empty((p, h // 2, w // 2), np.float32)
     share = np.empty((h // 2, w // 2), np.float32)
-    _halve(planes, owned, half, share)
+    _halve(moments, owned, half, share)
     return half, share
 
 
 @njit(**LEAN)
-def _halve(planes, owned, half, share):  # type: ignore[no-untyped-def]
+def _halve(moments, owned, half, share):  # type: ignore[no-untyped-def]
     R = np.float32
     height, width = share.shape
     for j in range(height):
@@ -210,14 +218,14 @@ def _halve(planes, owned, half, share):  # type: ignore[no-untyped-def]
                 (owned[2 * j, 2 * i] + owned[2 * j, 2 * i + 1])
                 + (owned[2 * j + 1, 2 * i] + owned[2 * j + 1, 2 * i + 1])
             )
-    for p in range(planes.shape[0]):
+    for p in range(moments.shape[0]):
         for j in range(height):
             for i in range(width):
                 total = (
-                    planes[p, 2 * j, 2 * i] * owned[2 * j, 2 * i]
-                    + planes[p, 2 * j, 2 * i + 1] * owned[2 * j, 2 * i + 1]
+                    moments[p, 2 * j, 2 * i] * owned[2 * j, 2 * i]
+                    + moments[p, 2 * j, 2 * i + 1] * owned[2 * j, 2 * i + 1]
                 ) + (
-                    planes[p, 2 * j + 1, 2 * i] * owned[2 * j + 1, 2 * i]
-                    + planes[p, 2 * j + 1, 2 * i + 1] * owned[2 * j + 1, 2 * i + 1]
+                    moments[p, 2 * j + 1, 2 * i] * owned[2 * j + 1, 2 * i]
+                    + moments[p, 2 * j + 1, 2 * i + 1] * owned[2 * j + 1, 2 * i + 1]
                 )
                 half[p, j, i] = R(0.25) * total / max(share[j, i], R(1e-20))

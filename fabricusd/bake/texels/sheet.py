@@ -18,7 +18,7 @@ SMALLEST, LARGEST = 64, 32768
 """Texels along a side of a texture. Most tools cannot open larger ones; use more UDIM tiles."""
 
 BLOCK_SIDE = 256
-"""Texels along a block's side: 12 MB of planes."""
+"""Texels along the side of a block, whose moments take 12 MB."""
 
 Window = tuple[int, int, int, int]
 """(x0, y0, x1, y1): texels of the finest level in the half-open ranges [x0, x1) and [y0, y1)."""

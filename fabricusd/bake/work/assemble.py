@@ -17,7 +17,7 @@ from fabricusd.bake.texels.blocks import Layers, composed
 from fabricusd.bake.texels.encoding import FORMATS, encoding_of
 from fabricusd.bake.texels.layers import ComputedLayer, Place
 from fabricusd.bake.texels.maps import TextureMap
-from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.sheet import Sheet
 from fabricusd.bake.work.checkpoint import Checkpoint, checkpoint_of, read_top
 from fabricusd.bake.work.scratch import Scratch
@@ -147,15 +147,15 @@ def bands(
 def uppermost(scratch: Scratch, sheet: Sheet) -> Layers:
     """Return the layers of the mip level at which each block is one texel."""
     lays, n = len(sheet.garment.lays), sheet.across
-    planes, owned = np.empty((lays, PLANES, n, n), np.float32), np.empty((lays, n, n), np.float32)
+    moments, owned = np.empty((lays, MOMENTS, n, n), np.float32), np.empty((lays, n, n), np.float32)
     for by in range(n):
         for bx in range(n):
             found = read_top(scratch.block(sheet, bx, by), sheet)
-            planes[:, :, by, bx], owned[:, by, bx] = found
+            moments[:, :, by, bx], owned[:, by, bx] = found
     window = (0, 0, sheet.resolution, sheet.resolution)
     return {
         k: ComputedLayer(
-            Place(sheet=sheet, lay=k, window=window, level=sheet.levels - 1), planes[k], owned[k]
+            Place(sheet=sheet, lay=k, window=window, level=sheet.levels - 1), moments[k], owned[k]
         )
         for k in range(lays)
         if owned[k].any()

@@ -19,7 +19,7 @@ from fabricusd.bake.layout.raster import NOBODY
 from fabricusd.bake.texels.blocks import Layers, bake_block, composed, layers_of, top
 from fabricusd.bake.texels.layers import Place, TableLayer, cut_texels, shares
 from fabricusd.bake.texels.maps import TextureMap
-from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.sheet import Sheet
 from fabricusd.files import whole_file
 
@@ -27,7 +27,7 @@ DIGEST = 16
 """Bytes of the checksum at a file's end; the block's top precedes it."""
 
 MOST = np.float32(1e12)
-"""Largest magnitude of a map's or plane's value, so that sums of its squares fit single precision.
+"""Largest magnitude of a map's or moment's value, so that sums of its squares fit single precision.
 """
 
 Floats = NDArray[np.float32]
@@ -58,7 +58,7 @@ def checkpoint_of(sheet: Sheet, maps: Sequence[TextureMap]) -> Checkpoint:
 
 
 class ValuesCheckpoint:
-    """Stores all levels of all maps."""
+    """A checkpoint that stores all levels of all maps."""
 
     def __init__(self, sheet: Sheet, maps: Sequence[TextureMap]) -> None:
         self.sheet, self.maps = sheet, maps
@@ -75,8 +75,8 @@ class ValuesCheckpoint:
 
     def write(self, path: Path, bx: int, by: int) -> None:
         """Compute a block and store it."""
-        found, planes, share = bake_block(self.sheet, self.maps, bx, by)
-        write_block(path, [*(level for one in found for level in one), planes, share])
+        found, moments, share = bake_block(self.sheet, self.maps, bx, by)
+        write_block(path, [*(level for one in found for level in one), moments, share])
 
     def is_sound(self, path: Path) -> bool:
         """Whether a block's file is whole."""
@@ -101,10 +101,10 @@ class ValuesCheckpoint:
 
 
 class LayoutCheckpoint:
-    """Stores the owner of each texel, and the planes of texels that are only partly owned.
+    """A checkpoint that stores owners of texels, and moments of texels that are partly owned.
 
     A file holds the owners (h, w) int16, or a single number if all are equal. Then, for each lay in
-    increasing order and each level from the second, follow the planes (PLANES, n) of the n texels
+    increasing order and each level from the second, follow the moments (MOMENTS, n) of the n texels
     that the lay owns in part.
     """
 
@@ -133,8 +133,8 @@ class LayoutCheckpoint:
         n, lays = self.sheet.block_side, len(self.sheet.garment.lays)
         tail = top_bytes(self.sheet) + DIGEST
         # Lays that share a texel each own a finer texel in it: at most n * n parts per level.
-        planes = 4 * PLANES * n * n * self.sheet.levels
-        data = sound_data(path, 2 + tail, 2 * n * n + planes + tail)
+        moments = 4 * MOMENTS * n * n * self.sheet.levels
+        data = sound_data(path, 2 + tail, 2 * n * n + moments + tail)
         if data is None:
             return False
         if not are_values(np.frombuffer(data[-tail:-DIGEST], np.float32)):
@@ -146,7 +146,7 @@ class LayoutCheckpoint:
         owner = np.frombuffer(data, np.int16, n * n).reshape(n, n)
         if owner.min() < NOBODY or owner.max() >= lays:
             return False
-        if len(data) != 2 * n * n + 4 * PLANES * self._cut(owner) + tail:
+        if len(data) != 2 * n * n + 4 * MOMENTS * self._cut(owner) + tail:
             return False
         return are_values(np.frombuffer(data[2 * n * n : -tail], np.float32))
 
@@ -174,14 +174,14 @@ class LayoutCheckpoint:
             whole = np.broadcast_to(np.float32(1), (n >> level, n >> level))
             return {} if number == NOBODY else {number: self._layer(number, bx, by, level, whole)}
         owner = np.frombuffer(data, np.int16, n * n).reshape(n, n)
-        planes = np.frombuffer(data[2 * n * n : -tail], np.float32)
+        moments = np.frombuffer(data[2 * n * n : -tail], np.float32)
         found, begin = {}, 0
         for number in np.unique(owner[owner != NOBODY]).tolist():
             owned = (owner == number).astype(np.float32)
             for one in range(self.sheet.levels):
-                count = int(np.count_nonzero(cut_texels(owned))) * PLANES
+                count = int(np.count_nonzero(cut_texels(owned))) * MOMENTS
                 if one == level:
-                    own = planes[begin : begin + count].reshape(PLANES, -1)
+                    own = moments[begin : begin + count].reshape(MOMENTS, -1)
                     found[number] = self._layer(number, bx, by, level, owned, own)
                 begin += count
                 owned = shares(owned, 1) if one + 1 < self.sheet.levels else owned
@@ -224,19 +224,19 @@ def sound_data(path: Path, least: int, most: int) -> bytes | None:
 
 
 def are_values(numbers: NDArray[Any]) -> bool:
-    """Whether all numbers are finite and small enough to be values of maps or planes."""
+    """Whether all numbers are finite and small enough to be values of maps or moments."""
     return bool((np.abs(numbers) <= MOST).all())
 
 
 def top_bytes(sheet: Sheet) -> int:
     """Return the bytes of a block's top, which precedes its checksum, see `read_top`."""
-    return 4 * len(sheet.garment.lays) * (PLANES + 1)
+    return 4 * len(sheet.garment.lays) * (MOMENTS + 1)
 
 
 def read_top(path: Path, sheet: Sheet) -> tuple[Floats, Floats]:
-    """Read the (lays, PLANES) planes and (lays,) owned shares of a block's coarsest texel."""
+    """Read the (lays, MOMENTS) moments and (lays,) owned shares of a block's coarsest texel."""
     lays = len(sheet.garment.lays)
     with path.open("rb") as stream:
         stream.seek(-DIGEST - top_bytes(sheet), 2)
         values = np.frombuffer(stream.read(top_bytes(sheet)), np.float32)
-    return values[: lays * PLANES].reshape(lays, PLANES), values[lays * PLANES :]
+    return values[: lays * MOMENTS].reshape(lays, MOMENTS), values[lays * MOMENTS :]
