@@ -158,7 +158,7 @@ def test_every_form_is_written_with_its_record(tmp_path):
     for record in records:
         assert record["delta_e"] <= 1.0
         assert all((tmp_path / f).is_file() for f in record["files"])
-    with pytest.raises(FabricError, match="must be ubo"):
+    with pytest.raises(FabricError, match="must be one of ubo"):
         write_btf(load("linen_plain"), tmp_path, ("dds",))
 
 
