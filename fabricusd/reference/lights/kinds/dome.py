@@ -1,4 +1,4 @@
-"""All domes together: one picture around the scene."""
+"""The dome light: all domes of a scene, merged into one picture around it."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ R = np.float32
 
 
 def fill(row: NDArray[np.float64], light: Light, axes: Axes) -> None:
-    """Everything else lies in the `Dome`; a dome is always seen."""
+    """Make the dome visible to the camera; its other data lies in the `Dome`."""
     row[VISIBLE] = 1.0
 
 
@@ -66,7 +66,7 @@ def irradiance(row: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]
 
 @njit(**PART)
 def sample(light, dome, begin, end, block):
-    """Directions to it for the hits `begin` to `end` of a block, see `hit_block`."""
+    """Sample directions to the light for hits `begin` to before `end`, see `hit_block`."""
     chance = light[CHANCE]
     for y in range(whole(begin), whole(end)):
         j, down, i, along = choose_cell(dome, block[U0 + y], block[U1 + y])
@@ -81,7 +81,7 @@ def sample(light, dome, begin, end, block):
 
 @njit(**PART)
 def meet(light, dome, size, block):
-    """Add what `size` rays see of it, see `ray_block`."""
+    """Add what `size` rays see of the light, see `ray_block`."""
     if dome.cells.shape[0] == 1:
         pdf = dome.cells[0, DENSITY] * light[CHANCE]
         red, green, blue = dome.cells[0, 0], dome.cells[0, 1], dome.cells[0, 2]
