@@ -1,8 +1,8 @@
-"""Where traced rays arrived: at lights, and at surfaces, put in the order they are shaded in.
+"""The stage after tracing: adds the light that rays hit, and sorts surface hits into queues.
 
-Rays that met a light add it, weighted against light sampling by the power heuristic [Veach1997].
-Rays that met a surface get the key of the queue in which that is shaded: one for each material,
-level and side.
+The light that a ray passes is added to its path, weighted against light sampling by the power
+heuristic [Veach1997]. A ray that hit a surface gets the key of the queue in which the hit is
+shaded. There is one queue for each material, level and side.
 """
 
 from __future__ import annotations
@@ -55,18 +55,19 @@ R = np.float32
 FAR = R(1e30)
 
 MIS, LIGHT_ONLY, SURFACE_ONLY, UNIFORM = range(4)
-"""Estimators of the same integral: both samplings, either, or uniform over all directions."""
+"""Estimators of the same integral: light and surface sampling combined, either one alone, or
+uniform directions over the sphere."""
 
 AUTO_LEVEL = 3
 NUMBERS_PER_STEP = 4
-"""Places that a step of a path may use, see `sobol.four_numbers`."""
+"""Number of places that a step of a path may use, see `sobol.four_numbers`."""
 
 QUEUES = 6
-"""Queues of a material: three levels, two sides."""
+"""Queues per material: three levels times two sides."""
 
-# Rows of a block after those of `ray_block`: the geometric normal, its cosine with the ray; for
-# level `auto` the steepness of both coordinates, the direction of growing u, the limits, the cone's
-# width and a uniform number, and the level they lead to.
+# Rows of a block after those of `ray_block`: the geometric normal and its cosine with the ray; for
+# level `auto`, the gradients of both coordinates, the direction of increasing u, the limits, the
+# cone's width, a uniform number, and the resulting level.
 _NORMAL, _COSINE, _STEEP, _GRAIN, _LIMITS, _WIDTH, _NUMBER, _LEVEL = (
     (LIGHT_ROWS + row) * BLOCK for row in (0, 3, 4, 6, 9, 13, 14, 15)
 )
@@ -77,11 +78,12 @@ _ROWS = LIGHT_ROWS + 16
 def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, dome, film, keys,
            triangle_material, limits, records, level, path_pixel, path_sample,
            numbers, counts):  # fmt: skip
-    """Add the light that rays met, and give each lane that goes on the key of its queue, else -1.
+    """Add the light that rays hit, and write each lane's queue key; -1 for a lane that ends.
 
-    limits : (materials, 4) float32 - `footprint.Limits.row` of a fabric, 0 where the surface has
-    no levels. counts : (QUEUES materials,) int64, filled with the length of each queue, which is
-    keyed by `(3 material + level) 2 + back`.
+    limits : (materials, 4) float32 - `footprint.Limits.row` of a fabric, 0 for a surface without
+        levels
+    counts : (QUEUES materials,) int64 - filled with the length of each queue; the key of a queue is
+        `(3 material + level) 2 + back`
     """
     counts[:] = 0
     count = whole(count)
@@ -126,7 +128,7 @@ def _load(start, size, rays, lanes, lane_tags, block):
 
 @njit(**PART)
 def _add_seen(start, size, estimator, lane_tags, lanes, film, block):
-    """Add what the rays saw of lights to their paths."""
+    """Add the radiance of lights that the rays passed to their paths."""
     for x in range(size):
         red, green, blue = block[SEEN_R + x], block[SEEN_G + x], block[SEEN_B + x]
         k = start + x
@@ -142,7 +144,7 @@ def _add_seen(start, size, estimator, lane_tags, lanes, film, block):
 
 @njit(**PART)
 def _turn(size, block):
-    """Cosine of each ray with the normal of what it met, which is not a unit vector."""
+    """Dot product of each ray's direction with the geometric normal, which is not normalized."""
     for x in range(size):
         block[_COSINE + x] = (
             block[D_X + x] * block[_NORMAL + x]
@@ -154,7 +156,7 @@ def _turn(size, block):
 @njit(**PART)
 def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
                  path_pixel, path_sample, counters, block):  # fmt: skip
-    """What `auto` needs of each ray that met a fabric; zeros for the others."""
+    """Load what level `auto` needs for each ray that hit a fabric; zeros for the other rays."""
     bits = rays.view(np.uint32)
     for x in range(size):
         k = start + x
@@ -182,7 +184,7 @@ def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits,
 
 @njit(**PART)
 def _choose_levels(numbers, place, size, counters, block):
-    """A level for each ray's cone, by a uniform number."""
+    """Choose a level for each ray from the footprint of its cone and a uniform number."""
     for x in range(size):
         block[_NUMBER + x], _, _, _ = four_numbers(numbers, counters[x], counters[BLOCK + x], place)
     for x in range(size):
@@ -191,7 +193,7 @@ def _choose_levels(numbers, place, size, counters, block):
         )  # fmt: skip
         square = block[_COSINE + x] * block[_COSINE + x]
         inverse = (nx * nx + ny * ny + nz * nz) / max(square, R(1e-30))
-        # A cone's cut with the surface is longer along the ray than across it.
+        # The cone's footprint on the surface is longer along the ray than across it.
         a = (
             block[D_X + x] * block[_GRAIN + x]
             + block[D_Y + x] * block[_GRAIN + BLOCK + x]
@@ -215,7 +217,7 @@ def _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material
     bits = rays.view(np.uint32)
     for x in range(size):
         k = start + x
-        # A path at its last depth still sees lights; emission of surfaces is left to `prepare`.
+        # The ray beyond the last surface only sees lights; it is not shaded.
         if block[REACH + x] >= ENDLESS or lane_tags[1, k] > max_depth:
             keys[k] = -1
             continue
@@ -237,9 +239,9 @@ def _advance(offsets, key):
 
 @njit(**LEAN)
 def sort_lanes(count, keys, offsets, order):
-    """The lanes that go on, in the order of their queues.
+    """Write the numbers of the lanes that go on to `order`, sorted by queue.
 
-    offsets : (queues,) int64 - where each queue starts; advanced to where it ends.
+    offsets : (queues,) int64 - where each queue starts; on return, where it ends
     order : (count,) int32
     """
     for k in range(whole(count)):

@@ -1,4 +1,4 @@
-"""From rays that met a surface to hits ready for shading: frames, numbers, a light for each."""
+"""The stage before shading: gives each hit its surface frame, random numbers and a light sample."""
 
 from __future__ import annotations
 
@@ -59,9 +59,9 @@ R = np.float32
 @njit(**KERNEL)
 def prepare(step, estimator, queue_ends, rays, lanes, lane_tags, keys, order, records, lights, dome,
             epsilon, path_pixel, path_sample, numbers, hits, tags):  # fmt: skip
-    """Turn the lanes of `order` into hits; within a block those of one light lie together.
+    """Turn the lanes of `order` into hits; within a block, hits of the same light lie together.
 
-    queue_ends : (queues,) int64 - no block holds hits of two queues
+    queue_ends : (queues,) int64 - where each queue ends; no block holds hits of two queues
     """
     block = np.empty(BLOCK_ROWS * BLOCK, np.float32)
     lane_of, choice = np.empty(2 * BLOCK, np.int32), np.empty(BLOCK, np.int32)
@@ -94,7 +94,7 @@ def prepare(step, estimator, queue_ends, rays, lanes, lane_tags, keys, order, re
 
 @njit(**PART)
 def _begin(start, size, order, lane_tags, path_pixel, path_sample, lane_of, counters):
-    """A block's lanes and their paths' counters, in the upper halves of both."""
+    """Load a block's lanes and their paths' counters into the upper halves of both arrays."""
     for x in range(size):
         lane = whole(order[start + x])
         path = whole(lane_tags[0, lane])
@@ -104,7 +104,7 @@ def _begin(start, size, order, lane_tags, path_pixel, path_sample, lane_of, coun
 
 @njit(**PART)
 def _choose(lights, numbers, place, size, counters, uniform, choice):
-    """A light for each lane, by the number that `make_numbers` makes once more for the hit."""
+    """Choose a light for each lane by the number that `make_numbers` later computes again."""
     if lights.shape[0] > 1:
         following = np.uint32(place + np.uint32(1))
         for x in range(size):
@@ -116,7 +116,7 @@ def _choose(lights, numbers, place, size, counters, uniform, choice):
 
 @njit(**PART)
 def _group(size, choice, ends, lane_of, counters):
-    """Bring the lanes of each light together, in the lower halves; `ends` is where they end."""
+    """Sort the lanes by light into the lower halves; `ends` is where each light's lanes end."""
     for j in range(ends.shape[0]):
         ends[j] = 0
     for x in range(size):
@@ -136,7 +136,7 @@ def _group(size, choice, ends, lane_of, counters):
 
 @njit(**INLINE)
 def _take(k, h, x, rays, lanes, lane_tags, keys, records, block, hits, tags):
-    """Lane `k` as hit `h`: what goes on unchanged, and place `x` of the block for what does not."""
+    """Copy lane `k` to hit `h`, and the inputs of what is computed to place `x` of the block."""
     bits = rays.view(np.uint32)
     p, lane = k >> 4, k & 15
     triangle, key = bits[p, PRIMITIVE, lane], whole(keys[k])
@@ -159,7 +159,7 @@ def _take(k, h, x, rays, lanes, lane_tags, keys, records, block, hits, tags):
 
 @njit(**PART)
 def _bring(start, size, block, hits):
-    """Bring the block's frames, numbers and lights to the hits."""
+    """Copy the block's frames, numbers and light samples to the hits."""
     _bring_rows(MADE, 0, SIDE + 1, start, size, block, hits)
     _bring_rows(NUMBERS, CHANCE, CHANCE + 4, start, size, block, hits)
     _bring_rows(CHOSEN, WI, LIGHT_PDF + 1, start, size, block, hits)
@@ -175,7 +175,7 @@ def _bring_rows(source, first, end, start, size, block, hits):
 
 @njit(**LEAN)
 def add_emission(count, surfaces, hits, tags, film):
-    """Add what surfaces that shine by themselves send back along the ray, on their front."""
+    """Add the radiance that emissive surfaces send back along the ray from their front."""
     for h in range(count):
         red, green, blue = emission_at(
             surfaces, tags[MATERIAL, h], hits[PLACE, h], hits[PLACE + 1, h]

@@ -1,4 +1,4 @@
-"""What becomes of shadow rays: blocked, let through, or weakened by see-through surfaces."""
+"""The last stage: adds the light of unblocked shadow rays, attenuated by see-through surfaces."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ FAR = R(1e30)
 
 @njit(**LEAN)
 def settle(count, shadow_rays, shadow, shadow_path, film, aovs):
-    """Add what unblocked shadow rays bring."""
+    """Add the light of the shadow rays that are not blocked."""
     for k in range(whole(count)):
         signed = shadow_path[k]
         path, row = whole(signed if signed >= 0 else -1 - signed), DIRECT
@@ -49,11 +49,14 @@ def settle(count, shadow_rays, shadow, shadow_path, film, aovs):
 @njit(**LEAN)
 def thin_out(count, rays, shadow, shadow_path, opacity, surfaces, triangle_material, records,
              epsilon, aovs, film):  # fmt: skip
-    """Let shadow rays through what is not opaque, after `intersect`.
+    """Attenuate shadow rays at see-through surfaces, after `intersect`.
 
-    Rays that met nothing are settled; those that met something opaque end; the others are
-    weakened and go on behind it. opacity : (materials,) float32 - constant of each material, below
-    0 where it varies over the surface. Returns how many go on, packed to the front.
+    A ray that hit nothing adds its light; a ray that hit an opaque surface ends; any other ray is
+    attenuated and goes on behind the surface. Returns the number of rays that go on, which are
+    packed to the front.
+
+    opacity : (materials,) float32 - the constant of each material, negative if its opacity varies
+        over the surface
     """
     whole = rays.view(np.uint32)
     left = 0
