@@ -1,8 +1,8 @@
-"""Cloth as a surface of the path tracer: the appearance kernels on hits, in blocks.
+"""The fabric shader: applies the appearance kernels to blocks of hits on cloth.
 
-Every fabric has tables for both its sides. At levels `weave` and `thread` the thread under each hit
-is looked up first; the laws are then evaluated towards the light and in the sampled direction by
-the vectorised loops, which want directions of their own, side by side.
+Every fabric has tables for both of its sides. At levels `weave` and `thread`, the thread under each
+hit is looked up first. Vectorised loops then evaluate the law towards the light and in the sampled
+direction; they need these directions in arrays of their own.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _ONE_AT_A_TIME = threading.Lock()
 
 
 class _Scratch:
-    """Directions and values of up to `capacity` hits, side by side; one per worker."""
+    """Arrays for the directions and values of up to `capacity` hits; one per worker."""
 
     def __init__(self, capacity: int) -> None:
         self.vectors = [aligned_empty((3 * capacity,)) for _ in range(5)]
@@ -65,12 +65,12 @@ class _Scratch:
         self.length = aligned_empty((capacity,))
 
     def views(self, count: int) -> list[NDArray[np.float32]]:
-        """Five (3, count) arrays, C-contiguous."""
+        """Five C-contiguous (3, count) arrays."""
         return [v[: 3 * count].reshape(3, count) for v in self.vectors]
 
 
 class _Side:
-    """One side of a cloth, made ready."""
+    """The tables of one side of a cloth, made on demand."""
 
     def __init__(self, fabric: Fabric, shadow: str, make_ready: Callable[[], None]) -> None:
         self.fabric, self.method, self.make_ready = fabric, shadow, make_ready
@@ -80,16 +80,16 @@ class _Side:
 
     @property
     def law(self) -> SurfaceLaw:
-        """The surface law, made when first needed: many a cloth never shows its back."""
+        """The surface law, made when it is first needed: often a cloth's back is never seen."""
         with _ONE_AT_A_TIME:
             if self._law is None:
                 self._law = surface_law(self.fabric, precision=np.float32)
             return self._law
 
     def near(self, level: int) -> tuple[CompiledFabric, Shadow]:
-        """Weave and shadowing of level `weave` or `thread`, made when first needed."""
-        # One at a time for all cloths: some of these tables are made by numba's own workers, which
-        # may not be called from two threads at once.
+        """Weave and shadowing for level `weave` or `thread`, made when they are first needed."""
+        # One lock for all cloths: numba's own workers compute some of these tables, and they may
+        # not be called from two threads at once.
         with _ONE_AT_A_TIME:
             if level not in self._near:
                 self.make_ready()
@@ -105,7 +105,7 @@ class FabricShader:
     """Shades hits of one fabric: rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP of `Wave.hits`.
 
     shadow : one of `shadow.METHODS`, at levels `weave` and `thread`
-    make_ready : called before the first hit at one of those levels, which many a picture never has
+    make_ready : called before the first hit at one of those levels; many pictures have none
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class FabricShader:
         self.gap = 0.0 if fabric.opaque else float(self.sides[0].law.published.gap)
 
     def __call__(self, level: int, back: int, wave: Wave, first: int, last: int) -> None:
-        """Shade hits `first` to `last`, all on one side at one level."""
+        """Shade the hits from `first` to before `last`, all on one side and at one level."""
         side = self.sides[back]
         if level == FAR_LEVEL and side.law.kind == PUBLISHED_ONLY:
             shade_far(R, side.law.published, side.law.lobes, R(self.gap), wave.hits, first, last)
@@ -134,7 +134,7 @@ class FabricShader:
     def _shade_by_law(
         self, side: _Side, hits: NDArray[np.float32], first: int, vectors: list[Any]
     ) -> None:
-        """Level `far` of cloth with `conserving` threads."""
+        """Shade hits at level `far` on cloth with `conserving` threads."""
         _, _, go, towards, onwards = vectors
         count = go.shape[1]
         none, real = np.zeros(count, np.uint8), np.zeros(count, np.float32)
@@ -181,7 +181,7 @@ class FabricShader:
 
 @njit(**LEAN)
 def _by_law(R, law, level, hits, first, wo, wi, go, towards, onwards, sets, threads, psi0, across):
-    """Directions, densities and values of cloth with `conserving` threads, one hit at a time."""
+    """Sample and evaluate cloth with `conserving` threads, one hit at a time."""
     for k in range(wo.shape[1]):
         h = first + k
         which, thread, angle, w = int(sets[k]), int(threads[k]), psi0[k], across[k]
@@ -191,7 +191,7 @@ def _by_law(R, law, level, hits, first, wo, wi, go, towards, onwards, sets, thre
             hits[CHANCE, h], hits[CHANCE + 1, h], hits[CHANCE + 2, h],
         )  # fmt: skip
         go[0, k], go[1, k], go[2, k] = x, y, z
-        # One call of each function, for both directions: they are large, and compiled in place.
+        # Loop over both directions: the functions are large and inlined at each call.
         for turn in range(2):
             pdf = law_density(R, law, level, which, thread, angle, w, x, y, z, ox, oy, oz)
             red, green, blue = law_value(
@@ -224,7 +224,7 @@ def _finish(hits, h, keep, k, go, onwards):
 
 @njit(**LEAN)
 def look_up(R, cloth, v_sign, hits, first, sets, threads, along, across, psi0, length):
-    """The thread under each hit."""
+    """Look up the thread under each hit."""
     for k in range(sets.shape[0]):
         h = first + k
         which, thread, s, w, angle, run = find(
@@ -239,7 +239,7 @@ def finish_point(
     R, cloth, shadow, v_sign, open_gap, types, hits, first, wi, go, towards, onwards,
     sets, threads, along, across, psi0, length,
 ):  # fmt: skip
-    """Shadow the values by the neighbouring threads; in a gap the path goes straight on or ends."""
+    """Apply the shadowing of neighbouring threads; in a gap, the path goes straight on or ends."""
     for k in range(wi.shape[1]):
         h = first + k
         if sets[k] == GAP:
@@ -251,7 +251,7 @@ def finish_point(
         u, v = float(hits[PLACE, h]), float(v_sign * hits[PLACE + 1, h])
         light, bounce = R(1), R(1)
         if shadow.method != NONE:
-            # Light from behind the cloth has threads of its own before it.
+            # Light from behind the cloth is shadowed by the threads on that side.
             light = R(1) if wi[2, k] <= R(0) else shade(
                 R, cloth, shadow, u, v, sets[k], threads[k], along[k], across[k], length[k],
                 wi[0, k], wi[1, k], wi[2, k],
@@ -263,7 +263,7 @@ def finish_point(
         for row in range(3):
             hits[F + row, h] = light * towards[row, k]
             onwards[row, k] = bounce * onwards[row, k]
-        # As `weave.thread_number` has it.
+        # The same number as `weave.thread_number`.
         hits[KEEP, h] = R(1)
         hits[THREAD, h] = R(threads[k] + (types if sets[k] == WARP else 0))
         _finish(hits, h, R(1), k, go, onwards)
