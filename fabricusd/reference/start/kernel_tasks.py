@@ -1,6 +1,7 @@
-"""What a picture calls, kernel by kernel, on next to nothing: for `compile_ahead`.
+"""The kernels that a picture calls, as tasks that `compile_ahead` runs with minimal arguments.
 
-A task is one kernel or a few that have parts in common. A test compares with what pictures call.
+A task calls one kernel, or a few kernels that share parts. A test compares the tasks with the
+kernels that pictures call.
 """
 
 from __future__ import annotations
@@ -40,8 +41,7 @@ R = np.float32
 
 
 class _Sample(NamedTuple):
-    """A triangle, lit as a scene without lights is, and buffers: what kernels take their types
-    from."""
+    """One triangle under the default lights, and buffers: arguments of the kernels' types."""
 
     scene: Scene
     wave: Wave
@@ -62,7 +62,7 @@ def _sample() -> _Sample:
 
 
 def _cloth() -> tuple[Any, SurfaceTables]:
-    # Level threads: next to nothing to sample.
+    # The default fabric's threads are level, so its lobes are made quickly.
     fabric = Fabric()
     return fabric, surface_tables(fabric, precision=np.float32)
 
@@ -132,7 +132,7 @@ def _trace_and_settle() -> None:
 
 
 def _scratch() -> tuple[Any, ...]:
-    """Of a hit in finer detail: side by side as the laws want them, none."""
+    """The arrays of hits at levels `weave` and `thread`, each of length 0."""
     real = np.zeros(0, np.float32)
     return np.zeros(0, np.uint8), np.zeros(0, np.int32), real, real, real, real
 
@@ -181,8 +181,9 @@ TASKS: dict[str, tuple[Callable[[], None], ...]] = {
     ),
     NEAR: (_finish_point, _look_up, _sample_points, _point_values, _shadow_table),
 }  # fmt: skip
-"""Those that take longest at both ends, beside those with which they have parts in common. Level
-`far` is what every picture needs, `near` what levels `weave` and `thread` need besides."""
+"""The tasks of each list. Tasks that take longest stand at both ends, next to those with which they
+share parts. Every picture needs the first list; levels `weave` and `thread` also need the second.
+"""
 
 LONGEST = {FAR: shade_far, NEAR: finish_point}
-"""A kernel of each list that takes long: where numba has it on disk, it has the others."""
+"""A kernel of each list that takes long to compile: if it is cached, so are the others."""
