@@ -1,7 +1,7 @@
-"""Paths in batches: trace, arrive, shade, depart, until none is left.
+"""The path integrator: batches of paths go through trace, arrive, shade and depart until they end.
 
-Each stage is one compiled loop over all rays of a batch, which releases the interpreter, so workers
-are plain Python threads and a batch is what the scheduler hands out.
+Each stage is one compiled loop over all rays of a batch and releases Python's global interpreter
+lock. Workers can therefore be plain Python threads, and the scheduler hands out batches.
 """
 
 from __future__ import annotations
@@ -68,30 +68,32 @@ ESTIMATORS = {
     "uniform": arrivals.UNIFORM,
 }
 AIMED = 16
-"""Rays along each side of the picture that find what is to be lit."""
+"""Number of rays along each side of the picture that find the places to be lit."""
 MOST_LAYERS = 32
-"""See-through surfaces that one ray may pass before it is taken as blocked."""
+"""Number of see-through surfaces that a ray may pass before it counts as blocked."""
 
 
 def _shaders(scene: Scene, shadow: str) -> list[FabricShader | None]:
-    """Of every material, once the kernels that they need are ready."""
+    """The shaders of all materials, made once the kernels that they need are ready."""
     compile_ahead(FAR).wait()
     return [_shader(surface, shadow) for surface in scene.materials] or [None]
 
 
 def _shader(surface: Material, shadow: str) -> FabricShader | None:
-    """What shades a cloth; None for a plain surface, which needs nothing of its own."""
+    """The shader of a cloth; None for a plain surface, which needs no shader of its own."""
     if not isinstance(surface, FabricSurface):
         return None
     return FabricShader(surface.binding.fabric, shadow, lambda: compile_ahead(NEAR).wait())
 
 
 class Tracer:
-    """A scene made ready for rays.
+    """A scene prepared for path tracing.
 
-    limits : where level "auto" goes from one level to the next
-    estimator : "mis", or for tests one of "light", "surface", "uniform"; all have the same mean.
-    sampler : "sobol", or for tests "random".
+    limits : where level "auto" changes from one level to the next
+    estimator : "mis", or for tests "light", "surface" or "uniform"; all have the same mean
+    sampler : "sobol", or for tests "random"
+
+    Raises `FabricError` for an unknown level and for a negative `max_bounces`.
     """
 
     def __init__(
@@ -110,8 +112,9 @@ class Tracer:
             raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
         if max_bounces < 0:
             raise FabricError("max bounces", f"is {max_bounces}; it must be at least 0")
-        # The triangles, while kernels are made ready and, by those, the laws of the cloths. In this
-        # order: what triangles take by the way, another thread's heap would not give back.
+        # Load the kernels and build the cloths' laws on a worker thread while the triangles are
+        # built. Build the triangles on the main thread: temporary memory that is freed on a worker
+        # thread's heap is not returned to the system.
         beside = ThreadPoolExecutor(1)
         shaders = beside.submit(_shaders, scene, shadow)
         beside.shutdown(wait=False)
@@ -139,7 +142,7 @@ class Tracer:
         self.see_through = bool((self.opacity < 1).any())
 
     def aim(self, lens: Lens, width: int, height: int) -> None:
-        """Choose among lights by what they do to the places that the camera sees."""
+        """Set the chance of choosing each light by how brightly it lights what the camera sees."""
         if len(self.lights) < 2:
             return
         x, y = (np.arange(AIMED) * size // AIMED for size in (width, height))
@@ -165,9 +168,10 @@ class Tracer:
         samples: int,
         counters: NDArray[np.int64],
     ) -> None:
-        """Follow `samples` paths of each pixel to their end; `wave.film` holds what they saw.
+        """Trace `samples` paths of each pixel to their end and write the results to `wave.film`.
 
-        counters : (3,) int64 - rays, shadow rays and values that were not finite, added up.
+        first : number of the first sample
+        counters : (3,) int64 - numbers of rays, shadow rays and non-finite values, added to
         """
         count = len(pixels) * samples
         aovs = len(wave.film) > BEAUTY_ROWS
@@ -225,7 +229,7 @@ class Tracer:
                 break
 
     def _shade(self, wave: Wave, queue: int, start: int, end: int) -> None:
-        """Fill the surface's rows of hits `start` to `end`."""
+        """Shade the hits from `start` to before `end`, all of one queue, by their material."""
         shader = self.shaders[queue // QUEUES]
         if shader is None:
             shade = shade_mapped if self.mapped[queue // QUEUES] else shade_preview
@@ -234,7 +238,7 @@ class Tracer:
             shader(queue // 2 % 3, queue % 2, wave, start, end)
 
     def _settle(self, wave: Wave, count: int, aovs: bool) -> None:
-        """Trace the shadow rays and add what they bring."""
+        """Trace the shadow rays and add the light that they bring."""
         if count == 0:
             return
         if not self.see_through:
