@@ -71,7 +71,9 @@ class Document:
             size, kind = struct.unpack_from("<II", content, at)
             if at + 8 + size > len(content):
                 self.refuse(
-                    "", f"is cut short: a chunk of {size} bytes, {len(content) - at - 8} are there"
+                    "",
+                    f"is cut short: a chunk should have {size} bytes, but only "
+                    f"{len(content) - at - 8} are left",
                 )
             chunks.setdefault(kind, content[at + 8 : at + 8 + size])
             at += 8 + size + -size % 4
@@ -259,7 +261,7 @@ class Document:
             data = self._beside(uri, name)
         length = self.entry(buffer, "byteLength", int, name, len(data))
         if length > len(data):
-            self.refuse(f"{name}.byteLength", f"is {length}; {len(data)} bytes are there")
+            self.refuse(f"{name}.byteLength", f"is {length}; the buffer has {len(data)} bytes")
         self._buffers[number] = data
         return data
 
