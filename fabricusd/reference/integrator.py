@@ -44,7 +44,7 @@ from fabricusd.reference.stages.arrivals import AUTO_LEVEL, QUEUES, arrive, sort
 from fabricusd.reference.stages.departures import depart, record_first
 from fabricusd.reference.stages.hits import add_emission, prepare
 from fabricusd.reference.stages.shadow_rays import settle, thin_out
-from fabricusd.reference.start.compile_ahead import FAR, NEAR, compile_ahead
+from fabricusd.reference.start.compile_ahead import CLOSE_UPS, EVERY_PICTURE, compile_ahead
 from fabricusd.reference.surfaces.fabric import FabricShader
 from fabricusd.reference.surfaces.normal_map import shade_mapped
 from fabricusd.reference.surfaces.preview import (
@@ -75,7 +75,7 @@ MOST_LAYERS = 32
 
 def _shaders(scene: Scene, shadow: str) -> list[FabricShader | None]:
     """The shaders of all materials, made once the kernels that they need are ready."""
-    compile_ahead(FAR).wait()
+    compile_ahead(EVERY_PICTURE).wait()
     return [_shader(surface, shadow) for surface in scene.materials] or [None]
 
 
@@ -83,7 +83,7 @@ def _shader(surface: Material, shadow: str) -> FabricShader | None:
     """The shader of a cloth; None for a plain surface, which needs no shader of its own."""
     if not isinstance(surface, FabricSurface):
         return None
-    return FabricShader(surface.binding.fabric, shadow, lambda: compile_ahead(NEAR).wait())
+    return FabricShader(surface.binding.fabric, shadow, lambda: compile_ahead(CLOSE_UPS).wait())
 
 
 class Tracer:

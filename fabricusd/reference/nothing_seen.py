@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fabricusd.reference.integrator import Tracer
-from fabricusd.reference.rays.camera import FAR, Lens
+from fabricusd.reference.rays.camera import Lens
+from fabricusd.reference.rays.embree import INFINITE_DISTANCE
 from fabricusd.reference.rays.wave import ALPHA, Wave
 
 LOOKED = 1 << 14
@@ -21,10 +22,12 @@ def reason_for_nothing(tracer: Tracer, lens: Lens, width: int, height: int) -> s
     near, far = float(lens.near), float(lens.far)
     if near > 0 and _meets(tracer, lens._replace(near=np.float32(0)), width, height):
         return f"shows nothing: the near clipping plane, at {near:.4g} m, cuts everything away"
-    if lens.far < FAR and _meets(tracer, lens._replace(far=FAR), width, height):
+    if lens.far < INFINITE_DISTANCE and _meets(
+        tracer, lens._replace(far=INFINITE_DISTANCE), width, height
+    ):
         return f"shows nothing: the far clipping plane, at {far:.4g} m, cuts everything away"
-    open_lens = lens._replace(near=np.float32(0), far=FAR)
-    if near > 0 and lens.far < FAR and _meets(tracer, open_lens, width, height):
+    open_lens = lens._replace(near=np.float32(0), far=INFINITE_DISTANCE)
+    if near > 0 and lens.far < INFINITE_DISTANCE and _meets(tracer, open_lens, width, height):
         return (
             f"shows nothing: everything the camera would see is outside its clipping range, "
             f"{near:.4g} to {far:.4g} m"

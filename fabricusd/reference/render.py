@@ -28,7 +28,7 @@ from fabricusd.reference.integrator import Tracer
 from fabricusd.reference.nothing_seen import reason_for_nothing
 from fabricusd.reference.rays.camera import build_lens, default_camera
 from fabricusd.reference.rays.wave import ALPHA, Wave
-from fabricusd.reference.start.compile_ahead import FAR, compile_ahead
+from fabricusd.reference.start.compile_ahead import EVERY_PICTURE, compile_ahead
 from fabricusd.reference.view_transform import view
 from fabricusd.run.workers import Batches, pixels_along_z_curve, worker_count
 from fabricusd.scene.read import read_scene
@@ -135,7 +135,7 @@ def render(
     for code in frames or ():
         RANGES["frame"].require("frames", code)
     targets = _targets(out, frames)
-    compile_ahead(FAR)
+    compile_ahead(EVERY_PICTURE)
     begun = time.perf_counter()
     frame_results: list[RenderResult] = []
     paths: tuple[str, ...] = ()

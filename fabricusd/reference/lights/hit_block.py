@@ -16,12 +16,11 @@ from numba import njit
 
 from fabricusd.kernels.real import INLINE, cos, sin
 from fabricusd.reference.lights.row import AREA, CHANCE, P, X, Y, Z
-from fabricusd.reference.rays.hit_frames import BLOCK, CHOSEN, MADE, NUMBERS
-from fabricusd.reference.rays.wave import FRONT
+from fabricusd.reference.rays.hit_frames import CHOSEN, MADE, NUMBERS
+from fabricusd.reference.rays.wave import BLOCK, FRONT
 
 R = np.float32
 _PI = R(math.pi)
-FAR = R(1e30)
 
 # Rows from CHOSEN on, in the order of the rows of `Wave.hits` from WI on.
 WI, TO, DISTANCE, LIGHT, PDF = (CHOSEN + row * BLOCK for row in (0, 3, 6, 7, 10))

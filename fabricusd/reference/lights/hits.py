@@ -9,8 +9,9 @@ from numba import njit
 
 from fabricusd.kernels.real import PART
 from fabricusd.reference.lights.kinds import KINDS
-from fabricusd.reference.lights.ray_block import BLOCK, SEEN_B, SEEN_R, R
+from fabricusd.reference.lights.ray_block import SEEN_B, SEEN_R, R
 from fabricusd.reference.lights.row import KIND, VISIBLE
+from fabricusd.reference.rays.wave import BLOCK
 
 
 def _first_of(kinds):

@@ -11,9 +11,9 @@ from numba import njit
 
 from fabricusd.kernels.real import INLINE
 from fabricusd.reference.lights.row import AREA, CHANCE, RED, VISIBLE, P, X, Y, Z
+from fabricusd.reference.rays.wave import BLOCK
 
 R = np.float32
-BLOCK = 128
 
 # Rows of a block of rays: origin and direction, distance to the first triangle, pdf of the
 # direction (negative if light sampling does not compete with it), 1 for a ray from the camera and 0
@@ -22,8 +22,6 @@ BLOCK = 128
     row * BLOCK for row in range(14)
 )
 LIGHT_ROWS = 14
-ENDLESS = R(1e29)
-"""Distance from which on a ray counts as having hit nothing."""
 
 
 @njit(**INLINE)

@@ -14,7 +14,6 @@ from numba import njit
 from fabricusd.kernels.real import INLINE, PART, cos, sin, whole
 from fabricusd.reference.lights.hit_block import (
     DISTANCE,
-    FAR,
     LIGHT,
     LIGHT_B,
     LIGHT_G,
@@ -25,8 +24,9 @@ from fabricusd.reference.lights.hit_block import (
 )
 from fabricusd.reference.lights.kinds import KINDS
 from fabricusd.reference.lights.row import CHANCE, KIND, RED
-from fabricusd.reference.rays.hit_frames import BLOCK, CHOSEN, MADE, NUMBERS
-from fabricusd.reference.rays.wave import N, U, V
+from fabricusd.reference.rays.embree import INFINITE_DISTANCE
+from fabricusd.reference.rays.hit_frames import CHOSEN, MADE, NUMBERS
+from fabricusd.reference.rays.wave import BLOCK, N, U, V
 
 R = np.float32
 _PI = R(math.pi)
@@ -127,7 +127,7 @@ def no_lights(count, block):
         for x in range(count):
             block[CHOSEN + row * BLOCK + x] = R(0)
     for x in range(count):
-        block[WI + 2 * BLOCK + x], block[DISTANCE + x] = R(1), FAR
+        block[WI + 2 * BLOCK + x], block[DISTANCE + x] = R(1), INFINITE_DISTANCE
 
 
 @njit(**PART)

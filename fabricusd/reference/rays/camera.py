@@ -19,7 +19,9 @@ from fabricusd.reference.rays.embree import (
     DX,
     DY,
     DZ,
+    ENDLESS,
     GEOMETRY,
+    INFINITE_DISTANCE,
     LANES,
     MISS,
     OX,
@@ -34,9 +36,6 @@ from fabricusd.scene.scene import Camera, Scene
 R = np.float32
 FILTERS = ("box", "tent", "spline")
 """Radius half a pixel, one pixel (the default), one and a half pixels (quadratic B-spline)."""
-
-FAR = R(1e30)
-"""Length of a ray without end."""
 
 
 class Lens(NamedTuple):
@@ -95,7 +94,7 @@ def build_lens(
     return Lens(
         real(eye - centre), real(across), real(down), real(corner), real(right), real(up),
         real(-back), R(radius), R(camera.focus_distance or 1.0), R(camera.clipping[0]),
-        R(min(camera.clipping[1], 1e30)), R(pixel), camera.orthographic,
+        R(min(camera.clipping[1], float(INFINITE_DISTANCE))), R(pixel), camera.orthographic,
         FILTERS.index(pixel_filter),
     )  # fmt: skip
 
@@ -201,7 +200,7 @@ def _packet(lens, numbers, size, counters, places, packet):
         packet[DZ * LANES + lane] = az
         cosine = max(ax * zx + ay * zy + az * zz, R(1e-3))
         packet[TNEAR * LANES + lane] = near / cosine
-        packet[TFAR * LANES + lane] = far / cosine if far < R(1e29) else FAR
+        packet[TFAR * LANES + lane] = far / cosine if far < ENDLESS else INFINITE_DISTANCE
         places[_SPREAD + lane] = flat * spread * cosine
 
 

@@ -34,6 +34,11 @@ NGX, NGY, NGZ, HIT_U, HIT_V, PRIMITIVE, GEOMETRY, INSTANCE = range(12, 20)
 MISS = np.uint32(0xFFFFFFFF)
 """`PRIMITIVE` and `GEOMETRY` of a ray that hit nothing."""
 
+INFINITE_DISTANCE = np.float32(1e30)
+"""`TFAR` of a ray without end, and the distance to a light at infinity."""
+ENDLESS = np.float32(1e29)
+"""Distance from which on a ray counts as having hit nothing."""
+
 _FLOAT3, _UINT3 = 0x9003, 0x5003
 _ROBUST = 4
 _TRIANGLES = 0
@@ -209,7 +214,7 @@ def _python_trace(scene: Any, rays: NDArray[np.float32], count: int, *, occlusio
     reach = (far[active] - start).astype(np.float32)
     if not len(origin):
         return
-    hit = scene.run(origin, direction, np.minimum(reach, np.float32(1e30)), output=True)
+    hit = scene.run(origin, direction, np.minimum(reach, INFINITE_DISTANCE), output=True)
     found = (hit["primID"] != -1) & (hit["tfar"] <= reach)
     if occlusion:
         far[active] = np.where(found, np.float32(-np.inf), far[active])

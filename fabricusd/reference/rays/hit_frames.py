@@ -16,13 +16,9 @@ from fabricusd.reference.rays.sobol import four_numbers
 from fabricusd.reference.rays.triangles import D1, D2, E1, E2, HAND, P0, RATE, RECORD, ST
 from fabricusd.reference.rays.triangles import N as NORMALS
 from fabricusd.reference.rays.triangles import T as TANGENTS
-from fabricusd.reference.rays.wave import BACK, FOOTPRINT, FRONT, PLACE, SIDE, WO, N, U, V
+from fabricusd.reference.rays.wave import BACK, BLOCK, FOOTPRINT, FRONT, PLACE, SIDE, WO, N, U, V
 
 R = np.float32
-
-BLOCK = 128
-"""Number of hits in a block: small enough for all its rows to stay close to the first-level cache.
-"""
 
 TAKEN, RAY = 0, RECORD * BLOCK
 """Where the rows of the triangle's record start, and those of the ray: its direction and the hit's

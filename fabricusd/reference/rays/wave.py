@@ -57,6 +57,10 @@ BEAUTY_ROWS = 7
 
 FAR_LEVEL, WEAVE_LEVEL, THREAD_LEVEL = levels.FAR, levels.WEAVE, levels.THREAD
 
+BLOCK = 128
+"""Number of lanes or hits that a stage processes at once: few enough for all rows of a block to stay
+close to the first-level cache."""
+
 ROW_PADDING = 80
 """Numbers of padding after each row: five cache lines, coprime to a cache's number of sets."""
 

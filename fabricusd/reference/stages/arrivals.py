@@ -15,11 +15,9 @@ from fabricusd.kernels.real import INLINE, KERNEL, LEAN, PART, whole
 from fabricusd.reference.lights.hits import meet_lights
 from fabricusd.reference.lights.ray_block import (
     BEFORE,
-    BLOCK,
     D_X,
     D_Y,
     D_Z,
-    ENDLESS,
     FIRST,
     LIGHT_ROWS,
     O_X,
@@ -30,7 +28,9 @@ from fabricusd.reference.lights.ray_block import (
 )
 from fabricusd.reference.rays.embree import (
     DX,
+    ENDLESS,
     GEOMETRY,
+    INFINITE_DISTANCE,
     LANES,
     MISS,
     NGX,
@@ -42,6 +42,7 @@ from fabricusd.reference.rays.sobol import four_numbers
 from fabricusd.reference.rays.triangles import RATE
 from fabricusd.reference.rays.triangles import T as TANGENTS
 from fabricusd.reference.rays.wave import (
+    BLOCK,
     DIRECT,
     FAR_LEVEL,
     INDIRECT,
@@ -52,7 +53,6 @@ from fabricusd.reference.rays.wave import (
 )
 
 R = np.float32
-FAR = R(1e30)
 
 MIS, LIGHT_ONLY, SURFACE_ONLY, UNIFORM = range(4)
 """Estimators of the same integral: light and surface sampling combined, either one alone, or
@@ -118,7 +118,7 @@ def _load(start, size, rays, lanes, lane_tags, block):
                 block[_NORMAL + row * BLOCK + x + lane] = packet[NGX + row, lane]
         for lane in range(LANES):
             missed = names[GEOMETRY, lane] == MISS
-            block[REACH + x + lane] = FAR if missed else packet[TFAR, lane]
+            block[REACH + x + lane] = INFINITE_DISTANCE if missed else packet[TFAR, lane]
     before, depth = lanes[LANE_PDF][start:], lane_tags[1][start:]
     for x in range(size):
         block[BEFORE + x] = before[x]

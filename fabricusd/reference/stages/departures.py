@@ -12,7 +12,15 @@ import numpy as np
 from numba import njit
 
 from fabricusd.kernels.real import INLINE, KERNEL, LEAN, PART, whole
-from fabricusd.reference.rays.embree import DX, GEOMETRY, MISS, OX, TFAR, TNEAR
+from fabricusd.reference.rays.embree import (
+    DX,
+    GEOMETRY,
+    INFINITE_DISTANCE,
+    MISS,
+    OX,
+    TFAR,
+    TNEAR,
+)
 from fabricusd.reference.rays.wave import (
     ALBEDO,
     ALPHA,
@@ -21,6 +29,7 @@ from fabricusd.reference.rays.wave import (
     BEAUTY_ROWS,
     BEFORE,
     BETA,
+    BLOCK,
     CHANCE,
     CORNERS,
     DEPTH,
@@ -61,7 +70,6 @@ from fabricusd.reference.rays.wave import PRIMITIVE as TRIANGLE
 from fabricusd.reference.stages.arrivals import LIGHT_ONLY, MIS, UNIFORM
 
 R = np.float32
-FAR = R(1e30)
 UNSEEN = R(-1)
 """The pdf stored for a ray with which light sampling does not compete."""
 CARRIES_ON = R(8)
@@ -69,8 +77,6 @@ CARRIES_ON = R(8)
 scenes, rays times relative MSE is smallest from 6 to 12, a sixth lower than at 2."""
 MOST = R(3e38)
 """Values that are not below this count as not finite."""
-
-BLOCK = 128
 
 # Rows of a block after those of `Wave.hits`: the shadow ray's origin and length, the light that it
 # brings, and the sum of that over the channels; the next ray's origin, direction, throughput, pdf
@@ -156,7 +162,7 @@ def _towards_lights(mis, size, block):
         # A light may lie on a surface: geometry in the last ten-thousandth of the distance belongs
         # to the lamp and does not block it.
         reach = block[DISTANCE * BLOCK + x]
-        block[_REACH * BLOCK + x] = reach if reach >= FAR else reach * R(0.9999)
+        block[_REACH * BLOCK + x] = reach if reach >= INFINITE_DISTANCE else reach * R(0.9999)
 
 
 @njit(**PART)
@@ -270,7 +276,7 @@ def _write_next(start, size, deepest, tags, rays, lanes, lane_tags, result, bloc
             result[2] += 1
         if alive < R(0) or (depth >= deepest and not straight):
             continue
-        _write_ray(k, _START * BLOCK + x, _ALONG * BLOCK + x, FAR, rays, block)
+        _write_ray(k, _START * BLOCK + x, _ALONG * BLOCK + x, INFINITE_DISTANCE, rays, block)
         for row in range(3):
             lanes[LANE_BETA + row, k] = block[(_BETA + row) * BLOCK + x]
         lanes[LANE_PDF, k] = block[_PDF * BLOCK + x]

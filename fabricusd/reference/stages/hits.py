@@ -14,7 +14,6 @@ from fabricusd.reference.lights.sampling import (
 )
 from fabricusd.reference.rays.embree import DX, HIT_U, HIT_V, PRIMITIVE, TFAR
 from fabricusd.reference.rays.hit_frames import (
-    BLOCK,
     BLOCK_ROWS,
     CHOSEN,
     MADE,
@@ -29,6 +28,7 @@ from fabricusd.reference.rays.triangles import RECORD
 from fabricusd.reference.rays.wave import (
     BEFORE,
     BETA,
+    BLOCK,
     CHANCE,
     CORNERS,
     DEPTH,

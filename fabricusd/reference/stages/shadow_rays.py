@@ -13,6 +13,7 @@ from fabricusd.reference.rays.embree import (
     GEOMETRY,
     HIT_U,
     HIT_V,
+    INFINITE_DISTANCE,
     MISS,
     OX,
     OY,
@@ -26,7 +27,6 @@ from fabricusd.reference.rays.wave import DIRECT, INDIRECT, LIT
 from fabricusd.reference.surfaces.preview import opacity_at
 
 R = np.float32
-FAR = R(1e30)
 
 
 @njit(**LEAN)
@@ -98,7 +98,7 @@ def thin_out(count, rays, shadow, shadow_path, opacity, surfaces, triangle_mater
         rays[q, OX, place], rays[q, OY, place], rays[q, OZ, place] = x, y, z
         rays[q, DX, place], rays[q, DY, place], rays[q, DZ, place] = dx, dy, dz
         rays[q, TNEAR, place] = R(8) * epsilon + R(4e-6) * max(abs(x), max(abs(y), abs(z)))
-        rays[q, TFAR, place] = end if end >= FAR else end - rest
+        rays[q, TFAR, place] = end if end >= INFINITE_DISTANCE else end - rest
         shadow[3, left] = rays[q, TFAR, place]
         whole[q, GEOMETRY, place] = MISS
         left += 1

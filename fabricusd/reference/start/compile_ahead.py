@@ -29,10 +29,10 @@ from pathlib import Path
 from numba.core.dispatcher import Dispatcher
 
 from fabricusd.kernels.start import load_as_they_are, load_without_blas
-from fabricusd.reference.start.kernel_tasks import FAR, LONGEST, NEAR, TASKS
+from fabricusd.reference.start.kernel_tasks import CLOSE_UPS, EVERY_PICTURE, LONGEST, TASKS
 from fabricusd.run.workers import worker_count
 
-__all__ = ["FAR", "NEAR", "compile_ahead", "compile_kernels"]
+__all__ = ["CLOSE_UPS", "EVERY_PICTURE", "compile_ahead", "compile_kernels"]
 
 _LONGEST = 120.0
 """Longest time to wait for the other processes [s]."""
@@ -88,7 +88,8 @@ class CompileAhead:
 def compile_ahead(which: str) -> CompileAhead:
     """Start the thread or the processes, once per list; call `wait` before the first kernel call.
 
-    which : FAR for what every picture needs, NEAR for what levels `weave` and `thread` also need
+    which : EVERY_PICTURE for what every picture needs, CLOSE_UPS for what levels `weave` and
+        `thread` also need
     """
     return CompileAhead(which)
 

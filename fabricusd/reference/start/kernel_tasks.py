@@ -173,17 +173,17 @@ def _finish_point() -> None:
     finish_point(R, *_woven(), R(1), R(0), 1, _sample().wave.hits, 0, *vectors, *_scratch())
 
 
-FAR, NEAR = "far", "near"
+EVERY_PICTURE, CLOSE_UPS = "every picture", "close-ups"
 TASKS: dict[str, tuple[Callable[[], None], ...]] = {
-    FAR: (
+    EVERY_PICTURE: (
         _shade_far, _share_lobes, _shade_preview, _depart, _trace_and_settle, _camera_rays,
         _arrive, _prepare,
     ),
-    NEAR: (_finish_point, _look_up, _sample_points, _point_values, _shadow_table),
+    CLOSE_UPS: (_finish_point, _look_up, _sample_points, _point_values, _shadow_table),
 }  # fmt: skip
 """The tasks of each list. Tasks that take longest stand at both ends, next to those with which they
 share parts. Every picture needs the first list; levels `weave` and `thread` also need the second.
 """
 
-LONGEST = {FAR: shade_far, NEAR: finish_point}
+LONGEST = {EVERY_PICTURE: shade_far, CLOSE_UPS: finish_point}
 """A kernel of each list that takes long to compile: if it is cached, so are the others."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from fabricusd.kernels.real import INLINE, KERNEL, PART, cos, sin
 from fabricusd.reference.rays.wave import (
+    BLOCK,
     CHANCE,
     F_PDF,
     GO,
@@ -237,7 +238,6 @@ def _sample(alpha, share, ox, oy, oz, u0, u1, u2):
     )
 
 
-BLOCK = 128
 _STEP = BLOCK + 16
 """Distance between rows of a block. Rows at a distance of a power of two would all map to the same
 few cache lines."""

@@ -19,7 +19,7 @@ from fabricusd.errors import FabricError, one_line
 from fabricusd.scene.files.number_text import is_blank, parsed, word_starts, words_per_line
 from fabricusd.scene.files.piece import QUIET, MeshFile, Polygons
 
-BLOCK = 1 << 22
+BYTES_AT_ONCE = 1 << 22
 """Number of bytes that are processed at once."""
 
 V, VT, VN, F = 1, 2, 3, 4
@@ -132,7 +132,7 @@ class _Text:
         last = 0
         while last < len(lines):
             done = sizes[last - 1] if last else 0
-            first, last = last, max(int(np.searchsorted(sizes, done + BLOCK)), last + 1)
+            first, last = last, max(int(np.searchsorted(sizes, done + BYTES_AT_ONCE)), last + 1)
             part = lines[first:last]
             yield part, self._joined(part, 1 if kind in (V, F) else 2)
 

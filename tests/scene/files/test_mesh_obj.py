@@ -218,7 +218,7 @@ def test_a_thousand_groups_are_a_thousand_meshes_of_their_own_points(tmp_path):
 
 
 def test_blocks_of_lines_meet_without_a_seam(tmp_path, monkeypatch):
-    monkeypatch.setattr("fabricusd.scene.files.obj.BLOCK", 40)
+    monkeypatch.setattr("fabricusd.scene.files.obj.BYTES_AT_ONCE", 40)
     text = QUAD + FULL + "f -4/-4 -3/-3 -2/-2\n" * 9
     [small] = read(tmp_path, text).pieces
     monkeypatch.undo()

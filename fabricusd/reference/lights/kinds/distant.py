@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from fabricusd.kernels.real import PART, whole
 from fabricusd.reference.lights.dome import Dome
-from fabricusd.reference.lights.hit_block import FAR, U0, U1, in_cone, keep
-from fabricusd.reference.lights.ray_block import D_X, D_Y, D_Z, ENDLESS, REACH, add
+from fabricusd.reference.lights.hit_block import U0, U1, in_cone, keep
+from fabricusd.reference.lights.ray_block import D_X, D_Y, D_Z, REACH, add
 from fabricusd.reference.lights.row import AREA, CHANCE, SIZE, Axes, Z, brightness, put_axes
+from fabricusd.reference.rays.embree import ENDLESS, INFINITE_DISTANCE
 from fabricusd.scene.light_kinds import DISTANT
 from fabricusd.scene.scene import Light
 
@@ -41,12 +42,12 @@ def sample(light, dome, begin, end, block):
     chance, wide = light[CHANCE], light[AREA]
     if wide <= R(0):
         for y in range(whole(begin), whole(end)):
-            keep(block, y, zx, zy, zz, FAR, -chance)
+            keep(block, y, zx, zy, zz, INFINITE_DISTANCE, -chance)
         return
     pdf = chance / (R(2) * _PI * wide)
     for y in range(whole(begin), whole(end)):
         dx, dy, dz = in_cone(zx, zy, zz, wide, block[U0 + y], block[U1 + y])
-        keep(block, y, dx, dy, dz, FAR, pdf)
+        keep(block, y, dx, dy, dz, INFINITE_DISTANCE, pdf)
 
 
 @njit(**PART)

@@ -21,7 +21,6 @@ from fabricusd.reference.lights.hit_block import (
     DX,
     DY,
     DZ,
-    FAR,
     LIGHT_B,
     LIGHT_G,
     LIGHT_R,
@@ -34,7 +33,6 @@ from fabricusd.reference.lights.ray_block import (
     D_X,
     D_Y,
     D_Z,
-    ENDLESS,
     FIRST,
     REACH,
     ROW,
@@ -44,6 +42,7 @@ from fabricusd.reference.lights.ray_block import (
     weight_of,
 )
 from fabricusd.reference.lights.row import CHANCE, LUMINANCE, VISIBLE, Axes
+from fabricusd.reference.rays.embree import ENDLESS, INFINITE_DISTANCE
 from fabricusd.scene.light_kinds import DOME
 from fabricusd.scene.scene import Light
 
@@ -72,7 +71,7 @@ def sample(light, dome, begin, end, block):
         j, down, i, along = choose_cell(dome, block[U0 + y], block[U1 + y])
         cell = dome.cells[j * dome.size[1] + i]
         block[LIGHT_R + y], block[LIGHT_G + y], block[LIGHT_B + y] = cell[0], cell[1], cell[2]
-        block[DISTANCE + y], block[PDF + y] = FAR, cell[DENSITY] * chance
+        block[DISTANCE + y], block[PDF + y] = INFINITE_DISTANCE, cell[DENSITY] * chance
         block[DX + y], block[DY + y], block[DZ + y] = R(j), down, R(i) + along
     for y in range(whole(begin), whole(end)):
         dx, dy, dz = direction_in(dome, block[DX + y], block[DY + y], block[DZ + y])
