@@ -27,7 +27,7 @@ from fabricusd.reference.rays.embree import (
     Accelerator,
 )
 from fabricusd.reference.rays.sobol import new_numbers
-from fabricusd.reference.rays.triangles import build_tables
+from fabricusd.reference.rays.triangles import Triangles, build_tables
 from fabricusd.reference.rays.wave import (
     BEAUTY_ROWS,
     FAR_LEVEL,
@@ -40,7 +40,7 @@ from fabricusd.reference.rays.wave import (
     Wave,
 )
 from fabricusd.reference.stages import arrivals
-from fabricusd.reference.stages.arrivals import AUTO_LEVEL, QUEUES, arrive, sort_lanes
+from fabricusd.reference.stages.arrivals import AUTO_LEVEL, QUEUES, Settings, arrive, sort_lanes
 from fabricusd.reference.stages.departures import depart, record_first
 from fabricusd.reference.stages.hits import add_emission, prepare
 from fabricusd.reference.stages.shadow_rays import settle, thin_out
@@ -121,14 +121,14 @@ class Tracer:
         self.tables = build_tables(scene)
         self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
         self.shaders = shaders.result()
-        self.lights, self.dome = build_lights(scene.lights, self.tables.centre)
+        self.triangles = Triangles(self.tables.records, self.tables.material)
+        self.lights = build_lights(scene.lights, self.tables.centre)
         self.surfaces = build_surfaces(scene)
         shining = self.surfaces.table[:, [EMISSIVE, EMISSIVE + 1, EMISSIVE + 2]].any(axis=1)
         self.shines = bool((shining | (self.surfaces.table[:, EMISSIVE_MAP] >= 0)).any())
         self.mapped = self.surfaces.table[:, NORMAL_MAP] >= 0
         self.max_bounces = max_bounces
-        self.level = LEVELS[level]
-        self.estimator = ESTIMATORS[estimator]
+        self.settings = Settings(ESTIMATORS[estimator], LEVELS[level], max_bounces)
         self.numbers = new_numbers(seed, independent=sampler == "random")
         self.epsilon = np.float32(1e-7 * self.tables.radius + 1e-12)
         self._limits = np.zeros((len(self.shaders), 4), np.float32)
@@ -143,20 +143,21 @@ class Tracer:
 
     def aim(self, lens: Lens, width: int, height: int) -> None:
         """Set the chance of choosing each light by how brightly it lights what the camera sees."""
-        if len(self.lights) < 2:
+        if len(self.lights.table) < 2:
             return
         x, y = (np.arange(AIMED) * size // AIMED for size in (width, height))
         pixels = (y[:, None] * width + x).ravel().astype(np.int32)
         wave = Wave(len(pixels), aovs=False)
+        rays = wave.lanes.rays
         camera_rays(
-            lens, width, pixels, 0, 1, self.numbers, wave.rays.reshape(len(wave.rays), -1),
-            wave.lanes[LANE_WIDTH : LANE_SPREAD + 1], wave.path_pixel, wave.path_sample,
+            lens, width, pixels, 0, 1, self.numbers, rays.reshape(len(rays), -1),
+            wave.lanes.rows[LANE_WIDTH : LANE_SPREAD + 1], wave.paths,
         )  # fmt: skip
-        self.accelerator.intersect(wave.rays, len(wave.rays))
-        rows = wave.rays.transpose(1, 0, 2).reshape(ROWS, -1)
+        self.accelerator.intersect(rays, len(rays))
+        rows = rays.transpose(1, 0, 2).reshape(ROWS, -1)
         ends = rows[OX : OZ + 1] + rows[DX : DZ + 1] * rows[TFAR]
         met = rows.view(np.uint32)[GEOMETRY] != MISS
-        share_out(self.lights, self.dome, ends[:, met].T)
+        share_out(self.lights, ends[:, met].T)
 
     def trace(
         self,
@@ -176,49 +177,43 @@ class Tracer:
         count = len(pixels) * samples
         aovs = len(wave.film) > BEAUTY_ROWS
         wave.film[:, :count] = 0.0
+        rays, rows, tags = wave.lanes
         camera_rays(
-            lens, width, pixels, first, samples, self.numbers,
-            wave.rays.reshape(len(wave.rays), -1), wave.lanes[LANE_WIDTH : LANE_SPREAD + 1],
-            wave.path_pixel, wave.path_sample,
+            lens, width, pixels, first, samples, self.numbers, rays.reshape(len(rays), -1),
+            rows[LANE_WIDTH : LANE_SPREAD + 1], wave.paths,
         )  # fmt: skip
-        wave.lanes[LANE_BETA : LANE_BETA + 3, :count] = 1.0
-        wave.lanes[LANE_PDF, :count] = -1.0
-        wave.lane_tags[0, :count] = np.arange(count)
-        wave.lane_tags[1, :count] = 0
+        rows[LANE_BETA : LANE_BETA + 3, :count] = 1.0
+        rows[LANE_PDF, :count] = -1.0
+        tags[0, :count] = np.arange(count)
+        tags[1, :count] = 0
         counts = np.zeros(QUEUES * len(self.shaders), np.int64)
         result = np.zeros(3, np.int64)
         for step in range(self.max_bounces + 2 + MOST_LAYERS):
-            self.accelerator.intersect(wave.rays, (count + 15) // 16, coherent=step == 0)
+            self.accelerator.intersect(wave.lanes.rays, (count + 15) // 16, coherent=step == 0)
             counters[0] += count
             arrive(
-                step, self.max_bounces, self.estimator, count, wave.rays, wave.lanes,
-                wave.lane_tags, self.lights, self.dome, wave.film, wave.keys,
-                self.tables.material, self._limits, self.tables.records, self.level,
-                wave.path_pixel, wave.path_sample, self.numbers, counts,
+                step, self.settings, count, wave.lanes, wave.paths, self.numbers, self.lights,
+                self.triangles, self._limits, wave.film, wave.queues, counts,
             )  # fmt: skip
             ends = np.cumsum(counts)
             hits = int(ends[-1])
             if hits == 0:
                 break
-            sort_lanes(count, wave.keys, ends - counts, wave.order)
+            sort_lanes(count, wave.queues, ends - counts)
             prepare(
-                step, self.estimator, ends, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
-                wave.order, self.tables.records, self.lights, self.dome, self.epsilon,
-                wave.path_pixel, wave.path_sample, self.numbers, wave.hits, wave.tags,
+                step, self.settings, ends, wave.lanes, wave.queues, wave.paths, self.numbers,
+                self.triangles, self.lights, self.epsilon, wave.hits,
             )  # fmt: skip
             if self.shines:
-                add_emission(hits, self.surfaces, wave.hits, wave.tags, wave.film)
+                add_emission(hits, self.surfaces, wave.hits, wave.film)
             for queue in np.flatnonzero(counts):
                 start, end = int(ends[queue] - counts[queue]), int(ends[queue])
                 self._shade(wave, int(queue), start, end)
             if aovs and step <= MOST_LAYERS:
-                record_first(
-                    hits, lens.eye, lens.axis, wave.hits, wave.tags, self.tables.uv, wave.film
-                )
+                record_first(hits, lens.eye, lens.axis, wave.hits, self.tables.uv, wave.film)
             depart(
-                step, self.estimator, hits, self.max_bounces, wave.hits, wave.tags, wave.film,
-                wave.shadow_rays, wave.shadow, wave.shadow_path, wave.next_rays, wave.next_lanes,
-                wave.next_tags, result,
+                step, self.settings, hits, wave.hits, wave.film, wave.shadows, wave.next_lanes,
+                result,
             )  # fmt: skip
             counters[1] += result[0]
             counters[2] += result[2]
@@ -233,7 +228,7 @@ class Tracer:
         shader = self.shaders[queue // QUEUES]
         if shader is None:
             shade = shade_mapped if self.mapped[queue // QUEUES] else shade_preview
-            shade(self.surfaces, wave.hits, wave.tags, start, end)
+            shade(self.surfaces, wave.hits.rows, wave.hits.tags, start, end)
         else:
             shader(queue // 2 % 3, queue % 2, wave, start, end)
 
@@ -242,15 +237,14 @@ class Tracer:
         if count == 0:
             return
         if not self.see_through:
-            self.accelerator.occluded(wave.shadow_rays, (count + 15) // 16)
-            settle(count, wave.shadow_rays, wave.shadow, wave.shadow_path, wave.film, aovs)
+            self.accelerator.occluded(wave.shadows.rays, (count + 15) // 16)
+            settle(count, wave.shadows, wave.film, aovs)
             return
         for _ in range(MOST_LAYERS):
-            self.accelerator.intersect(wave.shadow_rays, (count + 15) // 16)
+            self.accelerator.intersect(wave.shadows.rays, (count + 15) // 16)
             count = thin_out(
-                count, wave.shadow_rays, wave.shadow, wave.shadow_path, self.opacity,
-                self.surfaces, self.tables.material, self.tables.records, self.epsilon, aovs,
-                wave.film,
+                count, wave.shadows, self.opacity, self.surfaces, self.triangles, self.epsilon,
+                aovs, wave.film,
             )  # fmt: skip
             if count == 0:
                 break

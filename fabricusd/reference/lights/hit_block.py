@@ -22,7 +22,7 @@ from fabricusd.reference.rays.wave import BLOCK, FRONT
 R = np.float32
 _PI = R(math.pi)
 
-# Rows from CHOSEN on, in the order of the rows of `Wave.hits` from WI on.
+# Rows from CHOSEN on, in the order of the rows of `Hits.rows` from WI on.
 WI, TO, DISTANCE, LIGHT, PDF = (CHOSEN + row * BLOCK for row in (0, 3, 6, 7, 10))
 
 DX, DY, DZ = (TO + row * BLOCK for row in range(3))

@@ -8,6 +8,7 @@ integral. Every `pdf` is per solid angle and includes the chance of choosing the
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -24,10 +25,15 @@ R = np.float32
 _PI = R(math.pi)
 
 
-def build_lights(
-    lights: list[Light], centre: NDArray[np.float64]
-) -> tuple[NDArray[np.float32], Dome]:
-    """The table (n, COLUMNS) float32, and the picture of all domes together.
+class Lights(NamedTuple):
+    """All lights of a scene: table : (n, COLUMNS) float32; dome : the picture of all domes."""
+
+    table: NDArray[np.float32]
+    dome: Dome
+
+
+def build_lights(lights: list[Light], centre: NDArray[np.float64]) -> Lights:
+    """Build the table of the lights, and the picture of all domes together.
 
     All lights get the same chance; `share_out` changes the chances.
     """
@@ -41,16 +47,17 @@ def build_lights(
     if rows:
         table = np.ascontiguousarray(rows, np.float32)
         table[:, CHANCE] = 1 / len(rows)
-    return table, dome
+    return Lights(table, dome)
 
 
-def share_out(table: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]) -> None:
+def share_out(lights: Lights, places: NDArray[np.float32]) -> None:
     """Make the chance of choosing a light proportional to how brightly it lights `places`.
 
     places : (n, 3) [m], relative to the scene's centre - for example, what the camera sees
     """
     if not len(places):
         return
+    table, dome = lights
     power = np.array([KINDS[int(row[KIND])].irradiance(row, dome, places) for row in table])
     if power.sum() > 0:
         # Keep a chance for every light: the estimate ignores shadows and the surfaces' orientation.

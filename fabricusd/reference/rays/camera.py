@@ -129,15 +129,15 @@ _COLUMN, _ROW, _SPREAD = (row * LANES for row in range(3))
 
 
 @njit(**KERNEL)
-def camera_rays(lens, width, pixels, first, samples, numbers, packets, cone, path_pixel,
-                path_sample):  # fmt: skip
+def camera_rays(lens, width, pixels, first, samples, numbers, packets, cone, paths):
     """Write the camera rays of `samples` samples for each of `pixels`, starting at sample `first`.
 
     pixels : (n,) int32 - row times `width` plus column; path `k` is sample `k % samples` of pixel
         number `k // samples` in this array
     packets : (packets, ROWS 16) float32; cone : (2, n samples) - width and spread of each ray
-    path_pixel, path_sample : (n samples,) uint32 - select the random numbers of each path
+    paths : `Paths` of n samples entries
     """
+    path_pixel, path_sample = paths.pixel, paths.sample
     count = pixels.shape[0] * samples
     places = np.empty(3 * LANES, np.float32)
     counters = np.empty(2 * LANES, np.uint32)

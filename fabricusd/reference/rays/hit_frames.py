@@ -25,13 +25,13 @@ TAKEN, RAY = 0, RECORD * BLOCK
 barycentric coordinates."""
 
 MADE = (RECORD + 5) * BLOCK
-"""Where the computed rows start: those of `Wave.hits` from FRONT to SIDE, in their order."""
+"""Where the computed rows start: those of `Hits.rows` from FRONT to SIDE, in their order."""
 
 NUMBERS = MADE + (SIDE + 1) * BLOCK
 """Where the eight rows of random numbers start."""
 
 CHOSEN = NUMBERS + 8 * BLOCK
-"""Where the rows of the chosen light start: those of `Wave.hits` from WI to LIGHT_PDF, in their
+"""Where the rows of the chosen light start: those of `Hits.rows` from WI to LIGHT_PDF, in their
 order."""
 
 BLOCK_ROWS = RECORD + 5 + SIDE + 1 + 8 + 11

@@ -8,7 +8,7 @@ float32 resolves the position inside a thread however large the UVs are.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,13 @@ from fabricusd.scene.surface.normals import (
 # (u, v, N), and RATE the length of each coordinate's gradient [1/m].
 P0, E1, E2, N, T, ST, D1, D2, HAND, RATE = 0, 3, 6, 9, 18, 27, 29, 31, 33, 34
 RECORD = 36
+
+
+class Triangles(NamedTuple):
+    """What kernels read of the triangles: records : (m, RECORD) float32; material : (m,) int32."""
+
+    records: NDArray[np.float32]
+    material: NDArray[np.int32]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,14 +7,15 @@ lane whose ray hit a surface; hits are sorted by material, level and side.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fabricusd.appearance import levels
 from fabricusd.reference.rays.embree import aligned_empty, new_packets
 
-# Rows of `Wave.hits`.
+# Rows of `Hits.rows`.
 # FRONT, BACK: origins of new rays on the viewer's side and on the other side.
 # N, U, V: the surface frame in world space. WO, WI, GO: directions in that frame, towards the
 #     viewer, towards the chosen light, and the sampled direction.
@@ -39,10 +40,10 @@ from fabricusd.reference.rays.embree import aligned_empty, new_packets
 )  # fmt: skip
 HIT_ROWS = 58
 
-# Rows of `Wave.tags`.
+# Rows of `Hits.tags`.
 PATH, DEPTH, PRIMITIVE, MATERIAL, LEVEL = range(5)
 
-# Rows of `Wave.lanes`: throughput, pdf of the ray's direction (negative if light sampling does not
+# Rows of `Lanes.rows`: throughput, pdf of the ray's direction (negative if light sampling does not
 # compete with it), width and spread of the ray's cone.
 LANE_BETA, LANE_PDF, LANE_WIDTH, LANE_SPREAD = 0, 3, 4, 5
 
@@ -58,11 +59,66 @@ BEAUTY_ROWS = 7
 FAR_LEVEL, WEAVE_LEVEL, THREAD_LEVEL = levels.FAR, levels.WEAVE, levels.THREAD
 
 BLOCK = 128
-"""Number of lanes or hits that a stage processes at once: few enough for all rows of a block to stay
-close to the first-level cache."""
+"""Number of lanes or hits that a stage processes at once: few enough for all rows of a block to
+stay close to the first-level cache."""
 
 ROW_PADDING = 80
 """Numbers of padding after each row: five cache lines, coprime to a cache's number of sets."""
+
+
+class Lanes(NamedTuple):
+    """The live rays of a batch.
+
+    rays : (packets, ROWS, 16) float32 - as `embree` traces them
+    rows : (6, n) float32 - rows LANE_BETA to LANE_SPREAD
+    tags : (2, n) int32 - the lane's path and its depth
+    """
+
+    rays: NDArray[np.float32]
+    rows: NDArray[np.float32]
+    tags: NDArray[np.int32]
+
+
+class Paths(NamedTuple):
+    """What selects the random numbers of each path: pixel, sample : (n,) uint32."""
+
+    pixel: NDArray[np.uint32]
+    sample: NDArray[np.uint32]
+
+
+class Queues(NamedTuple):
+    """The lanes that hit a surface, sorted by material, level and side.
+
+    keys : (n,) int32 - number of each lane's queue, -1 for a lane that ends
+    order : (n,) int32 - the other lanes, in the order of their queues
+    """
+
+    keys: NDArray[np.int32]
+    order: NDArray[np.int32]
+
+
+class Hits(NamedTuple):
+    """The hits of a batch.
+
+    rows : (HIT_ROWS, n) float32 - rows FRONT to CORNERS
+    tags : (5, n) int32 - rows PATH to LEVEL
+    """
+
+    rows: NDArray[np.float32]
+    tags: NDArray[np.int32]
+
+
+class ShadowRays(NamedTuple):
+    """The shadow rays of a batch.
+
+    rays : (packets, ROWS, 16) float32 - as `embree` traces them
+    light : (4, n) float32 - the radiance that an unblocked ray adds, and the ray's length [m]
+    path : (n,) int32 - p for direct light of path p, -p - 1 for its indirect light
+    """
+
+    rays: NDArray[np.float32]
+    light: NDArray[np.float32]
+    path: NDArray[np.int32]
 
 
 class Wave:
@@ -70,28 +126,21 @@ class Wave:
 
     def __init__(self, capacity: int, *, aovs: bool) -> None:
         self.capacity = capacity
-        self.rays = new_packets(capacity)
-        self.shadow_rays = new_packets(capacity)
-        self.next_rays = new_packets(capacity)
         # Rows at a distance of a power of two would all map to the same few cache lines.
         row = capacity + ROW_PADDING
-        self.lanes = aligned_empty((6, row))
-        self.next_lanes = aligned_empty((6, row))
-        self.lane_tags = aligned_empty((2, row), np.int32)
-        self.next_tags = aligned_empty((2, row), np.int32)
-        self.hits = aligned_empty((HIT_ROWS, row))
-        self.tags = aligned_empty((5, row), np.int32)
-        self.keys = aligned_empty((capacity,), np.int32)
-        self.order = aligned_empty((capacity,), np.int32)
-        self.path_pixel = aligned_empty((capacity,), np.uint32)
-        self.path_sample = aligned_empty((capacity,), np.uint32)
-        self.shadow = aligned_empty((4, row))
-        self.shadow_path = aligned_empty((capacity,), np.int32)
+        self.lanes, self.next_lanes = (
+            Lanes(new_packets(capacity), aligned_empty((6, row)), aligned_empty((2, row), np.int32))
+            for _ in range(2)
+        )
+        self.paths = Paths(*(aligned_empty((capacity,), np.uint32) for _ in range(2)))
+        self.queues = Queues(*(aligned_empty((capacity,), np.int32) for _ in range(2)))
+        self.hits = Hits(aligned_empty((HIT_ROWS, row)), aligned_empty((5, row), np.int32))
+        self.shadows = ShadowRays(
+            new_packets(capacity), aligned_empty((4, row)), aligned_empty((capacity,), np.int32)
+        )
         self.film = aligned_empty((FILM_ROWS if aovs else BEAUTY_ROWS, row))
         self.scratch: Any = None
 
     def swap(self) -> None:
         """Make the rays that the last step spawned the current rays."""
-        self.rays, self.next_rays = self.next_rays, self.rays
         self.lanes, self.next_lanes = self.next_lanes, self.lanes
-        self.lane_tags, self.next_tags = self.next_tags, self.lane_tags

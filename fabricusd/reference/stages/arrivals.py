@@ -7,6 +7,8 @@ shaded. There is one queue for each material, level and side.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -59,6 +61,19 @@ MIS, LIGHT_ONLY, SURFACE_ONLY, UNIFORM = range(4)
 uniform directions over the sphere."""
 
 AUTO_LEVEL = 3
+
+
+class Settings(NamedTuple):
+    """What holds for all paths of a picture.
+
+    estimator : MIS to UNIFORM; level : a level or AUTO_LEVEL; max_depth : most bounces of a path
+    """
+
+    estimator: int
+    level: int
+    max_depth: int
+
+
 NUMBERS_PER_STEP = 4
 """Number of places that a step of a path may use, see `sobol.four_numbers`."""
 
@@ -75,9 +90,8 @@ _ROWS = LIGHT_ROWS + 16
 
 
 @njit(**KERNEL)
-def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, dome, film, keys,
-           triangle_material, limits, records, level, path_pixel, path_sample,
-           numbers, counts):  # fmt: skip
+def arrive(step, settings, count, lanes, paths, numbers, lights, triangles, limits, film, queues,
+           counts):  # fmt: skip
     """Add the light that rays hit, and write each lane's queue key; -1 for a lane that ends.
 
     limits : (materials, 4) float32 - `footprint.Limits.row` of a fabric, 0 for a surface without
@@ -87,25 +101,25 @@ def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, do
     """
     counts[:] = 0
     count = whole(count)
+    table, dome = lights.table, lights.dome
     block = np.empty(_ROWS * BLOCK, np.float32)
     counters = np.empty(2 * BLOCK, np.uint32)
     for start in range(0, count, BLOCK):
         size = min(BLOCK, count - start)
-        _load(start, size, rays, lanes, lane_tags, block)
-        meet_lights(lights, dome, step == 0, size, block)
-        _add_seen(start, size, estimator, lane_tags, lanes, film, block)
+        _load(start, size, lanes, block)
+        meet_lights(table, dome, step == 0, size, block)
+        _add_seen(start, size, settings.estimator, lanes, film, block)
         _turn(size, block)
-        if level == AUTO_LEVEL:
-            _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
-                         path_pixel, path_sample, counters, block)  # fmt: skip
+        if settings.level == AUTO_LEVEL:
+            _load_levels(start, size, lanes, paths, triangles, limits, counters, block)
             place = np.uint32(2 + NUMBERS_PER_STEP * step + 2)
             _choose_levels(numbers, place, size, counters, block)
-        _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, limits,
-                   keys, counts, block)  # fmt: skip
+        _give_keys(start, size, settings, lanes, triangles, limits, queues, counts, block)
 
 
 @njit(**PART)
-def _load(start, size, rays, lanes, lane_tags, block):
+def _load(start, size, lanes, block):
+    rays = lanes.rays
     bits = rays.view(np.uint32)
     for x in range(0, size, LANES):
         packet, names = rays[(start + x) >> 4], bits[(start + x) >> 4]
@@ -119,7 +133,7 @@ def _load(start, size, rays, lanes, lane_tags, block):
         for lane in range(LANES):
             missed = names[GEOMETRY, lane] == MISS
             block[REACH + x + lane] = INFINITE_DISTANCE if missed else packet[TFAR, lane]
-    before, depth = lanes[LANE_PDF][start:], lane_tags[1][start:]
+    before, depth = lanes.rows[LANE_PDF][start:], lanes.tags[1][start:]
     for x in range(size):
         block[BEFORE + x] = before[x]
     for x in range(size):
@@ -127,19 +141,20 @@ def _load(start, size, rays, lanes, lane_tags, block):
 
 
 @njit(**PART)
-def _add_seen(start, size, estimator, lane_tags, lanes, film, block):
+def _add_seen(start, size, estimator, lanes, film, block):
     """Add the radiance of lights that the rays passed to their paths."""
+    rows, tags = lanes.rows, lanes.tags
     for x in range(size):
         red, green, blue = block[SEEN_R + x], block[SEEN_G + x], block[SEEN_B + x]
         k = start + x
-        depth = lane_tags[1, k]
+        depth = tags[1, k]
         if red + green + blue <= R(0) or (depth > 0 and estimator == LIGHT_ONLY):
             continue
-        path = whole(lane_tags[0, k])
+        path = whole(tags[0, k])
         row = DIRECT if depth <= 1 else INDIRECT
-        film[row, path] += red * lanes[LANE_BETA, k]
-        film[row + 1, path] += green * lanes[LANE_BETA + 1, k]
-        film[row + 2, path] += blue * lanes[LANE_BETA + 2, k]
+        film[row, path] += red * rows[LANE_BETA, k]
+        film[row + 1, path] += green * rows[LANE_BETA + 1, k]
+        film[row + 2, path] += blue * rows[LANE_BETA + 2, k]
 
 
 @njit(**PART)
@@ -154,13 +169,14 @@ def _turn(size, block):
 
 
 @njit(**PART)
-def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
-                 path_pixel, path_sample, counters, block):  # fmt: skip
+def _load_levels(start, size, lanes, paths, triangles, limits, counters, block):
     """Load what level `auto` needs for each ray that hit a fabric; zeros for the other rays."""
-    bits = rays.view(np.uint32)
+    bits, rows, tags = lanes.rays.view(np.uint32), lanes.rows, lanes.tags
+    path_pixel, path_sample = paths.pixel, paths.sample
+    records, triangle_material = triangles.records, triangles.material
     for x in range(size):
         k = start + x
-        path = whole(lane_tags[0, k])
+        path = whole(tags[0, k])
         counters[x], counters[BLOCK + x] = path_pixel[path], path_sample[path]
         for row in range(4):
             block[_LIMITS + row * BLOCK + x] = R(0)
@@ -179,7 +195,7 @@ def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits,
             block[_STEEP + row * BLOCK + x] = record[RATE + row]
         for row in range(3):
             block[_GRAIN + row * BLOCK + x] = record[TANGENTS + row]
-        block[_WIDTH + x] = lanes[LANE_WIDTH, k] + block[REACH + x] * lanes[LANE_SPREAD, k]
+        block[_WIDTH + x] = rows[LANE_WIDTH, k] + block[REACH + x] * rows[LANE_SPREAD, k]
 
 
 @njit(**PART)
@@ -212,13 +228,13 @@ def _choose_levels(numbers, place, size, counters, block):
 
 
 @njit(**PART)
-def _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, limits, keys,
-               counts, block):  # fmt: skip
-    bits = rays.view(np.uint32)
+def _give_keys(start, size, settings, lanes, triangles, limits, queues, counts, block):
+    bits, tags, keys = lanes.rays.view(np.uint32), lanes.tags, queues.keys
+    level, max_depth, triangle_material = settings.level, settings.max_depth, triangles.material
     for x in range(size):
         k = start + x
         # The ray beyond the last surface only sees lights; it is not shaded.
-        if block[REACH + x] >= ENDLESS or lane_tags[1, k] > max_depth:
+        if block[REACH + x] >= ENDLESS or tags[1, k] > max_depth:
             keys[k] = -1
             continue
         material = whole(triangle_material[bits[k >> 4, PRIMITIVE, k & 15]])
@@ -238,12 +254,12 @@ def _advance(offsets, key):
 
 
 @njit(**LEAN)
-def sort_lanes(count, keys, offsets, order):
-    """Write the numbers of the lanes that go on to `order`, sorted by queue.
+def sort_lanes(count, queues, offsets):
+    """Write the numbers of the lanes that go on to `queues.order`, sorted by queue.
 
     offsets : (queues,) int64 - where each queue starts; on return, where it ends
-    order : (count,) int32
     """
+    keys, order = queues.keys, queues.order
     for k in range(whole(count)):
         if keys[k] >= 0:
             order[_advance(offsets, whole(keys[k]))] = k

@@ -78,7 +78,7 @@ scenes, rays times relative MSE is smallest from 6 to 12, a sixth lower than at 
 MOST = R(3e38)
 """Values that are not below this count as not finite."""
 
-# Rows of a block after those of `Wave.hits`: the shadow ray's origin and length, the light that it
+# Rows of a block after those of `Hits.rows`: the shadow ray's origin and length, the light that it
 # brings, and the sum of that over the channels; the next ray's origin, direction, throughput, pdf
 # and spread, and whether it is alive. In the sum and in the last row, a value of 0 or less means
 # that there is no ray, and _BROKEN that the ray was dropped because a value was not finite.
@@ -90,13 +90,13 @@ _NONE, _BROKEN = R(-1), R(-2)
 
 
 @njit(**KERNEL)
-def depart(step, estimator, count, max_depth, hits, tags, film, shadow_rays, shadow, shadow_path,
-           next_rays, next_lanes, next_tags, result):  # fmt: skip
+def depart(step, settings, count, hits, film, shadows, lanes, result):
     """Write the shadow rays and the next rays of all hits, both packed.
 
-    shadow : (4, n) - the radiance that an unblocked shadow ray adds, and its length [m]
+    lanes : `Lanes` of the next step
     result : (3,) int64 - numbers of shadow rays, next rays and non-finite values
     """
+    estimator, max_depth = settings.estimator, settings.max_depth
     block = np.empty(_ROWS * BLOCK, np.float32)
     result[:] = 0
     count = whole(count)
@@ -107,18 +107,18 @@ def depart(step, estimator, count, max_depth, hits, tags, film, shadow_rays, sha
         if estimator == UNIFORM:
             _go_uniformly(size, block)
         _onwards(step, estimator == MIS, size, block)
-        _write_shadows(start, size, tags, film, shadow_rays, shadow, shadow_path, result, block)
+        _write_shadows(start, size, hits, film, shadows, result, block)
         # Trace one ray beyond the last surface: the lights that it sees illuminate that surface.
         deepest = max_depth if estimator == LIGHT_ONLY else max_depth + 1
-        _write_next(start, size, deepest, tags, next_rays, next_lanes, next_tags, result, block)
-    _fill_up(result[0], shadow_rays)
-    _fill_up(result[1], next_rays)
+        _write_next(start, size, deepest, hits, lanes, result, block)
+    _fill_up(result[0], shadows.rays)
+    _fill_up(result[1], lanes.rays)
 
 
 @njit(**PART)
 def _load(start, size, hits, block):
     for row in range(CORNERS):
-        source = hits[row][start:]
+        source = hits.rows[row][start:]
         for x in range(size):
             block[row * BLOCK + x] = source[x]
 
@@ -242,7 +242,8 @@ def _write_ray(k, start, along, reach, rays, block):
 
 
 @njit(**PART)
-def _write_shadows(start, size, tags, film, rays, shadow, shadow_path, result, block):
+def _write_shadows(start, size, hits, film, shadows, result, block):
+    tags, (rays, light, shadow_path) = hits.tags, shadows
     k = whole(result[0])
     for x in range(size):
         h = start + x
@@ -254,8 +255,8 @@ def _write_shadows(start, size, tags, film, rays, shadow, shadow_path, result, b
             reach = block[_REACH * BLOCK + x]
             _write_ray(k, _SHADOW * BLOCK + x, TO_LIGHT * BLOCK + x, reach, rays, block)
             for row in range(3):
-                shadow[row, k] = block[(_BRINGS + row) * BLOCK + x]
-            shadow[3, k] = reach
+                light[row, k] = block[(_BRINGS + row) * BLOCK + x]
+            light[3, k] = reach
             shadow_path[k] = path if depth == 0 else -path - 1
             if depth == 0 and film.shape[0] > BEAUTY_ROWS:
                 film[UNLIT, path] += total
@@ -266,7 +267,8 @@ def _write_shadows(start, size, tags, film, rays, shadow, shadow_path, result, b
 
 
 @njit(**PART)
-def _write_next(start, size, deepest, tags, rays, lanes, lane_tags, result, block):
+def _write_next(start, size, deepest, hits, lanes, result, block):
+    tags, (rays, rows, lane_tags) = hits.tags, lanes
     k = whole(result[1])
     for x in range(size):
         h = start + x
@@ -278,10 +280,10 @@ def _write_next(start, size, deepest, tags, rays, lanes, lane_tags, result, bloc
             continue
         _write_ray(k, _START * BLOCK + x, _ALONG * BLOCK + x, INFINITE_DISTANCE, rays, block)
         for row in range(3):
-            lanes[LANE_BETA + row, k] = block[(_BETA + row) * BLOCK + x]
-        lanes[LANE_PDF, k] = block[_PDF * BLOCK + x]
-        lanes[LANE_WIDTH, k] = block[WIDTH * BLOCK + x]
-        lanes[LANE_SPREAD, k] = block[_SPREAD * BLOCK + x]
+            rows[LANE_BETA + row, k] = block[(_BETA + row) * BLOCK + x]
+        rows[LANE_PDF, k] = block[_PDF * BLOCK + x]
+        rows[LANE_WIDTH, k] = block[WIDTH * BLOCK + x]
+        rows[LANE_SPREAD, k] = block[_SPREAD * BLOCK + x]
         lane_tags[0, k], lane_tags[1, k] = tags[PATH, h], depth if straight else depth + 1
         k += 1
     result[1] = k
@@ -297,23 +299,24 @@ def _fill_up(count, rays):
 
 
 @njit(**LEAN)
-def record_first(count, eye, view, hits, tags, uv, film):
+def record_first(count, eye, view, hits, uv, film):
     """Write the properties of each path's first surface to the rows of the AOVs."""
+    rows, tags = hits.rows, hits.tags
     for h in range(count):
-        if tags[DEPTH, h] != 0 or hits[GO_PDF, h] < R(0):
+        if tags[DEPTH, h] != 0 or rows[GO_PDF, h] < R(0):
             continue
         path = whole(tags[PATH, h])
         distance = R(0)
         for row in range(3):
-            film[ALBEDO + row, path] = hits[WEIGHT + row, h] if hits[GO_PDF, h] > R(0) else R(0)
-            film[NORMAL + row, path] = hits[N + row, h]
-            film[TANGENT + row, path] = hits[U + row, h]
-            distance += (hits[FRONT + row, h] - eye[row]) * view[row]
+            film[ALBEDO + row, path] = rows[WEIGHT + row, h] if rows[GO_PDF, h] > R(0) else R(0)
+            film[NORMAL + row, path] = rows[N + row, h]
+            film[TANGENT + row, path] = rows[U + row, h]
+            distance += (rows[FRONT + row, h] - eye[row]) * view[row]
         film[DEPTH_Z, path] = distance
-        film[THREAD_ID, path] = hits[THREAD, h]
+        film[THREAD_ID, path] = rows[THREAD, h]
         film[AT_LEVEL, path] = R(tags[LEVEL, h])
         corner = uv[tags[TRIANGLE, h]]
-        b, c = hits[CORNERS, h], hits[CORNERS + 1, h]
+        b, c = rows[CORNERS, h], rows[CORNERS + 1, h]
         for row in range(2):
             film[UV + row, path] = (
                 (R(1) - b - c) * corner[row] + b * corner[row + 2] + c * corner[row + 4]

@@ -30,8 +30,9 @@ R = np.float32
 
 
 @njit(**LEAN)
-def settle(count, shadow_rays, shadow, shadow_path, film, aovs):
+def settle(count, shadows, film, aovs):
     """Add the light of the shadow rays that are not blocked."""
+    shadow_rays, shadow, shadow_path = shadows
     for k in range(whole(count)):
         signed = shadow_path[k]
         path, row = whole(signed if signed >= 0 else -1 - signed), DIRECT
@@ -47,8 +48,7 @@ def settle(count, shadow_rays, shadow, shadow_path, film, aovs):
 
 
 @njit(**LEAN)
-def thin_out(count, rays, shadow, shadow_path, opacity, surfaces, triangle_material, records,
-             epsilon, aovs, film):  # fmt: skip
+def thin_out(count, shadows, opacity, surfaces, triangles, epsilon, aovs, film):
     """Attenuate shadow rays at see-through surfaces, after `intersect`.
 
     A ray that hit nothing adds its light; a ray that hit an opaque surface ends; any other ray is
@@ -58,6 +58,8 @@ def thin_out(count, rays, shadow, shadow_path, opacity, surfaces, triangle_mater
     opacity : (materials,) float32 - the constant of each material, negative if its opacity varies
         over the surface
     """
+    rays, shadow, shadow_path = shadows
+    records, triangle_material = triangles.records, triangles.material
     whole = rays.view(np.uint32)
     left = 0
     for k in range(count):

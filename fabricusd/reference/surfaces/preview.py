@@ -184,9 +184,24 @@ def _fresnel(f0, f90, c):
     return f0 + (f90 - f0) * d2 * d2 * d
 
 
+class _Layers(NamedTuple):
+    """The surface at a hit: base colour, metallic, the alpha of GGX, the reflectance at normal
+    incidence, and the share of samples that the specular layer gets."""
+
+    red: np.float32
+    green: np.float32
+    blue: np.float32
+    metallic: np.float32
+    alpha: np.float32
+    f0: np.float32
+    share: np.float32
+
+
 @njit(**INLINE)
-def _evaluate(red, green, blue, metallic, alpha, f0, share, ox, oy, oz, ix, iy, iz):
+def _evaluate(layers, wo, wi):
     """f times cosine (r, g, b) and pdf of `wi`; 0 unless both directions are above the surface."""
+    red, green, blue, metallic, alpha, f0, share = layers
+    (ox, oy, oz), (ix, iy, iz) = wo, wi
     hx, hy, hz = ix + ox, iy + oy, iz + oz
     inverse = R(1) / math.sqrt(max(hx * hx + hy * hy + hz * hz, R(1e-20)))
     hx, hy, hz = hx * inverse, hy * inverse, hz * inverse
@@ -242,7 +257,7 @@ _STEP = BLOCK + 16
 """Distance between rows of a block. Rows at a distance of a power of two would all map to the same
 few cache lines."""
 
-# Rows of a block: inputs from `Wave.hits`, the surface's properties at each hit, and the results.
+# Rows of a block: inputs from `Hits.rows`, the surface's properties at each hit, and the results.
 (_O, _I, _CHANCE, _RED, _GREEN, _BLUE, _METALLIC, _ALPHA, _OPACITY, _F, _F_PDF, _GO, _WEIGHT,
  _GO_PDF) = (
     row * _STEP for row in (0, 3, 6, 10, 11, 12, 13, 14, 15, 16, 19, 20, 23, 26)
@@ -319,19 +334,16 @@ def _shade(f0, size, block):
         base = max(red, max(green, blue)) * (R(1) - metallic)
         share = gloss / max(gloss + base, R(1e-6))
         share = R(0) if gloss <= R(0) else min(max(share, R(0.1)), R(1))
-        fr, fg, fb, pdf = _evaluate(
-            red, green, blue, metallic, alpha, f0, share, ox, oy, oz,
-            block[_I + x], block[_I + _STEP + x], block[_I + 2 * _STEP + x],
-        )  # fmt: skip
+        layers = _Layers(red, green, blue, metallic, alpha, f0, share)
+        wi = block[_I + x], block[_I + _STEP + x], block[_I + 2 * _STEP + x]
+        fr, fg, fb, pdf = _evaluate(layers, (ox, oy, oz), wi)
         block[_F + x], block[_F + _STEP + x] = opacity * fr, opacity * fg
         block[_F + 2 * _STEP + x], block[_F_PDF + x] = opacity * fb, opacity * pdf
         gx, gy, gz = _sample(
             alpha, share, ox, oy, oz,
             block[_CHANCE + x], block[_CHANCE + _STEP + x], block[_CHANCE + 2 * _STEP + x],
         )  # fmt: skip
-        wr, wg, wb, pdf = _evaluate(
-            red, green, blue, metallic, alpha, f0, share, ox, oy, oz, gx, gy, gz
-        )
+        wr, wg, wb, pdf = _evaluate(layers, (ox, oy, oz), (gx, gy, gz))
         block[_GO + x], block[_GO + _STEP + x], block[_GO + 2 * _STEP + x] = gx, gy, gz
         inverse = R(1) / pdf if pdf > R(0) else R(0)
         block[_WEIGHT + x], block[_WEIGHT + _STEP + x] = wr * inverse, wg * inverse
