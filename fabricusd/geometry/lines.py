@@ -36,8 +36,14 @@ touch: their edges give way there, as yarn does, and tubes overlap."""
 ACROSS = 17
 """Points across a crossing, each way, at which its two threads are kept apart."""
 
-MOST_CELLS = 1 << 14
-"""Cells of the repeat beyond which a cloth is refused: triangles would take gigabytes."""
+SETTLED = 6
+"""Iterations for the place of the centre line whose side lies over a point."""
+
+HALVINGS = 20
+"""Of the interval in which the greatest height is looked for: it is then known to a millionth."""
+
+MOST_CELLS = 1 << 12
+"""Cells of the repeat beyond which a cloth is refused: to fit the sections would take minutes."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -145,26 +151,25 @@ class _Crossings:
     """Every crossing of the repeat, ACROSS points each way.
 
     grid : (m, n) bool - whether warp is on top
-    apart : (m, n, k, k) float - height of the warp's centre over the weft's [m], across the weft and
-        across the warp
-    warp_reach, weft_reach : float, of that shape or 1 long - vertical half height of a section there,
-        over its half height
-    warp_half, weft_half : (m, 1, 1, 1), (1, n, 1, 1) float - half heights of round sections [m]
+    found : the lines of both sets, as they lie before the weft is moved
+    place : (k,) float - points across a thread that is crossed, in half widths
+    span : (2,) float - half width of each set's threads, in cells
+    pitch : (2,) float - of each set [m]
     """
 
     grid: NDArray[np.bool_]
-    apart: Floats
-    warp_reach: Floats
-    weft_reach: Floats
-    warp_half: Floats
-    weft_half: Floats
+    found: dict[int, list[Line]]
+    place: Floats
+    span: Floats
+    pitch: Floats
 
     def room(self, tall: float) -> tuple[float, float]:
         """The offsets of the weft that leave threads apart [m]: at least, at most."""
-        need = np.minimum(self.warp_half, 0.5 * tall) * self.warp_reach
-        need = need + np.minimum(self.weft_half, 0.5 * tall) * self.weft_reach
-        most = float((self.apart - need)[self.grid].min()) if self.grid.any() else np.inf
-        least = float((self.apart + need)[~self.grid].max()) if not self.grid.all() else -np.inf
+        warp = self._surface(WARP, tall)
+        weft = np.swapaxes(self._surface(WEFT, tall), 0, 1).swapaxes(2, 3)
+        apart = warp - weft
+        most = float(apart[self.grid].min()) if self.grid.any() else np.inf
+        least = float(apart[~self.grid].max()) if not self.grid.all() else -np.inf
         return least, most
 
     def fits(self, tall: float) -> bool:
@@ -172,34 +177,43 @@ class _Crossings:
         least, most = self.room(tall)
         return least <= most
 
+    def _surface(self, which: int, tall: float) -> Floats:
+        """(threads, crossed, k along, k across) height of the side that faces the other set [m].
+
+        A side lies at s + h n of the centre line, where n leans along the thread: the place that
+        lies over a given point is found by fixed-point iteration, which converges where tubes do
+        not bend more sharply than they are thick.
+        """
+        lines, other = self.found[which], self.found[1 - which]
+        count, crossing = len(other), float(self.pitch[1 - which])
+        ring = (np.arange(count * RINGS) + 0.5) / RINGS
+        along = (np.arange(count) + 0.5)[:, None] + self.place * self.span[1 - which]
+        out = np.empty((len(lines), count, ACROSS, ACROSS))
+        round_ = np.sqrt(1.0 - self.place**2)
+        for k, line in enumerate(lines):
+            on_top = self.grid[k] if which == WARP else ~self.grid[:, k]
+            side = np.where(on_top, -1.0, 1.0)[:, None, None] * round_
+            h = min(line.half_height, 0.5 * tall) * side
+            s = np.broadcast_to(along[..., None], h.shape[:1] + (ACROSS, ACROSS))
+            at = s
+            for _ in range(SETTLED):
+                psi = np.interp(at, ring, line.angle, period=count)
+                at = s - h / crossing * np.sin(psi)
+            psi = np.interp(at, ring, line.angle, period=count)
+            out[k] = np.interp(at, ring, line.height, period=count) + h * np.cos(psi)
+        return out
+
 
 def _crossings(
     found: dict[int, list[Line]], grid: NDArray[np.bool_], pitch: Floats, reach: float
 ) -> _Crossings:
     """The crossings of the lines of both sets, out to `reach` of the half widths."""
-    e = np.linspace(-reach, reach, ACROSS)
-    round_ = np.sqrt(1 - e * e)
-    z, steep, half = {}, {}, {}
-    for which in (WARP, WEFT):
-        other = found[1 - which]
-        # The places along a thread where it is crossed, in cells.
-        wide = other[0].half_width / pitch[1 - which]
-        at = ((np.arange(len(other)) + 0.5)[:, None] + e * wide).ravel()
-        ring = (np.arange(len(other) * RINGS) + 0.5) / RINGS
-        shape = (len(found[which]), len(other), ACROSS)
-        heights = [np.interp(at, ring, ln.height, period=len(other)) for ln in found[which]]
-        angles = [np.interp(at, ring, ln.angle, period=len(other)) for ln in found[which]]
-        z[which] = np.reshape(heights, shape)
-        steep[which] = 1.0 / np.cos(np.reshape(angles, shape))
-        half[which] = np.array([line.half_height for line in found[which]])
-    z_weft, steep_weft = np.swapaxes(z[WEFT], 0, 1), np.swapaxes(steep[WEFT], 0, 1)
     return _Crossings(
         grid=grid,
-        apart=z[WARP][..., :, None] - z_weft[..., None, :],
-        warp_reach=round_[None, :] * steep[WARP][..., :, None],
-        weft_reach=round_[:, None] * steep_weft[..., None, :],
-        warp_half=half[WARP][:, None, None, None],
-        weft_half=half[WEFT][None, :, None, None],
+        found=found,
+        place=np.linspace(-reach, reach, ACROSS),
+        span=np.array([found[j][0].half_width for j in (WEFT, WARP)]) / pitch,
+        pitch=pitch,
     )
 
 
@@ -224,7 +238,7 @@ def _fit(
     low, high = flattest, 2.0 * max(halves)
     if crossings.fits(high):
         low = high
-    for _ in range(40):
+    for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if crossings.fits(middle) else (low, middle)
     bounds = [x for x in crossings.room(low) if np.isfinite(x)]
