@@ -1,4 +1,4 @@
-"""The repeat of a weave as swept tubes that light is traced through: what the levels are judged by."""
+"""The repeat of a weave as tubes that light is traced through: what the levels are judged by."""
 
 from fabricusd.geometry.cloth import Cloth, tubes
 from fabricusd.geometry.paths import Reflectance, Shares, albedo, reflectance

@@ -25,8 +25,8 @@ Floats = NDArray[np.float64]
 class Patch(NamedTuple):
     """What a ray may cross before it has to be put back into the repeat [m].
 
-    size : (2,) float - the repeat; low, high : (2,) float - rims of the patch of triangles, less the
-        widest thread, which would be missing just beyond them; bottom, top : float
+    size : (2,) float - the repeat; low, high : (2,) float - rims of the patch of triangles, less
+        the widest thread, which would be missing just beyond them; bottom, top : float
     """
 
     size: Floats
@@ -56,7 +56,7 @@ class Lines(NamedTuple):
 class Cloth:
     """One repeat of a fabric as swept elliptical tubes, without end in both directions.
 
-    pitch : (2,) float - along U and along V: from one end to the next, from one pick to the next [m]
+    pitch : (2,) float - along U and V: from one end to the next, from one pick to the next [m]
     conserving : bool - whether every thread follows the conserving law: light then bounces, and
         leaves a thread in proportion to the width that the thread shows there. Otherwise light
         scatters once, and a thread is as bright as its model says.

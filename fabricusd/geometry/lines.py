@@ -54,7 +54,8 @@ class Line:
     number : int - of the thread in its set, from 0, in the repeat
     lateral : float - where it lies across its set
     half_width, half_height : float - half axes of its section
-    height, angle : (n RINGS,) - of its centre line, at the middles of the rings' parts; tangent [rad]
+    height, angle : (n RINGS,) float - of its centre line [m], its tangent angle [rad], in the
+        middles of RINGS parts of a cell
     """
 
     which: int
@@ -71,7 +72,7 @@ class Line:
 class Repeat:
     """The threads of one repeat of the cloth.
 
-    size : (2,) float - its extent along U and V [m]; tall : float - greatest height of a section [m]
+    size : (2,) float - extent along U and V [m]; tall : float - greatest height of a section [m]
     reach : float - share of the half widths over which threads that cross are apart: 1, or SQUEEZED
         where a thread passes between two that touch, and the three are squeezed at their edges
     """
@@ -194,7 +195,7 @@ class _Crossings:
             on_top = self.grid[k] if which == WARP else ~self.grid[:, k]
             side = np.where(on_top, -1.0, 1.0)[:, None, None] * round_
             h = min(line.half_height, 0.5 * tall) * side
-            s = np.broadcast_to(along[..., None], h.shape[:1] + (ACROSS, ACROSS))
+            s = along[..., None]
             at = s
             for _ in range(SETTLED):
                 psi = np.interp(at, ring, line.angle, period=count)

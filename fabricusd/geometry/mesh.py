@@ -1,4 +1,4 @@
-"""Tubes as triangles, repeated as far as a ray is likely to go, and what lies behind each triangle."""
+"""Tubes as triangles, repeated as far as a ray is likely to go, and what lies behind each one."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from fabricusd.geometry.lines import Line, Repeat
 Floats = NDArray[np.float64]
 
 SIDES = 24
-"""Faces round a section: their middles lie .9 % inside the ellipse. EXIT is outside of its corners."""
+"""Faces round a section: their middles lie .9 % inside the ellipse. EXIT clears the corners."""
 
 REACH = 4.0
-"""Heights of the cloth to each side of the repeat over which it is laid out as triangles. A ray that
+"""Heights of the cloth to each side of the repeat over which triangles are laid out. A ray that
 goes on is put back into the repeat; of rays at 45 degrees none has to be."""
 
 MOST_TRIANGLES = 6_000_000
@@ -57,9 +57,7 @@ class Mesh:
 def sweep(repeat: Repeat, thick: float) -> Mesh:
     """The tubes of `repeat`, which is `thick` high [m]."""
     copies = np.maximum(1, np.ceil(REACH * thick / repeat.size)).astype(np.int64)
-    quads = sum(
-        SIDES * len(ln.angle) * int((2 * copies + 1).prod()) for ln in repeat.lines
-    )
+    quads = sum(SIDES * len(ln.angle) * int((2 * copies + 1).prod()) for ln in repeat.lines)
     if 2 * quads > MOST_TRIANGLES:
         raise FabricError(
             "weave", f"takes {2 * quads} triangles as tubes; geometry takes {MOST_TRIANGLES}"

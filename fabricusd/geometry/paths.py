@@ -4,8 +4,8 @@
     albedo        where the light goes: back, through, past the threads, lost
 
 Published threads are brighter than white, so their light scatters once and what scatters again is
-left out; `conserving` threads let it go on until it leaves. Each figure comes with its standard error,
-from BATCHES independent sets of places.
+left out; `conserving` threads let it go on until it leaves. Each figure comes with its standard
+error, from BATCHES independent sets of places.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ Floats = NDArray[np.float64]
 Sky = Callable[[Floats], Floats]
 
 BATCHES = 8
-BLOCK = 1 << 15
-"""Paths that travel together: their state is 10 MB."""
+BLOCK = 1 << 14
+"""Paths that travel together: their state is 5 MB."""
 
 BOUNCES = 500
 ROULETTE = 4
@@ -44,8 +44,8 @@ class Assumptions:
     """What geometry has to assume of a tube; how far figures move with each is its uncertainty.
 
     correlated : bool - surface light leaves at the mirror of where it came in; otherwise anywhere
-    by_width : bool or None - a thread's light goes by the width that it shows there, and by its bend,
-        which makes tubes reciprocal; None for `conserving` cloth only
+    by_width : bool or None - a thread's light goes by the width that it shows there, and by its
+        bend, which makes tubes reciprocal; None for `conserving` cloth only
     """
 
     correlated: bool = True
@@ -57,8 +57,8 @@ USUAL = Assumptions()
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reflectance:
-    """value, error : (n, 3) float - radiance per unit `L_i dwi`, and its standard error; rays : int -
-    how many were traced."""
+    """value, error : (n, 3) float - radiance per unit `L_i dwi`, and its standard error; rays :
+    int - how many were traced."""
 
     value: Floats
     error: Floats
@@ -98,7 +98,7 @@ class Shares:
 
 
 class _Paths(NamedTuple):
-    """origin, direction : (n, 3); throughput : (n, 3); group : (n,) - which figure they belong to."""
+    """origin, direction : (n, 3); throughput : (n, 3); group : (n,) - the figure they belong to."""
 
     origin: Floats
     direction: Floats
@@ -106,7 +106,9 @@ class _Paths(NamedTuple):
     group: NDArray[np.int64]
 
     def only(self, keep: NDArray[np.bool_]) -> _Paths:
-        return _Paths(*(x[keep] for x in self))
+        return _Paths(
+            self.origin[keep], self.direction[keep], self.throughput[keep], self.group[keep]
+        )
 
 
 def reflectance(
@@ -125,8 +127,8 @@ def reflectance(
     count : paths a pair; bounces : scatterings at most, None for 1 where threads are published and
         for all of them where they are `conserving`
 
-    Raises FabricError for directions that are not unit vectors or lie in the cloth's plane, and for a
-    view of the back of a fabric whose back is another one.
+    Raises FabricError for directions that are not unit vectors or lie in the cloth's plane, and for
+    a view of the back of a fabric whose back is another one.
     """
     viewers, lights = np.broadcast_arrays(_directions("wo", wo), _directions("wi", wi))
     _check_side(cloth, viewers)
@@ -162,10 +164,7 @@ def albedo(
     tracer = _Tracer(cloth, assumptions, _bounces(cloth, bounces), np.random.default_rng(seed))
     each = max(1, BLOCK // count)
     found = np.concatenate(
-        [
-            tracer.escaped(viewers[k : k + each], sky, count)
-            for k in range(0, len(viewers), each)
-        ]
+        [tracer.escaped(viewers[k : k + each], sky, count) for k in range(0, len(viewers), each)]
     )
     mean, _ = _mean(found)
     _, error = _mean(found[:, :, 0] + found[:, :, 1])
@@ -202,7 +201,7 @@ def _directions(name: str, w: ArrayLike) -> Floats:
         k = int(np.argmax(bad))
         raise FabricError(
             f"{name} {k}",
-            f"is {rows[k].tolist()}; it must be a unit vector at least .006 degrees out of the cloth",
+            f"is {rows[k].tolist()}; it must be a unit vector, .006 degrees or more off the cloth",
         )
     return np.asarray(rows / length[:, None])
 
@@ -243,7 +242,7 @@ class _Tracer:
         for depth in range(self.bounces):
             hits = self._meet(paths)
             on = (hits.primitive != NOTHING) & ~hits.back
-            paths, hits = paths.only(on), Hits(*(x[on] for x in hits))
+            paths, hits = paths.only(on), hits.only(on)
             n = len(paths.group)
             if n == 0:
                 break
@@ -280,7 +279,7 @@ class _Tracer:
             radiance = np.ones(len(paths.group)) if sky is None else sky(paths.direction)
             _sort(depth, paths, up, radiance, hits, out)
             on = (hits.primitive != NOTHING) & ~hits.back
-            paths, hits = paths.only(on), Hits(*(x[on] for x in hits))
+            paths, hits = paths.only(on), hits.only(on)
             if depth < self.bounces:
                 paths = self._scattered(paths, hits, depth)
             else:
@@ -321,7 +320,8 @@ class _Tracer:
             return paths.only(paths.throughput.any(axis=1))
         chance = np.clip(np.abs(paths.throughput).max(axis=1), 0.0, 1.0)
         paths.throughput[:] /= np.maximum(chance, 1e-30)[:, None]
-        return paths.only(self.rng.random(n) < chance)
+        kept: NDArray[np.bool_] = np.less(self.rng.random(n), chance)
+        return paths.only(kept)
 
 
 @njit(**KERNEL)

@@ -58,15 +58,15 @@ def lit_share(
     """(k, n) share of the light from each direction that gets to the thread seen at each place.
 
     uv_threads : (n, 2) as for `seen`; wi : (k, 3) unit vectors in the surface frame
-    count : places across the side of the thread that faces the light, over which the share is taken.
-        That its far side is dark is the thread's own doing, and no shadow. NaN in gaps
+    count : places across the side of the thread that faces the light, over which the share is
+        taken. That its far side is dark is the thread's own doing, and no shadow. NaN in gaps
     """
     lights = _directions("wi", wi)
     hits = _from_above(cloth, uv_threads)
     on = np.flatnonzero((hits.primitive != NOTHING) & ~hits.back)
     found = np.full((len(lights), len(hits.primitive)), math.nan)
     rng = np.random.default_rng(seed)
-    chosen = Hits(*(np.repeat(x[on], count) for x in hits))
+    chosen = hits.only(np.repeat(on, count))
     origin = np.empty((len(on) * count, 3))
     for k, light in enumerate(lights):
         strata = (np.tile(np.arange(count), len(on)) + rng.random(len(origin))) / count
@@ -106,5 +106,3 @@ def _facing(rings, lines, hits, light, offset, origin):
         sin_c, cos_c, _ = squeezed(wide, tall, b / length, n / length)
         px, py, pz, _ = leave(which, c, s, x, y, z, wide, tall, sin_c, cos_c, offset[k])
         origin[k, 0], origin[k, 1], origin[k, 2] = px, py, pz
-
-

@@ -41,13 +41,17 @@ PATCHES = 4096
 
 
 class Hits(NamedTuple):
-    """primitive : (n,) int32 - triangle, NOTHING where the ray leaves; u, v : (n,) float32 - place on
-    it; back : (n,) bool - whether it was hit from inside the tube."""
+    """primitive : (n,) int32 - triangle, NOTHING where the ray leaves; u, v : (n,) float32 - place
+    on it; back : (n,) bool - whether it was hit from inside the tube."""
 
     primitive: NDArray[np.int32]
     u: NDArray[np.float32]
     v: NDArray[np.float32]
     back: NDArray[np.bool_]
+
+    def only(self, keep: NDArray[Any]) -> Hits:
+        """Those that a mask or indices choose."""
+        return Hits(self.primitive[keep], self.u[keep], self.v[keep], self.back[keep])
 
 
 def nearest(cloth: Cloth, origin: Floats, direction: Floats) -> Hits:
@@ -69,9 +73,7 @@ def nearest(cloth: Cloth, origin: Floats, direction: Floats) -> Hits:
             break
         _fill(cloth.patch, packets, packets.view(np.uint32), live, place, direction)
         cloth.accelerator.intersect(packets, (len(live) + LANES - 1) // LANES)
-        kept = _found(
-            cloth.patch, packets, packets.view(np.uint32), live, place, direction, hits
-        )
+        kept = _found(cloth.patch, packets, packets.view(np.uint32), live, place, direction, hits)
         live = live[:kept]
     return hits
 
@@ -175,7 +177,7 @@ def _stopped(patch, packets, live, place, direction, out):
 
 
 def from_outside(cloth: Cloth, uv: Floats, w: Floats) -> Floats:
-    """(n, 3) origins [m] at the places `uv` (n, 2), in repeats, of rays that come from `w` (n, 3)."""
+    """(n, 3) origins [m] at the places `uv` (n, 2), in repeats, of rays that come from `w`."""
     out: Any = np.empty((len(uv), 3))
     out[:, :2] = uv * cloth.patch.size
     out[:, 2] = np.where(w[:, 2] > 0, cloth.patch.top, cloth.patch.bottom)

@@ -1,7 +1,8 @@
 """What happens at a hit: light that arrives from a given direction, and a direction drawn to go on.
 
-Surface light leaves at the mirror of where it came in, across the thread as its azimuth asks; volume
-light leaves anywhere on the side that faces the light. Both are equal in the mean over the width.
+Surface light leaves at the mirror of where it came in, across the thread as its azimuth asks;
+volume light leaves anywhere on the side that faces the light. In the mean over the width both are
+equal.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ def arrive(
     rings, lines, threads, reciprocal, correlated, primitive, u, v, direction, light, random,
     origin, value,
 ):  # fmt: skip
-    """The light from one direction that each path would pick up at its hit, if nothing is in its way.
+    """The light from one direction that each path picks up at its hit if nothing is in the way.
 
     direction, light : (n, 3) - of the path, and to its light; random : (n,)
     reciprocal : whether a thread's light goes by the width it shows there, and by its bend
@@ -124,8 +125,8 @@ def pick_up(lines, rings, threads, primitive, value, shadowed, throughput, group
 
 @njit(**INLINE)
 def _inclination(theta_o, deviation, even, u0, u1, u2):
-    """(theta, density over theta [1/rad]): a normal about the mirror inclination, cut at 90 degrees;
-    what is cut, and a share `even`, by the cosine."""
+    """(theta, density over theta [1/rad]): a normal about the mirror inclination, cut at 90
+    degrees; what is cut, and a share `even`, by the cosine."""
     theta = -theta_o + deviation * math.sqrt(-2.0 * math.log(1.0 - u1)) * math.cos(
         2.0 * math.pi * u2
     )
@@ -225,7 +226,7 @@ def _surface_share(row, cos_o):
 
 @njit(**INLINE)
 def _across(came, beta, u0, u1, even, correlated):
-    """(h, density over h): about where the path came in, cut at the rims; what is cut lies evenly."""
+    """(h, density over h): about where the path came in, cut at the rims; what is cut, evenly."""
     if not correlated:
         return even, 0.5
     h = came + beta * math.sqrt(-2.0 * math.log(1.0 - u0)) * math.cos(2.0 * math.pi * u1)

@@ -59,8 +59,8 @@ def offset_across(alpha, sin_c, cos_c):
 
 @njit(**INLINE)
 def leave(which, cos_psi, sin_psi, x, y, z, half_width, half_height, sin_c, cos_c, offset):
-    """(x, y, z, height) [m]: the point on the side that faces the azimuth (sin_c, cos_c) at `offset`
-    across, and how far along n_t from the axis it lies."""
+    """(x, y, z, height) [m]: the point on the side that faces the azimuth (sin_c, cos_c) at
+    `offset` across, and how far along n_t from the axis it lies."""
     deep = math.sqrt(max(0.0, 1.0 - offset * offset))
     across = half_width * (offset * cos_c + deep * sin_c)
     up = half_height * (-offset * sin_c + deep * cos_c)
