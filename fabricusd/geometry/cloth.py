@@ -13,10 +13,12 @@ from fabricusd.appearance.scattering.model import CONSERVING
 from fabricusd.appearance.scattering.models import model_of
 from fabricusd.appearance.scattering.table import pack_threads
 from fabricusd.appearance.weave.coverage import sets
+from fabricusd.appearance.weave.curve import is_pile
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.geometry.lines import Repeat, repeat_lines
 from fabricusd.geometry.mesh import Mesh, sweep
+from fabricusd.geometry.pile import tuft_repeat
 from fabricusd.reference.rays.embree import Accelerator
 
 Floats = NDArray[np.float64]
@@ -103,12 +105,17 @@ def tubes(fabric: Fabric, *, squash: float = 1.0) -> Cloth:
     """
     if not 0.0 < squash <= 1.0:
         raise FabricError("squash", f"is {squash}; it must be above 0 and at most 1")
-    repeat = repeat_lines(fabric, squash)
+    piled = _is_pile(fabric)
+    if piled:
+        repeat, mesh = tuft_repeat(fabric, squash)
+    else:
+        repeat = repeat_lines(fabric, squash)
     if not repeat.lines:
         raise FabricError(f"fabric '{fabric.name}'", "covers nothing; it must show some thread")
     top = max(float((ln.height + ln.half_height).max()) for ln in repeat.lines)
     bottom = min(float((ln.height - ln.half_height).min()) for ln in repeat.lines)
-    mesh = sweep(repeat, top - bottom)
+    if not piled:
+        mesh = sweep(repeat, top - bottom)
     spare, widest = 1e-3 * (top - bottom), max(ln.half_width for ln in repeat.lines)
     pitch = np.array([s.pitch for s in sets(fabric)])
     return Cloth(
@@ -128,6 +135,18 @@ def tubes(fabric: Fabric, *, squash: float = 1.0) -> Cloth:
         conserving=_all_conserving(fabric),
         accelerator=Accelerator(mesh.points, mesh.triangles),
     )
+
+
+def _is_pile(fabric: Fabric) -> bool:
+    """Whether `fabric` is tufts on a backing. Raises FabricError for pile of any other kind."""
+    piled = [name for name, t in fabric.threads.items() if is_pile(t.curve)]
+    if piled and not (fabric.opaque and len(piled) == len(fabric.threads)):
+        raise FabricError(
+            f"thread '{piled[0]}'",
+            "is pile in a cloth that is not all pile on an opaque backing; geometry takes pile "
+            "where every thread is pile and the fabric is opaque",
+        )
+    return bool(piled)
 
 
 def _all_conserving(fabric: Fabric) -> bool:

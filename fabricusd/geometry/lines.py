@@ -15,7 +15,6 @@ from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.bands import bands
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.coverage import sets
-from fabricusd.appearance.weave.curve import is_pile
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.geometry.centre import RINGS, centre_line
@@ -88,21 +87,14 @@ def repeat_lines(fabric: Fabric, squash: float = 1.0) -> Repeat:
 
     squash : the sections' greatest height over the one that just fits
 
-    Raises FabricError for pile, for cloth whose threads cannot cross at any height, for repeats of
-    more than MOST_CELLS cells.
+    Raises FabricError for cloth whose threads cannot cross at any height, and for repeats of more
+    than MOST_CELLS cells.
     """
     ends, picks = true_repeat(fabric)
     if ends * picks > MOST_CELLS:
         raise FabricError(
             "weave", f"repeats after {ends} by {picks} threads; geometry takes {MOST_CELLS} cells"
         )
-    for name, thread in fabric.threads.items():
-        if is_pile(thread.curve):
-            raise FabricError(
-                f"thread '{name}'",
-                "is pile: its curve says how it leans, and neither how long it is nor where it is "
-                "cut; geometry takes curves that close",
-            )
     weave = fabric.weave
     grid = np.tile(weave.cells, (ends // weave.ends, picks // weave.picks))
     width = bands(fabric).width

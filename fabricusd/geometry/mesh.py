@@ -68,9 +68,9 @@ def sweep(repeat: Repeat, thick: float) -> Mesh:
     for number, line in enumerate(repeat.lines):
         for shift in range(-int(copies[1 - _along(line)]), int(copies[1 - _along(line)]) + 1):
             centre, angle, bend = _sections(line, repeat, copies, shift)
-            points.append(_outline(line, centre, angle))
+            points.append(outline(line, centre, angle))
             count = len(angle)
-            triangles.append(_faces(count) + begun * SIDES)
+            triangles.append(faces(count) + begun * SIDES)
             first = np.arange(count - 1, dtype=np.int32) + begun
             parts.append((centre, angle, bend, np.full(count, number, np.int32), first))
             begun += count
@@ -108,7 +108,7 @@ def _sections(
     return centre, angle, bend
 
 
-def _outline(line: Line, centre: Floats, angle: Floats) -> Floats:
+def outline(line: Line, centre: Floats, angle: Floats) -> Floats:
     """(r SIDES, 3) corners of the sections."""
     around = 2 * math.pi * np.arange(SIDES) / SIDES
     across = np.zeros(3)
@@ -123,7 +123,7 @@ def _outline(line: Line, centre: Floats, angle: Floats) -> Floats:
     return np.asarray(corners.reshape(-1, 3))
 
 
-def _faces(sections: int) -> NDArray[np.int32]:
+def faces(sections: int) -> NDArray[np.int32]:
     """(2 (sections - 1) SIDES, 3) triangles of one tube."""
     ring, side = np.meshgrid(np.arange(sections - 1), np.arange(SIDES), indexing="ij")
     here, beside = ring * SIDES + side, ring * SIDES + (side + 1) % SIDES

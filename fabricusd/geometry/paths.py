@@ -207,6 +207,12 @@ def _directions(name: str, w: ArrayLike) -> Floats:
 
 
 def _check_side(cloth: Cloth, viewers: Floats) -> None:
+    if cloth.fabric.opaque and (viewers[:, 2] < 0).any():
+        raise FabricError(
+            "wo",
+            f"looks at the back of fabric '{cloth.fabric.name}', which is opaque: nothing is known "
+            "of its backing; look from above",
+        )
     if cloth.fabric.back is not None and (viewers[:, 2] < 0).any():
         raise FabricError(
             "wo",
@@ -316,12 +322,14 @@ class _Tracer:
             paths.throughput, paths.origin, onward,
         )  # fmt: skip
         paths = _Paths(paths.origin, onward, paths.throughput, paths.group)
+        brightest: Floats = np.asarray(np.abs(paths.throughput).max(axis=1))
+        # The conditions are such that NaN goes on, and shows in the sums.
         if depth < ROULETTE:
-            return paths.only(paths.throughput.any(axis=1))
-        chance = np.clip(np.abs(paths.throughput).max(axis=1), 0.0, 1.0)
-        paths.throughput[:] /= np.maximum(chance, 1e-30)[:, None]
-        kept: NDArray[np.bool_] = np.less(self.rng.random(n), chance)
-        return paths.only(kept)
+            return paths.only(~(brightest <= 0.0))
+        chance = np.minimum(brightest, 1.0)
+        paths = paths.only(~(self.rng.random(n) >= chance))
+        paths.throughput[:] /= np.minimum(np.abs(paths.throughput).max(axis=1), 1.0)[:, None]
+        return paths
 
 
 @njit(**KERNEL)

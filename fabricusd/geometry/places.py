@@ -63,7 +63,7 @@ def lit_share(
     """
     lights = _directions("wi", wi)
     hits = _from_above(cloth, uv_threads)
-    on = np.flatnonzero((hits.primitive != NOTHING) & ~hits.back)
+    on = np.flatnonzero(hits.primitive != NOTHING)
     found = np.full((len(lights), len(hits.primitive)), math.nan)
     rng = np.random.default_rng(seed)
     chosen = hits.only(np.repeat(on, count))
@@ -81,7 +81,10 @@ def _from_above(cloth: Cloth, uv_threads: ArrayLike) -> Hits:
     if uv.ndim != 2 or uv.shape[1] != 2 or not np.isfinite(uv).all():
         raise FabricError("uv_threads", f"has shape {uv.shape}; it must be (n, 2), all finite")
     down = np.tile((0.0, 0.0, -1.0), (len(uv), 1))
-    return nearest(cloth, from_outside(cloth, uv * cloth.pitch / cloth.patch.size, -down), down)
+    hits = nearest(cloth, from_outside(cloth, uv * cloth.pitch / cloth.patch.size, -down), down)
+    # The backing, and where tubes overlap their insides.
+    hits.primitive[hits.back] = NOTHING
+    return hits
 
 
 @njit(**KERNEL)

@@ -3,8 +3,8 @@
 python -m fabricusd.geometry.tables [--only NAME ...] remakes them.
 
 A table is `data/NAME.npz`, read by `table`. Light comes from three sorts of directions in turn:
-any within 80 degrees of the normal; near the mirror direction; grazing, 3 to 15 degrees above the cloth.
-A third of each is held out: models are to be fitted to the others and judged by those.
+any within 80 degrees of the normal; near the mirror direction; grazing, 3 to 15 degrees above the
+cloth. A third of each is held out: models are to be fitted to the others and judged by those.
 """
 
 from __future__ import annotations

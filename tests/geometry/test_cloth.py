@@ -18,7 +18,6 @@ from fabricusd.schema import load, preset_names
 
 REFUSED = {
     "polyester_satin_charmeuse_back": "pass through one another",
-    "velvet": "is pile",
 }
 
 
