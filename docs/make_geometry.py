@@ -11,6 +11,7 @@ import numpy as np
 
 from fabricusd.appearance import surface
 from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
 from fabricusd.geometry import tubes
 from fabricusd.geometry.judge import judge
 from fabricusd.geometry.tables import (
@@ -99,7 +100,7 @@ def law_row(name: str, found: Table) -> str:
 
 def by_angle(values: np.ndarray) -> np.ndarray:
     """(polar, ...) means over the azimuths of a table's views."""
-    return values.reshape(len(POLAR), len(AZIMUTHS), *values.shape[1:]).mean(axis=1)
+    return values.reshape(-1, len(AZIMUTHS), *values.shape[1:]).mean(axis=1)
 
 
 def hemisphere(rings: int = 24, azimuths: int = 48) -> np.ndarray:
@@ -111,13 +112,13 @@ def hemisphere(rings: int = 24, azimuths: int = 48) -> np.ndarray:
     return np.stack((r * np.cos(turn), r * np.sin(turn), z), axis=1)
 
 
-def law_shares(fabric: object, side: int) -> np.ndarray:
-    """(v, 3) of a white sky at `far`: from the viewer's side (1) or from the other (-1)."""
+def law_shares(fabric: Fabric, side: int, seen: np.ndarray) -> np.ndarray:
+    """(v, 3) of a white sky at `far` from `seen` (v, 3): from its side (1), from the other (-1)."""
     sky = hemisphere() * (1, 1, side)
     return np.array(
         [
             surface.evaluate(fabric, sky, np.tile(wo, (len(sky), 1))).mean(axis=0) * 2 * np.pi
-            for wo in views()
+            for wo in seen
         ]
     )
 
@@ -125,13 +126,15 @@ def law_shares(fabric: object, side: int) -> np.ndarray:
 def share_rows(name: str, found: Table) -> list[str]:
     """One preset's `conserving` shares, a row an angle and shade."""
     fabric = conserving(load(name))
-    law = [by_angle(law_shares(fabric, side)) for side in (1, -1)]
+    shown = views().reshape(len(POLAR), -1, 3)[[POLAR.index(a) for a in SHOWN]].reshape(-1, 3)
+    law = [by_angle(law_shares(fabric, side, shown)) for side in (1, -1)]
     columns = [by_angle(x) for x in (found.once_up, found.once_down, found.up, found.down)]
     gap, lost = by_angle(found.gap), by_angle(found.lost)
     rows = []
-    for angle in SHOWN:
+    for row, angle in enumerate(SHOWN):
         k = POLAR.index(angle)
-        cells = [" / ".join(f"{v:.2f}" for v in x[k]) for x in (*columns, *law)]
+        values = [x[k] for x in columns] + [x[row] for x in law]
+        cells = [" / ".join(f"{v:.2f}" for v in x) for x in values]
         rows.append(
             f"| {name} | {angle:g}° | {gap[k]:.3f} | {' | '.join(cells)} | {lost[k, 0]:.3f} |"
         )
@@ -152,7 +155,7 @@ def main() -> None:
         )
     )  # fmt: skip
     for name, t in found.items():
-        truth, law = by_angle(t.sky), by_angle(law_shares(load(name), 1))
+        truth, law = by_angle(t.sky), by_angle(law_shares(load(name), 1, views()))
         brightest = truth.mean(axis=0).argmax()
         cells = [
             f"{a:.2f} {b:.2f}" for a, b in zip(truth[:, brightest], law[:, brightest], strict=True)
