@@ -196,12 +196,12 @@ def _directions(name: str, w: ArrayLike) -> Floats:
     if rows.ndim != 2 or rows.shape[1] != 3:
         raise FabricError(name, f"has shape {rows.shape}; it must be (n, 3)")
     length = np.linalg.norm(rows, axis=1)
-    bad = ~(np.abs(length - 1) < 1e-3) | ~(np.abs(rows[:, 2]) > 1e-4)
+    bad = ~(np.abs(length - 1) < 1e-3) | ~(np.abs(rows[:, 2]) > 1e-6)
     if bad.any():
         k = int(np.argmax(bad))
         raise FabricError(
             f"{name} {k}",
-            f"is {rows[k].tolist()}; it must be a unit vector, .006 degrees or more off the cloth",
+            f"is {rows[k].tolist()}; it must be a unit vector out of the plane of the cloth",
         )
     return np.asarray(rows / length[:, None])
 
