@@ -74,7 +74,7 @@ SHARES = """
 
 Reflected, transmitted and passed by the gap, of a white sky, with the preset's threads in
 `conserving` at A = {shades}: first after one scattering, then after all, then the law. *lost* ends
-where tubes overlap.
+where tubes overlap, and on velvet's backing.
 
 | preset | angle | gap | once R | once T | R | T | law R | law T | lost |
 |---|---|---|---|---|---|---|---|---|---|"""

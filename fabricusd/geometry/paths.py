@@ -72,7 +72,7 @@ class Shares:
     reflected, transmitted : to the viewer's side, to the other; after any number of scatterings
     reflected_once, transmitted_once : after one
     gap : what meets no thread
-    lost : what ends inside a tube: where tubes overlap
+    lost : what ends inside a tube, where tubes overlap, or on the backing of pile
     left : what is still between the tubes after the last bounce; for published threads, what would
         scatter a second time
     error : standard error of reflected + transmitted

@@ -60,7 +60,8 @@ class Table:
     sky, sky_error : (v, 3) - reflected of a white sky, of the preset as it is
     once_up, once_down, up, down, shares_error : (v, 3) - of `conserving` threads of the albedos
         SHADES: reflected and transmitted after one scattering, and after all; error of up + down
-    gap : (v,) - what passes between the threads; lost : (v, 3) - what ends where tubes overlap
+    gap : (v,) - what passes between the threads
+    lost : (v, 3) - what ends where tubes overlap, or on the backing of pile
     flatness : (2,) - height over width of the sections, weft and warp
     reach : () - share of the widths over which crossing threads are apart
     """
