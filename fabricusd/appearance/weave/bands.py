@@ -1,16 +1,16 @@
 """Threads as continuous bands: how wide each set is so that it covers the area that it should.
 
 End `i` covers `|u - (i + 1/2)| < x_warp/2` and pick `j` covers `|v - (j + 1/2)| < x_weft/2`, in
-threads. Where both bands are, the grid decides which is on top; where neither is, there is gap. With
-`c_j` the share of cells that set j is on top in, set j is seen on
+threads. Where both bands are, the grid decides which is on top; where neither is, there is gap.
+With `c_j` the share of cells that set j is on top in, set j is seen on
 
     x_j (c_j + c_k (1 - x_k)) = a_j
 
 of the cloth. That is two equations for two widths. With P = c_0 x_0, Q = c_1 x_1, A = c_0 a_0 and
 B = c_1 a_1 they read P (1 - Q) = A, Q (1 - P) = B: P - Q = A - B, and P solves a quadratic. Of its
-two roots only the smaller has P + Q <= 1, which widths up to 1 need. The square of widths from 0 to 1
-is mapped one to one (the determinant is 1 - c_0 x_0 - c_1 x_1 >= 0), its edges onto the edges of the
-triangle a_0 + a_1 <= 1: every pair of areas that a fabric may state has exactly one pair of widths.
+two roots only the smaller has P + Q <= 1, which widths up to 1 need. The square of widths from 0
+to 1 is mapped one to one (the determinant is 1 - c_0 x_0 - c_1 x_1 >= 0), its edges onto the edges
+of the triangle a_0 + a_1 <= 1: every pair of areas that a fabric may state has one pair of widths.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.weave.coverage import WARP, WEFT, _type_cells, coverage
 from fabricusd.fabric import Fabric
 
-__all__ = ["Bands", "bands", "band_widths", "seen_length"]
+__all__ = ["Bands", "band_widths", "bands", "seen_length"]
 
 Floats = NDArray[np.float64]
 
@@ -35,9 +35,9 @@ class Bands:
 
     width : (2,) float - share `x_j` of its pitch that a thread of set j takes
     area : (2,) float - share of the cloth on which set j is seen: `x_j (c_j + c_k (1 - x_k))`
-    type_area : (2, k) float - the same for each thread type; a row sums to `area[j]`. Types are seen
-        as their places in the grid have it, so that a type's part of `area` may differ from that of
-        `coverage`, which shares by the cells alone
+    type_area : (2, k) float - the same for each thread type; a row sums to `area[j]`. Types are
+        seen as their places in the grid have it, so that a type's part of `area` may differ from
+        that of `coverage`, which shares by the cells alone
     gap : float - (1 - x_0)(1 - x_1), where neither band is
     error : float - the largest |area - a_j|; rounding, for every fabric whose coverages sum to 1 at
         most

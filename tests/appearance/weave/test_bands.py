@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import fabrics
 
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.bands import band_widths, bands, seen_length
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.fabric import Fabric
 from fabricusd.schema import load, preset_names
-from strategies import fabrics
 
 
 def seen_by_counting(fabric: Fabric, places: int = 4001) -> np.ndarray:
