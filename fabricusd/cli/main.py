@@ -114,7 +114,7 @@ def _status_of(error: Exception) -> int:
         where = error.filename or "the output"
         return refused(f"{where} cannot be read or written: {error.strerror or described(error)}")
     if isinstance(error, MemoryError):
-        return refused("there is not memory enough for that")
+        return refused("there is not enough memory for that")
     hint = "" if debugging() else " with what FABRICUSD_DEBUG=1 shows of it"
     return refused(f"{INTERNAL}: {described(error)}; please report it{hint}")
 

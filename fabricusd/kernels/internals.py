@@ -1,7 +1,9 @@
 """Whether numba's internals are used, which makes the first picture a third faster to compile.
 
-Nothing depends on them. In a version of numba where they have not been tried, or where one is
-missing, and with FABRICUSD_PLAIN_NUMBA set, kernels are compiled by numba as it is.
+Nothing depends on them. In a version of numba in which they have not been tried, where one of them
+is missing, and where FABRICUSD_PLAIN_NUMBA is 1, numba compiles the kernels as it is. Where
+FABRICUSD_PLAIN_NUMBA is 0, the internals are used in a version that has not been tried, too: that
+is how `bench/numba_versions.py` tries one.
 """
 
 from __future__ import annotations
@@ -18,4 +20,7 @@ TRIED = ("0.68.",)
 
 def use_internals() -> bool:
     """Whether `parts` and `start` may go beyond numba's public interface."""
-    return not os.environ.get(VARIABLE) and numba.__version__.startswith(TRIED)
+    asked = os.environ.get(VARIABLE, "")
+    if asked == "0":
+        return True
+    return not asked and numba.__version__.startswith(TRIED)

@@ -221,7 +221,7 @@ def test_a_file_without_permission_is_refused_in_one_line(tmp_path: Path) -> Non
 
 def test_a_draft_is_not_written_where_it_cannot_be(tmp_path: Path) -> None:
     draft = parse_wif(SMALL)
-    with pytest.raises(FabricError, match="no directory"):
+    with pytest.raises(FabricError, match="not a directory"):
         write_wif(draft, tmp_path / "none" / "d.wif")
     write_wif(draft, tmp_path / "d.wif")
     with pytest.raises(FabricError, match="exists"):
