@@ -61,8 +61,15 @@ def install(folder: Path, version: str) -> Path:
         others = [need for need in project["dependencies"] if not need.startswith("numba")]
         wanted = [*others, f"numba=={version}", "pytest", "hypothesis"]
         subprocess.run(
-            [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-            + wanted,
+            [
+                str(python),
+                "-m",
+                "pip",
+                "install",
+                "--quiet",
+                "--disable-pip-version-check",
+                *wanted,
+            ],
             check=True,
         )
         done.touch()

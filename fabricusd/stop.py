@@ -16,11 +16,11 @@ SIGNALS = tuple(
 class Stop:
     """A context in which termination signals raise KeyboardInterrupt, as Ctrl-C does.
 
-    Between `hold` and `release` they only set `asked`, however often they arrive: a picture is being
-    made or written, and its maker polls `asked`. Handlers that the caller has installed are left
-    alone, and so are signals that are ignored, as nohup ignores SIGHUP. In a thread other than the
-    main one, which alone may have handlers, nothing is installed. In nested contexts the inner one
-    receives the signal.
+    Between `hold` and `release` they only set `asked`, however often they arrive: a picture is
+    being made or written, and its maker polls `asked`. Handlers that the caller has installed are
+    left alone, and so are signals that are ignored, as nohup ignores SIGHUP. In a thread other than
+    the main one, which alone may have handlers, nothing is installed. In nested contexts the inner
+    one receives the signal.
     """
 
     def __init__(self) -> None:

@@ -9,9 +9,9 @@ from dataclasses import asdict
 
 from fabricusd.cli.arguments.number import number
 
-EPILOG = """A is measured against the reference B; EXR is radiance, the rest display colours
+EPILOG = """A is compared with the reference B. EXR holds radiance, other formats display colours.
 
-status: 0 done, 1 the difference is above --max-flip or --max-error, 2 a picture cannot be read
+exit status: 0 done, 1 the difference is above a --max bound, 2 a picture cannot be read
 
 example:
   fabricusd compare new.exr golden.exr -o difference.png
@@ -19,24 +19,29 @@ example:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Two pictures, and what to make of them."""
+    """Two pictures, what to write, and which difference to allow."""
     parser.add_argument("a", metavar="A", help="picture")
     parser.add_argument("b", metavar="B", help="reference")
-    parser.add_argument("-o", "--output", metavar="PNG", help="draw where they differ, by FLIP")
-    parser.add_argument("--json", action="store_true", help="figures as JSON")
     parser.add_argument(
-        "--max-flip", type=number("difference"), metavar="X", help="status 1 above this mean"
+        "-o", "--output", metavar="PNG", help="write a map of where they differ, by FLIP"
+    )
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    parser.add_argument(
+        "--max-flip",
+        type=number("difference"),
+        metavar="X",
+        help="exit with status 1 if the mean FLIP is above this",
     )
     parser.add_argument(
         "--max-error",
         type=number("difference"),
         metavar="DE",
-        help="status 1 above this mean delta E 2000",
+        help="exit with status 1 if the mean delta E 2000 is above this",
     )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the figures, draw the map, judge the bounds."""
+    """Print the figures, draw the map, and judge the difference by the bounds."""
     from fabricusd.images.files import read_image, write_png
     from fabricusd.quality.pictures import difference, flip_map, heat
 
@@ -52,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
         print(f"delta E 2000  {found.delta_e_mean:.3f} mean, {found.delta_e_95:.3f} at 95 %")
     if found.not_finite:
         print(
-            f"fabricusd: {found.not_finite} pixels are not finite and were left out",
+            f"fabricusd: {found.not_finite} pixels are not finite and are left out",
             file=sys.stderr,
         )
     if options.output:

@@ -14,15 +14,14 @@ from fabricusd.weaves.color import RGB
 from fabricusd.weaves.draft import LIMIT, Draft, Side, known_length
 
 DEFAULT_THREAD = Thread(curve=TangentCurve(angles=(-20 * DEGREE, 20 * DEGREE)))
-"""The thread that is used if no other is asked for: spun, it rises and falls over what it crosses.
-"""
+"""The default thread: spun, it rises and falls over the threads that it crosses."""
 
 
 def albedo_scale(base: Thread) -> float:
     """The factor that turns a draft's colour into an albedo: the largest channel of the base's.
 
     A published albedo is a colour times a scale (MODEL section 11), and the scale belongs to the
-    fibre, not to the dye: a white thread reflects as much as the base does in its brightest channel.
+    fibre, not to the dye: a white thread reflects as much as the base in its brightest channel.
     """
     return max(base.albedo)
 

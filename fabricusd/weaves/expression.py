@@ -213,7 +213,7 @@ def _number(node: ast.expr) -> _Term:
 
 
 def _join(terms: list[_Term], combine: Callable[[Iterator[Values]], Values]) -> _Term:
-    """The truth value that `combine` makes of the terms, in order; it repeats when all of them do."""
+    """The truth value that `combine` makes of the terms, in order; it repeats when they all do."""
     return _Term(
         lambda i, j: combine(t.evaluate(i, j) for t in terms),
         math.lcm(*(t.ends for t in terms)),

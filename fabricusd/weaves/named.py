@@ -94,7 +94,7 @@ def basket(words: list[str]) -> Draft:
 
 @named("twill", "twill 2/1 S")
 def twill(words: list[str]) -> Draft:
-    """Over and under the given numbers of picks, offset by one pick from end to end: Z up, S down."""
+    """Over and under the given numbers of picks, moved by a pick from end to end: Z up, S down."""
     runs, words = _take_runs(words, "twill 2/1 S")
     hand = _take_word(words, ("s", "z"), "z").upper()
     _expect_none(words, "twill 2/1 S")
@@ -171,8 +171,7 @@ def point(words: list[str]) -> Draft:
 
 @named("diamond", "diamond 2/2 8")
 def diamond(words: list[str]) -> Draft:
-    """Twill that reverses after the given number of ends and picks: diamonds, or, if small, bird's
-    eye."""
+    """Twill that reverses after a given number of ends and picks: diamonds, bird's eye if small."""
     form = "diamond 2/2 8"
     runs, words = _take_runs(words, form)
     over = _over(runs)

@@ -1,4 +1,4 @@
-"""Files that are not WIF but are given as WIF: recognised, so that the refusal says what they are."""
+"""Recognition of files that are given as WIF but are not, so that the refusal names their kind."""
 
 from __future__ import annotations
 

@@ -72,6 +72,6 @@ def _stepped(end: NDArray[np.bool_], step: int) -> str:
         lengths = "/".join(map(str, runs))
         return f"twill {lengths} {'Z' if step == 1 else 'S'}"
     if over in (1, n - 1) and math.gcd(step, n) == 1:
-        # MODEL section 1 writes a satin as mod(a i + j, N): its tie moves *down* by a picks per end.
+        # MODEL section 1 writes a satin mod(a i + j, N): its tie moves *down* by a picks per end.
         return f"satin {n} step {n - step}{' weft' if over == 1 else ''}"
     return ""

@@ -57,7 +57,7 @@ WIF = {
     "not a number": ("Spacing=0.05", "Spacing=nan", r"\[WARP\] Spacing is 'nan'; it must"),
     "an empty cloth": ("[WARP]\nThreads=2", "[WARP]\nThreads=0", "'0'; it must be a whole number"),
     "a size that disagrees": ("Shafts=2", "Shafts=1", "2 names 2; it must be from 0 to 1"),
-    "a colour of no table": ("Color=2", "Color=9", r"\[WEFT\] Color is '9'; it must be a number"),
+    "a colour of no table": ("Color=2", "Color=9", r"\[WEFT\] Color is '9'; it must be a colour"),
     "a billion threads": ("[WEFT]\nThreads=2", "[WEFT]\nThreads=1000000000", "from 1 to 16384"),
 }
 
@@ -198,4 +198,4 @@ def test_lines_that_no_one_uses_are_told_and_the_draft_is_read(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     Path("d.wif").write_text(SMALL.replace("[TIEUP]\n", "[TIEUP]\n9=1\n"))
     assert main(("cat", "d.wif")) == 0
-    assert "d.wif: [TIEUP] has 1 line(s) of no treadle from 1 to 2" in capsys.readouterr().err
+    assert "d.wif: [TIEUP] has 1 line(s) for treadles outside 1 to 2" in capsys.readouterr().err

@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from numba.core.compiler import Compiler
 
 from fabricusd.kernels import internals, real
 from fabricusd.kernels.parts import PartCompiler
@@ -38,6 +39,7 @@ def values(**variables):
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not internals.use_internals(), reason="this run uses numba as it is")
 def test_values_without_internals_are_those_with_them():
     without, found = values(**{internals.VARIABLE: "1"})
     plain, expected = values()
@@ -49,8 +51,22 @@ def test_values_without_internals_are_those_with_them():
         np.testing.assert_allclose(a, b, rtol=1e-12)
 
 
-def test_another_version_of_numba_is_used_as_it_is(monkeypatch):
-    assert real.PartCompiler is PartCompiler
+def test_parts_are_compiled_by_the_compiler_that_is_chosen():
+    assert real.PartCompiler is (PartCompiler if internals.use_internals() else Compiler)
+
+
+@pytest.mark.parametrize("version", [f"{tried}1" for tried in internals.TRIED])
+def test_a_tried_version_of_numba_is_used_with_its_internals(monkeypatch, version):
+    monkeypatch.setattr(internals.numba, "__version__", version)
+    monkeypatch.delenv(internals.VARIABLE, raising=False)
     assert internals.use_internals()
-    monkeypatch.setattr(internals.numba, "__version__", "0.99.0")
+    monkeypatch.setenv(internals.VARIABLE, "1")
     assert not internals.use_internals()
+
+
+def test_another_version_of_numba_is_used_as_it_is_unless_it_is_being_tried(monkeypatch):
+    monkeypatch.setattr(internals.numba, "__version__", "0.99.0")
+    monkeypatch.delenv(internals.VARIABLE, raising=False)
+    assert not internals.use_internals()
+    monkeypatch.setenv(internals.VARIABLE, "0")
+    assert internals.use_internals()

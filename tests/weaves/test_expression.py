@@ -132,7 +132,7 @@ def test_the_largest_repeat_costs_no_more_than_its_cells(case: str) -> None:
 
 BAD = {
     "much over a large repeat": (
-        " or ".join(["mod(i + j, 4096) == 1"] * 9), "for a repeat of that size it must have at most 16"
+        " or ".join(["mod(i + j, 4096) == 1"] * 9), "of that size it must have at most 16"
     ),
     "open bracket": ("mod(i + j, 5 == 0", "cannot be read"),
     "two equal signs missing": ("mod(i, 2) = 0", "cannot be read"),

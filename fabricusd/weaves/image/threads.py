@@ -1,4 +1,4 @@
-"""The threads in an image of a cloth: the warp colour of each column, the weft colour of each row."""
+"""The threads in an image of a cloth: a warp colour per column, a weft colour per row."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ def find_threads(
     `index` is overwritten.
 
     Each colour belongs to the warp or to the weft. If `warp` or `weft` is given, it says which; if
-    only one of them is, all other colours belong to the other set. If neither is, the image decides,
-    and where it leaves a choice, the darkest colour is warp, as in a black-and-white draft. Raises
-    FabricError, naming a pixel, if a column would have two warp colours, a row two weft colours, or
-    if a colour would belong to both sets.
+    only one of them is, all other colours belong to the other set. If neither is, the image
+    decides, and where it leaves a choice, the darkest colour is warp, as in a black-and-white
+    draft. Raises FabricError, naming a pixel, if a column would have two warp colours, a row two
+    weft colours, or if a colour would belong to both sets.
     """
     shown_in_column = np.zeros((index.shape[1], len(colors)), np.bool_)
     shown_in_row = np.zeros((index.shape[0], len(colors)), np.bool_)
