@@ -1,4 +1,4 @@
-"""Panels as CSV, JSON and Markdown."""
+"""Writing panels as CSV, JSON and Markdown."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def write_csv(path: Path, rows: Sequence[Row]) -> None:
 
 
 def write_json(path: Path, charts: Charts, seconds: float, quick: bool) -> None:
-    """Every panel with its axes and rows, and what they were measured with."""
+    """Write every panel with its axes and rows, and the software and machine of the measurement."""
     content = {
         "software": f"fabricusd {fabricusd.__version__}",
         "python": platform.python_version(),
@@ -55,7 +55,7 @@ def write_json(path: Path, charts: Charts, seconds: float, quick: bool) -> None:
 
 
 def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: str) -> str:
-    """The page: a picture, the front, and who is dominated by whom, for each panel; the sheets."""
+    """The page: for each panel a picture, the front, and the dominated methods; then the sheets."""
     parts = [
         "# Speed against accuracy\n",
         f"Made by `{command}`: every method in one process on one machine, in turns. Cost is given "
@@ -83,7 +83,7 @@ def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: st
 
 
 def _tables(rows: Sequence[Row]) -> list[str]:
-    """The front's rows as a table, the others in a line a group."""
+    """The rows of the front as a table, and the other rows as a list with a line per group."""
     relative = relative_costs(rows)
     lines = [
         "<details><summary>The front</summary>\n",
@@ -115,7 +115,7 @@ BOUNDS = (1.0, 0.5, 0.3, 0.1, 0.05, 0.01)
 
 
 def _choices() -> list[str]:
-    """The shadowing that each preset gets at some bounds, from the table that is in use."""
+    """The shadowing that each preset gets at some bounds, from the table in use."""
     table = read_table()
     lines = [
         "The shadowing that `fabricusd render --max-error` chooses: the cheapest whose error is "
@@ -137,7 +137,7 @@ def _choices() -> list[str]:
 
 
 def _limits() -> list[str]:
-    """Where level `auto` changes for each preset at some bounds, from the table that is in use."""
+    """Where level `auto` changes for each preset at some bounds, from the table in use."""
     lines = [
         "Level `auto` with a bound: `far` from so many repeats under a pixel on / `thread` from so "
         "many pixels on a thread on, `weave` between. There and at every wider pixel the level is "
@@ -158,7 +158,7 @@ def _limits() -> list[str]:
 
 
 def number(x: float) -> str:
-    """Two digits, without an exponent where that reads well."""
+    """Two significant digits, without an exponent for numbers of moderate size."""
     return (
         "0"
         if x == 0

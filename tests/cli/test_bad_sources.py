@@ -69,7 +69,7 @@ WEAVE = {
     "by zero": ("mod(i + j, 0) < 1", "divides by 0; the divisor must be at least 1"),
     "a name not known": ("mod(k, 2) < 1", "'k' is not a sum of whole multiples of i and j"),
     "too large": ("mod(i, 99991) < 1", "repeats after 99991 x 1; it must be at most 4096"),
-    "a satin that is none": ("satin 6 step 2", "must be of 5, 7 or more"),
+    "a satin that is none": ("satin 6 step 2", "a satin must have 5, 7 or more"),
     "code": ("__import__('os').getcwd() == 1", "must be mod, shift or scale"),
 }
 

@@ -38,13 +38,13 @@ def test_lines_beyond_what_the_draft_has_leave_its_drawdown(file: str, warning: 
 
 
 UNUSED = {
-    "end beyond the warp": (("4=4\n[TIEUP]", "4=4\n9=1\n[TIEUP]"), "[THREADING] has 1 line(s) of"),
-    "end zero": (("[THREADING]\n", "[THREADING]\n0=1\n"), "no end from 1 to 4, such as '0'"),
+    "end beyond the warp": (("4=4\n[TIEUP]", "4=4\n9=1\n[TIEUP]"), "[THREADING] has 1 line(s) for"),
+    "end zero": (("[THREADING]\n", "[THREADING]\n0=1\n"), "ends outside 1 to 4, such as '0'"),
     "end in words": (("[THREADING]\n", "[THREADING]\nfirst=x\n"), "such as 'first'"),
-    "end of nonsense": (("[THREADING]\n", "[THREADING]\n-1=1\n1.5=1\n９=1\n"), "has 3 line(s) of"),
+    "end of nonsense": (("[THREADING]\n", "[THREADING]\n-1=1\n1.5=1\n９=1\n"), "has 3 line(s) for"),
     "end beyond integers": (("[THREADING]\n", f"[THREADING]\n{'9' * 5000}=1\n"), "such as '9999"),
-    "pick beyond the weft": (("5=1\n", "5=1\n6=1\n7=99\n8=no\n"), "[TREADLING] has 3 line(s) of"),
-    "treadle beyond the loom": (("4=1,4\n", "4=1,4\n5=1\n6=99\n"), "[TIEUP] has 2 line(s) of no"),
+    "pick beyond the weft": (("5=1\n", "5=1\n6=1\n7=99\n8=no\n"), "[TREADLING] has 3 line(s) for"),
+    "treadle beyond the loom": (("4=1,4\n", "4=1,4\n5=1\n6=99\n"), "[TIEUP] has 2 line(s) for"),
     "treadle zero": (("4=1,4\n", "4=1,4\n0=1\n"), "[TIEUP] has 1 line(s) for treadles outside"),
     "wrong treadle that no pick presses": (
         ("Treadles=4", "Treadles=9\n"),
@@ -59,7 +59,7 @@ UNUSED = {
         ("2=255,255,255\n", "2=255,255,255\n3=1,2\n4=0,0,256\n5=x\n"),
         "3 colour(s) are wrong, but no thread uses them: d.wif [COLOR TABLE] 3 is '1,2'",
     ),
-    "colour in words": (("1=0,0,0\n", "1=0,0,0\nblack=0,0,0\n"), "[COLOR TABLE] has 1 line(s) of"),
+    "colour in words": (("1=0,0,0\n", "1=0,0,0\nblack=0,0,0\n"), "[COLOR TABLE] has 1 line(s) for"),
     "default colour while each end has its own": (
         ("Color=1", "Color=17"),
         ("[TIEUP]", "[WARP COLORS]\n1=1\n2=1\n3=1\n4=1\n[TIEUP]"),
