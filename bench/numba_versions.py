@@ -3,9 +3,9 @@
     python bench/numba_versions.py [--versions 0.60.0 0.68.1] [--folder DIR] [--plain]
 
 Each environment gets what pyproject.toml asks for, with the one version of numba in place of its
-range. In it run the tests of `kernels`, the chi-squared tests of the sampler at level `far`, and
-one picture at level `far`, with numba's internals in use (see `kernels/internals.py`), or, with
---plain, without them. The last column is the largest difference of that picture from the one that
+range. The quick tests of `kernels`, one chi-squared test of the sampler, and one picture at level
+`far` run in it, with numba's internals in use (see `kernels/internals.py`), or, with --plain,
+without them. The last column is the largest difference of that picture from the one that
 the first version made, over the mean. The table goes to stdout as Markdown, row by row.
 """
 
@@ -33,9 +33,10 @@ VERSIONS = (
 """The last release of each minor version since the first that accepts numpy 2."""
 
 CHECKS = {
-    "kernels": ["tests/kernels"],
+    "kernels": ["tests/kernels", "-m", "not slow"],
     "sampling": [
-        "tests/appearance/sampling/test_mixture.py", "-k", "test_samples_follow_the_density and far"
+        "tests/appearance/sampling/test_mixture.py",
+        "-k", "test_samples_follow_the_density and silk_shot and microcylinder and far",
     ],
 }  # fmt: skip
 """Column of the table -> arguments of pytest."""

@@ -14,7 +14,7 @@ import numba
 
 VARIABLE = "FABRICUSD_PLAIN_NUMBA"
 
-TRIED = ("0.68.",)
+TRIED = tuple(f"0.{minor}." for minor in range(60, 69))
 """Beginnings of the versions in which `parts` and `start` have been tried."""
 
 

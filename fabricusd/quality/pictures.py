@@ -67,7 +67,7 @@ def difference(picture: Picture, reference: Picture, *, high_range: bool = True)
         )
     good = np.asarray(np.isfinite(picture).all(axis=2) & np.isfinite(reference).all(axis=2))
     if not good.any():
-        raise FabricError("pictures", "have no pixel in common that is finite in both")
+        raise FabricError("pictures", "have no pixel that is finite in both")
     a = np.asarray(picture, np.float64)[good]
     b = np.asarray(reference, np.float64)[good]
     square = (a - b) ** 2
