@@ -63,7 +63,7 @@ def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: st
         "quartiles over repeats. A method is dominated when another is no dearer and no worse, and "
         "better in either by more than both spreads. `charts.csv` and `charts.json` hold every "
         "figure, absolute costs included.\n",
-        "## What --max-error takes\n",
+        "## What --max-error chooses\n",
         *_choices(),
         *_limits(),
     ]
@@ -118,10 +118,11 @@ def _choices() -> list[str]:
     """The shadowing that each preset gets at some bounds, from the table in use."""
     table = read_table()
     lines = [
-        "The shadowing that `fabricusd render --max-error` chooses: the cheapest whose error is "
-        "within the bound, else the nearest (*). In brackets cost over the cheapest method's, and "
-        "error. `fabricusd chart --choice fabricusd/chart/choice.json` remakes the table; "
-        "`render -n` says what would be chosen, and why.\n",
+        "The shadowing that `fabricusd render --max-error` chooses: the cheapest method whose "
+        "error is within the bound, or else the most accurate one (*). In brackets are its cost, "
+        "as a multiple of the cheapest method's, and its error. "
+        "`fabricusd chart --choice fabricusd/chart/choice.json` remakes the table; `render -n` "
+        "says what would be chosen, and why.\n",
         "| preset | " + " | ".join(f"{b:g}" for b in BOUNDS) + " |",
         "|---|" + "---|" * len(BOUNDS),
     ]
@@ -139,11 +140,11 @@ def _choices() -> list[str]:
 def _limits() -> list[str]:
     """Where level `auto` changes for each preset at some bounds, from the table in use."""
     lines = [
-        "Level `auto` with a bound: `far` from so many repeats under a pixel on / `thread` from so "
-        "many pixels on a thread on, `weave` between. There and at every wider pixel the level is "
-        "within the bound of `thread` filtered: rms over the pixels, over the cloth's mean, the "
-        "worst of three lights, without shadows. Without a bound the levels change "
-        f"about {DEFAULT.repeats:g} / {DEFAULT.pixels:g}, gradually.\n",
+        "Where level `auto` changes, given a bound: `far` begins at this many repeats per pixel / "
+        "`thread` at this many pixels per thread, with `weave` in between. There and at every "
+        "wider pixel, the level is within the bound of `thread` filtered: rms over the pixels, "
+        "relative to the cloth's mean, for the worst of three lights, without shadows. Without a bound, "
+        f"the levels change gradually at about {DEFAULT.repeats:g} / {DEFAULT.pixels:g}.\n",
         "| preset | " + " | ".join(f"{b:g}" for b in LEVEL_BOUNDS) + " |",
         "|---|" + "---|" * len(LEVEL_BOUNDS),
     ]

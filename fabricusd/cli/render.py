@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=number("max_bounces"),
         default=4,
         metavar="N",
-        help="most bounces of a path (default: 4)",
+        help="maximum number of bounces (default: 4)",
     )
     parser.add_argument(
         "--level",
@@ -88,7 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--max-error",
         type=number("max_error"),
         metavar="E",
-        help="choose --shadow and --noise for an error of at most this",
+        help="choose --shadow, --noise and the level for an error of at most this",
     )
     parser.add_argument(
         "--complexity", choices=("auto", "low", "medium", "high", "veryhigh"), default="auto",

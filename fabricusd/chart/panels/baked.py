@@ -66,9 +66,10 @@ def by_time(quick: bool) -> list[Row]:
 
 
 _ABOUT = (
-    "The BTF of one repeat in each form, 151 directions, its rank chosen by the bound. Error: "
-    "mean delta E 2000 against level `weave` at places and directions between those of the "
-    "table, interpolation included; no rank brings it below what the table's directions allow."
+    "The BTF of one repeat in each form, with 151 directions and a rank that the bound chooses. "
+    "The error is the mean delta E 2000 from level `weave` at places and directions between those of "
+    "the table, so it includes interpolation; no rank brings it below what the table's directions "
+    "allow."
 )
 
 PANELS = (
@@ -85,7 +86,7 @@ PANELS = (
         title="Baked forms: time",
         cost="processor seconds",
         error="mean delta E 2000",
-        about="The same bakes by what they take, the table included.",
+        about="The same bakes, by the time that they take, including that of the table.",
         run=by_time,
     ),
 )

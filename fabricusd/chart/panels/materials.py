@@ -116,11 +116,11 @@ PANEL = Panel(
     cost="ns an evaluation",
     error="mean delta E 2000",
     about=(
-        "Standard surfaces over a bake whose texels span whole repeats, against level `far` over "
-        "pairs of directions of the hemisphere: `preview` is UsdPreviewSurface, `openpbr` also "
-        "stands for Standard Surface, `principled` is Blender's. A surface's cost is that of its "
-        "formulas in NumPy, the law's that of its float64 kernels; a renderer's own differ. What "
-        "Cycles shows of them is in [materials.md](materials.md)."
+        "Standard surfaces over a bake whose texels span whole repeats, compared with level `far` "
+        "for pairs of directions of the hemisphere: `preview` is UsdPreviewSurface, `openpbr` also "
+        "stands for Standard Surface, `principled` is Blender's. The cost of a surface is that of "
+        "its formulas in NumPy, the cost of the law that of its float64 kernels; a renderer's own "
+        "costs differ. [materials.md](materials.md) compares them with Cycles."
     ),
     run=run,
     draw=draw,

@@ -147,12 +147,13 @@ PANEL = Panel(
     cost="processor seconds, one worker",
     error="relative mean square error",
     about=(
-        "A cylinder of cloth under a sky and a sun of 5°, level `auto` unless named; the "
-        "number is that of samples a pixel. Against a picture of many more samples by MIS, other "
-        "seed; preparation is not counted. FLIP and delta E 2000 of every row are in the tables. "
-        "A level's row holds its bias too: the reference's is `auto`. `one light`: no path "
-        "tracing, level `far` of every pixel at once, as NumPy has it and compiled; error against "
-        "NumPy with 256 nodes a piece."
+        "A cylinder of cloth under a sky and a sun 5° across, at level `auto` unless another is "
+        "named; the number is samples per pixel. The reference is a picture of many more samples "
+        "by MIS, with another seed; preparation is not timed. `charts.csv` and `charts.json` give "
+        "FLIP and delta E 2000 for every row. The row of a level includes its bias, since the "
+        "reference is at level `auto`. `one light` involves no path tracing: it evaluates level "
+        "`far` for all pixels at once, in NumPy and compiled; its error is against NumPy with 256 "
+        "nodes per piece."
     ),
     run=run,
 )

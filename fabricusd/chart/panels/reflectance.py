@@ -236,9 +236,9 @@ PANEL = Panel(
     cost="ns an evaluation, one worker",
     error="mean error over mean value",
     about=(
-        f"Error on {CHECKED} pairs of directions spread over the hemisphere, against the law as it "
-        f"is written (plain float64 NumPy, {REFERENCE_NODES} nodes on each piece of a curve); "
-        "`conserving` without multiple scattering."
+        f"The error is measured on {CHECKED} pairs of directions spread over the hemisphere, "
+        f"against the plain law (float64 NumPy, {REFERENCE_NODES} nodes on each piece of a curve); "
+        "for `conserving`, without multiple scattering."
     ),
     run=run,
 )

@@ -132,10 +132,11 @@ PANEL = Panel(
     cost="ns a shadow, one worker, light at 20°",
     error="rms difference of g from traced",
     about=(
-        "Share `g` of the light that reaches places spread evenly over the threads of one repeat, "
-        f"level `weave`, at {', '.join(map(str, ELEVATIONS))} degrees of elevation and {AZIMUTHS} "
-        "azimuths, single precision; against the height field marched in float64. The usual "
-        "`horizon` table has 16 azimuths of 8×4 texels a cell."
+        "The share `g` of the light that reaches places spread evenly over the threads of one "
+        "repeat, at level `weave`, for light from "
+        f"{', '.join(map(str, ELEVATIONS))} degrees of elevation and {AZIMUTHS} azimuths, in "
+        "single precision. The reference is the height field, marched in float64. The usual `horizon` "
+        "table has 16 azimuths of 8×4 texels per cell."
     ),
     run=run,
 )

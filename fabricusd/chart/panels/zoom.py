@@ -153,11 +153,11 @@ PANEL = Panel(
     cost="ns a pixel, one worker",
     error="rms difference over mean",
     about=(
-        "A flat cloth, a pixel so many threads wide, the camera rolled, level `weave` "
-        "with shadows by `horizon`; `auto` goes from `far` to `weave` and no further. The "
-        "reference is the cloth's spectrum below the picture's Nyquist frequency. Alias is what "
-        "the picture holds beside it, moiré above all; blur what it lacks of it, shift how far its "
-        "mean is off. Their squares add up to that of the error."
+        "A flat cloth under a rolled camera, whose pixel is as many threads wide as stated, at "
+        "level `weave` with `horizon` shadows; `auto` mixes only `far` and `weave`. The reference "
+        "is the cloth's spectrum below the picture's Nyquist frequency. Alias is what the picture "
+        "adds to it, mostly moiré; blur is what it loses of it; shift is the error of its mean. "
+        "The squares of the three add up to the square of the error."
     ),
     run=run,
     draw=draw,
