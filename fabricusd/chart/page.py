@@ -143,8 +143,8 @@ def _limits() -> list[str]:
         "Where level `auto` changes, given a bound: `far` begins at this many repeats per pixel / "
         "`thread` at this many pixels per thread, with `weave` in between. There and at every "
         "wider pixel, the level is within the bound of `thread` filtered: rms over the pixels, "
-        "relative to the cloth's mean, for the worst of three lights, without shadows. Without a bound, "
-        f"the levels change gradually at about {DEFAULT.repeats:g} / {DEFAULT.pixels:g}.\n",
+        "relative to the cloth's mean, for the worst of three lights, without shadows. Without a "
+        f"bound, the levels change gradually at about {DEFAULT.repeats:g} / {DEFAULT.pixels:g}.\n",
         "| preset | " + " | ".join(f"{b:g}" for b in LEVEL_BOUNDS) + " |",
         "|---|" + "---|" * len(LEVEL_BOUNDS),
     ]

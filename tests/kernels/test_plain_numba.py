@@ -6,6 +6,8 @@ import json
 import os
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,8 @@ from numba.core.compiler import Compiler
 
 from fabricusd.kernels import internals, real
 from fabricusd.kernels.parts import PartCompiler
+
+PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 
 VALUES = """
 import json, numpy as np
@@ -70,3 +74,11 @@ def test_another_version_of_numba_is_used_as_it_is_unless_it_is_being_tried(monk
     assert not internals.use_internals()
     monkeypatch.setenv(internals.VARIABLE, "0")
     assert internals.use_internals()
+
+
+def test_the_pin_of_numba_is_the_range_that_was_tried():
+    needs = tomllib.loads(PROJECT.read_text())["project"]["dependencies"]
+    [pin] = [need.removeprefix("numba") for need in needs if need.startswith("numba")]
+    minors = [int(version.split(".")[1]) for version in internals.TRIED]
+    assert minors == list(range(minors[0], minors[-1] + 1))
+    assert pin == f">=0.{minors[0]},<0.{minors[-1] + 1}"

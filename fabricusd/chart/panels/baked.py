@@ -67,9 +67,9 @@ def by_time(quick: bool) -> list[Row]:
 
 _ABOUT = (
     "The BTF of one repeat in each form, with 151 directions and a rank that the bound chooses. "
-    "The error is the mean delta E 2000 from level `weave` at places and directions between those of "
-    "the table, so it includes interpolation; no rank brings it below what the table's directions "
-    "allow."
+    "The error is the mean delta E 2000 from level `weave` at places and directions between those "
+    "of the table, so it includes interpolation; no rank brings it below what the table's "
+    "directions allow."
 )
 
 PANELS = (

@@ -135,8 +135,8 @@ PANEL = Panel(
         "The share `g` of the light that reaches places spread evenly over the threads of one "
         "repeat, at level `weave`, for light from "
         f"{', '.join(map(str, ELEVATIONS))} degrees of elevation and {AZIMUTHS} azimuths, in "
-        "single precision. The reference is the height field, marched in float64. The usual `horizon` "
-        "table has 16 azimuths of 8×4 texels per cell."
+        "single precision. The reference is the height field, marched in float64. The usual "
+        "`horizon` table has 16 azimuths of 8×4 texels per cell."
     ),
     run=run,
 )
