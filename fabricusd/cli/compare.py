@@ -123,7 +123,7 @@ def _noise(options: argparse.Namespace) -> NoiseTest | None:
 
 def _in_words(tested: NoiseTest) -> str:
     if not tested.larger:
-        return f"p {tested.p:.2g}: noise explains the difference"
+        return f"p {tested.p:.2g}: noise may explain the difference"
     x, y = tested.pixel
     return f"p {tested.p:.2g}: the difference is larger than the noise, most at pixel ({x}, {y})"
 

@@ -112,7 +112,7 @@ def test_a_number_within_a_text_is_refused_with_option_value_and_range(
 def test_a_picture_of_too_many_pixels_is_refused(capsys, folder):
     size = ["--width", "60000", "--height", "60000"]
     line = refusal(capsys, folder, ["render", *ARGUMENTS["render"], *size])
-    assert f"60000 x 60000 pixels; it must be at most {MOST_PIXELS}" in line
+    assert f"60000 x 60000 pixels; it must have at most {MOST_PIXELS}" in line
 
 
 def test_the_table_has_every_option_that_takes_a_number():
