@@ -76,9 +76,9 @@ def test_another_version_of_numba_is_used_as_it_is_unless_it_is_being_tried(monk
     assert internals.use_internals()
 
 
-def test_the_pin_of_numba_is_the_range_that_was_tried():
+def test_the_pin_of_numba_begins_and_ends_with_versions_that_were_tried():
     needs = tomllib.loads(PROJECT.read_text())["project"]["dependencies"]
     [pin] = [need.removeprefix("numba") for need in needs if need.startswith("numba")]
     minors = [int(version.split(".")[1]) for version in internals.TRIED]
-    assert minors == list(range(minors[0], minors[-1] + 1))
+    assert minors == sorted(minors)
     assert pin == f">=0.{minors[0]},<0.{minors[-1] + 1}"
