@@ -110,7 +110,7 @@ def test_a_prim_path_chooses_the_fabric(tmp_path):
     ("name", "message"),
     [
         ("cloth.txt", "has another suffix"),
-        ("nowhere/cloth.usda", "is no directory"),
+        ("nowhere/cloth.usda", "is not a directory"),
         ("taken.usda", "is a directory"),
     ],
 )
