@@ -19,6 +19,18 @@ from fabricusd.schema.plugin import FOLDER
 BINDING_API = "WovenBindingAPI"
 TYPES = ("WovenFabric", "WovenThread")
 
+EARLIER_NAMES = {
+    "Fabric": "WovenFabric",
+    "FabricThread": "WovenThread",
+    "FabricBindingAPI": BINDING_API,
+}
+"""What layers from before the types had a prefix call them. Another plugin may define a type of one
+of these names, which is then none of ours."""
+
+
+PRESENT = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
+"""Prims whose opinions count, defined or not."""
+
 
 @cache
 def _schema() -> Sdf.Layer:
@@ -31,9 +43,50 @@ def definition(name: str) -> dict[str, Sdf.PropertySpec]:
     return {spec.name: spec for spec in _schema().GetPrimAtPath(f"/{name}").properties}
 
 
+def type_of(prim: Usd.Prim) -> str:
+    """The name of a prim's type, an earlier name of ours as the one that replaced it; "" for none.
+
+    A prim with an earlier name counts as ours where USD knows no type of that name, and where its
+    properties, its children or its parent say that it belongs to a fabric.
+    """
+    name = str(prim.GetTypeName())
+    if name not in EARLIER_NAMES or _is_known(name):
+        return name
+    namespace = "fabric:" if name == "Fabric" else "thread:"
+    if any(each.startswith(namespace) for each in prim.GetAuthoredPropertyNames()):
+        return EARLIER_NAMES[name]
+    # A fabric or a thread that is left at its fallbacks has no property.
+    if name == "Fabric":
+        children = prim.GetFilteredChildren(Usd.TraverseInstanceProxies(PRESENT))
+        ours = any(child.GetTypeName() in ("FabricThread", "WovenThread") for child in children)
+    else:
+        ours = prim.GetParent().GetTypeName() in ("Fabric", "WovenFabric")
+    return EARLIER_NAMES[name] if ours else name
+
+
+@cache
+def _is_known(name: str) -> bool:
+    """Whether USD, or a plugin that it has, defines a schema of that name."""
+    return not Usd.SchemaRegistry.GetTypeFromSchemaTypeName(name).isUnknown
+
+
+def earlier_names(prim: Usd.Prim) -> Iterator[str]:
+    """The earlier names under which a prim has its type and its binding, of those that are ours."""
+    name = str(prim.GetTypeName())
+    if name in EARLIER_NAMES and type_of(prim) != name:
+        yield name
+    if _applies_earlier_binding(prim):
+        yield "FabricBindingAPI"
+
+
+def kind_of(prim: Usd.Prim) -> str:
+    """A prim's type for messages."""
+    return str(prim.GetTypeName()) or "an untyped prim"
+
+
 def definitions(prim: Usd.Prim) -> Iterator[dict[str, Sdf.PropertySpec]]:
     """The definitions that a prim's type and its applied or authored binding ask for."""
-    type_name = str(prim.GetTypeName())
+    type_name = type_of(prim)
     if type_name in TYPES:
         yield definition(type_name)
     if applies_binding(prim) or prim.HasRelationship("fabric:binding"):
@@ -41,12 +94,31 @@ def definitions(prim: Usd.Prim) -> Iterator[dict[str, Sdf.PropertySpec]]:
 
 
 def applies_binding(prim: Usd.Prim) -> bool:
-    """Whether WovenBindingAPI is applied to a prim."""
-    authored = prim.GetMetadata("apiSchemas")
-    if authored is not None and BINDING_API in authored.GetAppliedItems():
+    """Whether WovenBindingAPI is applied to a prim, under that name or its earlier one."""
+    if _authors_api(prim, BINDING_API):
         return True
     # Another schema may build it in, which USD knows only where it knows ours.
-    return BINDING_API in prim.GetAppliedSchemas()
+    return BINDING_API in prim.GetAppliedSchemas() or _applies_earlier_binding(prim)
+
+
+def remove_binding(prim: Usd.Prim) -> None:
+    """Take WovenBindingAPI off a prim, under either name."""
+    if _applies_earlier_binding(prim):
+        prim.RemoveAppliedSchema("FabricBindingAPI")
+    prim.RemoveAppliedSchema(BINDING_API)
+
+
+def _applies_earlier_binding(prim: Usd.Prim) -> bool:
+    return (
+        _authors_api(prim, "FabricBindingAPI")
+        and not _is_known("FabricBindingAPI")
+        and bool(prim.HasRelationship("fabric:binding"))
+    )
+
+
+def _authors_api(prim: Usd.Prim, name: str) -> bool:
+    authored = prim.GetMetadata("apiSchemas")
+    return authored is not None and name in authored.GetAppliedItems()
 
 
 @cache
@@ -65,7 +137,7 @@ def value(prim: Usd.Prim, name: str) -> Any:
 
 def allowed_tokens(prim: Usd.Prim, name: str) -> tuple[str, ...]:
     """What the schema allows an attribute of a prim to be."""
-    return tuple(definition(str(prim.GetTypeName()))[name].GetInfo("allowedTokens") or ())
+    return tuple(definition(type_of(prim))[name].GetInfo("allowedTokens") or ())
 
 
 def targets(prim: Usd.Prim, name: str) -> list[Sdf.Path]:

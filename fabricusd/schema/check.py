@@ -9,8 +9,9 @@ from dataclasses import asdict, dataclass
 from pxr import Usd
 
 from fabricusd.errors import reads
+from fabricusd.schema.access import PRESENT
 from fabricusd.schema.anysource import is_draft, load_any
-from fabricusd.schema.rules.rules import PRESENT, RULES, applies, kinds, run
+from fabricusd.schema.rules.rules import RULES, applies, kinds, run
 from fabricusd.schema.source import find_prim, no_warnings, open_stage, split_source, usd_errors
 
 _OF_ANY_PRIM = [rule for rule in RULES if not rule.schema_types]

@@ -12,6 +12,7 @@ from pxr import Sdf, Tf, Usd, UsdUtils
 
 from fabricusd.errors import FabricError, one_line, reads
 from fabricusd.files import readable_file
+from fabricusd.schema.access import kind_of, type_of
 
 PRESETS = Path(__file__).resolve().parent / "presets"
 
@@ -150,18 +151,19 @@ def find_fabric(stage: Usd.Stage, file: str, prim_path: str = "") -> Usd.Prim:
     """The WovenFabric prim at `prim_path`; by default the default prim, or the only one."""
     if prim_path:
         prim = find_prim(stage, file, prim_path)
-        if prim.GetTypeName() != "WovenFabric":
-            kind = prim.GetTypeName() or "an untyped prim"
-            raise FabricError(f"{file}:{prim_path}", f"is {kind}; it must be a WovenFabric")
+        if type_of(prim) != "WovenFabric":
+            raise FabricError(
+                f"{file}:{prim_path}", f"is {kind_of(prim)}; it must be a WovenFabric"
+            )
         return prim
     default = stage.GetDefaultPrim()
-    if default and default.GetTypeName() == "WovenFabric":
+    if default and type_of(default) == "WovenFabric":
         return default
     every = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
     found = []
     walk = iter(every)
     for prim in walk:
-        if prim.GetTypeName() == "WovenFabric":
+        if type_of(prim) == "WovenFabric":
             found.append(prim)
             # A fabric below is its back.
             walk.PruneChildren()

@@ -26,7 +26,7 @@ from fabricusd.materials.targets.paths import asset_path
 from fabricusd.materials.targets.write_usd import write_material
 from fabricusd.materials.wearers import Dressed, NewUV, Wearer
 from fabricusd.schema import export, write_binding, write_fabric
-from fabricusd.schema.access import BINDING_API
+from fabricusd.schema.access import remove_binding
 from fabricusd.schema.names import prim_name
 from fabricusd.schema.source import usd_errors
 
@@ -170,7 +170,7 @@ def _fill(
         if not wearer.worn and lay.fabric is not None:
             write_binding(prim, scope.AppendChild(prim_name(lay.fabric.name)), binding_of(lay))
     elif wearer.worn:
-        prim.RemoveAppliedSchema(BINDING_API)
+        remove_binding(prim)
         prim.CreateRelationship("fabric:binding", custom=False).SetTargets([])
     if variant != "off":
         recipe = recipes[wearer.maps.name, wearer.lay, variant]

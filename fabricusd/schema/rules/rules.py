@@ -18,13 +18,18 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import describe_limits, within_limits
 from fabricusd.schema import attributes, weave_rows
 from fabricusd.schema.access import (
+    EARLIER_NAMES,
+    PRESENT,
     allowed_tokens,
     applies_binding,
     definitions,
+    earlier_names,
+    kind_of,
     lost_targets,
     next_targets,
     over_above,
     targets,
+    type_of,
     value,
 )
 from fabricusd.schema.attributes import Attribute
@@ -43,10 +48,16 @@ from fabricusd.schema.rules.table import (
 
 __all__ = ["RULES", "Rule", "applies", "kinds", "run", "thread_prims"]
 
-PRESENT = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
-"""Prims whose opinions count, defined or not."""
-
 # ---- any of the three ---------------------------------------------------------------------------
+
+
+# Of no type, or USD would not run it on prims of types that it does not know.
+@rule(severity="warning")
+def name_is_current(prim: Usd.Prim) -> Iterator[Fault]:
+    """No prim has its type or its binding under a name that the schema has given up."""
+    for name in earlier_names(prim):
+        what = "applies" if name.endswith("API") else "is of the type"
+        yield "", f"{what} {name}, an earlier name of the schema; write {EARLIER_NAMES[name]}"
 
 
 @rule(FABRIC, THREAD, BINDING)
@@ -89,7 +100,7 @@ def property_known(prim: Usd.Prim) -> Iterator[Fault]:
     known = {name for definition in definitions(prim) for name in definition}
     for name in prim.GetAuthoredPropertyNames():
         if name.startswith(("fabric:", "thread:")) and name not in known:
-            yield name, f"is not in the schema of {prim.GetTypeName()}; it is not read"
+            yield name, f"is not in the schema of {type_of(prim)}; it is not read"
 
 
 @rule(FABRIC, BINDING)
@@ -110,7 +121,7 @@ def targets_kept(prim: Usd.Prim) -> Iterator[Fault]:
 def below_defs_alone(prim: Usd.Prim) -> Iterator[Fault]:
     """A fabric, a thread of a library and what wears a fabric lie below no `over`."""
     above = prim.GetParent()
-    while above and above.GetTypeName() != "WovenFabric":
+    while above and type_of(above) != "WovenFabric":
         above = above.GetParent()
     over = over_above(prim)
     # The threads and the back of a fabric are told with it.
@@ -119,9 +130,9 @@ def below_defs_alone(prim: Usd.Prim) -> Iterator[Fault]:
 
 
 def _numbers(prim: Usd.Prim) -> tuple[Attribute, ...]:
-    if prim.GetTypeName() == "WovenThread":
+    if type_of(prim) == "WovenThread":
         return attributes.THREAD
-    if prim.GetTypeName() == "WovenFabric":
+    if type_of(prim) == "WovenFabric":
         sets = (attributes.thread_set("warp"), attributes.thread_set("weft"))
         return (*attributes.FABRIC, *sets[0], *sets[1])
     return attributes.BINDING
@@ -147,7 +158,7 @@ def number_in_range(prim: Usd.Prim) -> Iterator[Fault]:
 @rule(FABRIC, THREAD)
 def model_allowed(prim: Usd.Prim) -> Iterator[Fault]:
     """The scattering model is an allowed token."""
-    name = "fabric:model" if prim.GetTypeName() == "WovenFabric" else "thread:model"
+    name = "fabric:model" if type_of(prim) == "WovenFabric" else "thread:model"
     # USD stores any token; the allowed ones are advice to user interfaces.
     allowed, token = allowed_tokens(prim, name), value(prim, name)
     if token not in allowed:
@@ -164,7 +175,7 @@ def thread_prims(prim: Usd.Prim) -> list[Usd.Prim]:
         return [prim.GetStage().GetPrimAtPath(path) for path in targets(prim, "fabric:threads")]
     # An instance shows its children to those who ask for them alone; below an over none is defined.
     children = prim.GetFilteredChildren(Usd.TraverseInstanceProxies(PRESENT))
-    return [c for c in children if c.HasDefiningSpecifier() and c.GetTypeName() == "WovenThread"]
+    return [c for c in children if c.HasDefiningSpecifier() and type_of(c) == "WovenThread"]
 
 
 def _forwarding_cycle(relationship: Usd.Relationship) -> list[str]:
@@ -209,9 +220,8 @@ def threads_exist(prim: Usd.Prim) -> Iterator[Fault]:
         target = prim.GetStage().GetPrimAtPath(path)
         if not target:
             yield "fabric:threads", f"targets {path}, which is no prim; it must be one"
-        elif target.GetTypeName() != "WovenThread" and target != prim:
-            kind = target.GetTypeName() or "an untyped prim"
-            yield "fabric:threads", f"targets {path}, {kind}; it must be a WovenThread"
+        elif type_of(target) != "WovenThread" and target != prim:
+            yield "fabric:threads", f"targets {path}, {kind_of(target)}; it must be a WovenThread"
 
 
 @rule(FABRIC)
@@ -260,9 +270,8 @@ def back_is_a_fabric(prim: Usd.Prim) -> Iterator[Fault]:
         target = prim.GetStage().GetPrimAtPath(path)
         if not target:
             yield "fabric:back", f"targets {path}, which is no prim; it must be a WovenFabric"
-        elif target.GetTypeName() != "WovenFabric":
-            kind = target.GetTypeName() or "an untyped prim"
-            yield "fabric:back", f"targets {path}, {kind}; it must be a WovenFabric"
+        elif type_of(target) != "WovenFabric":
+            yield "fabric:back", f"targets {path}, {kind_of(target)}; it must be a WovenFabric"
 
 
 @rule(FABRIC, severity="warning")
@@ -365,9 +374,8 @@ def binding_names_a_fabric(prim: Usd.Prim) -> Iterator[Fault]:
     target = prim.GetStage().GetPrimAtPath(found[0])
     if not target:
         yield name, f"targets {found[0]}, which is no prim; it must be a WovenFabric"
-    elif target.GetTypeName() != "WovenFabric":
-        kind = target.GetTypeName() or "an untyped prim"
-        yield name, f"targets {found[0]}, {kind}; it must be a WovenFabric"
+    elif type_of(target) != "WovenFabric":
+        yield name, f"targets {found[0]}, {kind_of(target)}; it must be a WovenFabric"
 
 
 @rule(BINDING, fatal=False)
@@ -388,8 +396,7 @@ def bound_fabric_defined(prim: Usd.Prim) -> Iterator[Fault]:
 def binding_on_mesh_or_subset(prim: Usd.Prim) -> Iterator[Fault]:
     """Only meshes and subsets of their faces are bound."""
     if prim.GetTypeName() not in ("Mesh", "GeomSubset"):
-        kind = prim.GetTypeName() or "an untyped prim"
-        yield "fabric:binding", f"is on {kind}; it must be on a Mesh or a GeomSubset"
+        yield "fabric:binding", f"is on {kind_of(prim)}; it must be on a Mesh or a GeomSubset"
 
 
 @rule(BINDING)

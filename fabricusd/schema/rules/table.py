@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pxr import Tf, Usd
 
 from fabricusd.errors import one_line
-from fabricusd.schema.access import applies_binding
+from fabricusd.schema.access import applies_binding, type_of
 
 Fault = tuple[str, str]
 RuleFunction = Callable[[Usd.Prim], Iterable[Fault]]
@@ -54,7 +54,7 @@ def rule(
 
 def kinds(prim: Usd.Prim) -> frozenset[str]:
     """The schema types that a prim is of: FABRIC or THREAD, and BINDING."""
-    found = {f"Fabricusd{prim.GetTypeName()}"} & {FABRIC, THREAD}
+    found = {f"Fabricusd{type_of(prim)}"} & {FABRIC, THREAD}
     if applies_binding(prim) or prim.HasRelationship("fabric:binding"):
         found.add(BINDING)
     return frozenset(found)
