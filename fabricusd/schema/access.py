@@ -19,6 +19,8 @@ from fabricusd.schema.plugin import FOLDER
 BINDING_API = "WovenBindingAPI"
 TYPES = ("WovenFabric", "WovenThread")
 
+BACK = "fabric:back"
+
 EARLIER_NAMES = {
     "Fabric": "WovenFabric",
     "FabricThread": "WovenThread",
@@ -157,6 +159,16 @@ def _has_targets(relationship: Usd.Relationship) -> bool:
         return False
     kept, lost = _by_fate(relationship.GetPrim(), relationship.GetName())
     return bool(kept) or not lost
+
+
+def thread_prims(prim: Usd.Prim) -> list[Usd.Prim]:
+    """The fabric's thread prims in index order; an invalid prim where a target is missing."""
+    relationship = prim.GetRelationship("fabric:threads")
+    if relationship and relationship.HasAuthoredTargets():
+        return [prim.GetStage().GetPrimAtPath(path) for path in targets(prim, "fabric:threads")]
+    # An instance shows its children to those who ask for them alone; below an over none is defined.
+    children = prim.GetFilteredChildren(Usd.TraverseInstanceProxies(PRESENT))
+    return [c for c in children if c.HasDefiningSpecifier() and type_of(c) == "WovenThread"]
 
 
 def lost_targets(prim: Usd.Prim, name: str) -> list[tuple[Sdf.Path, str]]:

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 from pxr import Usd
 
 from fabricusd.errors import FabricError, reads
-from fabricusd.fabric import Binding, Fabric, TangentCurve, Thread, ThreadSet, Weave
-from fabricusd.schema import attributes, weave_rows
-from fabricusd.schema.access import over_above, targets, value
-from fabricusd.schema.attributes import DEGREE, Attribute, to_si
-from fabricusd.schema.check import Finding, check_prim
-from fabricusd.schema.names import free_name
-from fabricusd.schema.rules.rules import thread_prims
+from fabricusd.fabric import Binding, Fabric
+from fabricusd.schema import attributes
+from fabricusd.schema.access import BACK, over_above, targets, thread_prims, value
+from fabricusd.schema.build import build_numbers, build_side
+from fabricusd.schema.findings import Finding, check_prim
 from fabricusd.schema.source import (
     find_fabric,
     no_warnings,
@@ -27,8 +23,6 @@ from fabricusd.schema.source import (
 )
 
 Note = Callable[[str], None]
-
-_BACK = "fabric:back"
 
 
 @reads("a fabric")
@@ -53,9 +47,9 @@ def read_fabric(prim: Usd.Prim, note: Note | None = None) -> Fabric:
         it is None, that raises FabricError as well
     """
     faults = list(check_prim(prim, fatal=True))
-    fabric = _read_side(prim, [f for f in faults if f.property != _BACK])
+    fabric = _read_side(prim, [f for f in faults if f.property != BACK])
     try:
-        back = _read_back(prim, [f for f in faults if f.property == _BACK])
+        back = _read_back(prim, [f for f in faults if f.property == BACK])
     except FabricError as error:
         if note is None:
             raise
@@ -66,43 +60,24 @@ def read_fabric(prim: Usd.Prim, note: Note | None = None) -> Fabric:
 
 def _read_back(prim: Usd.Prim, faults: list[Finding]) -> Fabric | None:
     _raise_first(faults)
-    found = targets(prim, _BACK)
+    found = targets(prim, BACK)
     if not found:
         return None
     back = prim.GetStage().GetPrimAtPath(found[0])
-    beyond = targets(back, _BACK)
+    beyond = targets(back, BACK)
     if beyond and beyond != [prim.GetPath()]:
         raise FabricError(
-            f"{back.GetPath()} {_BACK}",
+            f"{back.GetPath()} {BACK}",
             f"targets {beyond[0]}; the back of {prim.GetPath()} must target that or nothing",
         )
-    return read_side(back)
-
-
-def read_side(prim: Usd.Prim) -> Fabric:
-    """A WovenFabric prim without its back."""
-    return _read_side(prim, [f for f in check_prim(prim, fatal=True) if f.property != _BACK])
+    return _read_side(back, [f for f in check_prim(back, fatal=True) if f.property != BACK])
 
 
 def _read_side(prim: Usd.Prim, faults: list[Finding]) -> Fabric:
     _raise_first(faults)
-    threads: dict[str, Thread] = {}
-    for thread_prim in thread_prims(prim):
-        _require_clean(thread_prim)
-        # Two threads of one name may come from two libraries.
-        threads[free_name(thread_prim.GetName(), threads)] = read_thread(thread_prim)
-    rows = value(prim, "fabric:weave:rows")
-    return Fabric(
-        name=prim.GetName(),
-        threads=threads,
-        weave=Weave(weave_rows.to_cells(rows), value(prim, "fabric:weave:name")),
-        warp=_read_set(prim, "warp"),
-        weft=_read_set(prim, "weft"),
-        model=str(value(prim, "fabric:model")),
-        opaque=bool(value(prim, "fabric:opaque")),
-        documentation=_documentation(prim),
-        **_read_numbers(prim, attributes.FABRIC),
-    )
+    for thread in thread_prims(prim):
+        _require_clean(thread)
+    return build_side(prim)
 
 
 def _require_clean(prim: Usd.Prim) -> None:
@@ -112,31 +87,6 @@ def _require_clean(prim: Usd.Prim) -> None:
 def _raise_first(faults: list[Finding]) -> None:
     for finding in faults:
         raise FabricError(f"{finding.prim} {finding.property}".strip(), finding.problem)
-
-
-def _read_numbers(prim: Usd.Prim, table: tuple[Attribute, ...]) -> dict[str, Any]:
-    return {entry.field: to_si(value(prim, entry.name), entry) for entry in table}
-
-
-def _read_set(prim: Usd.Prim, which: str) -> ThreadSet:
-    sequence = tuple(value(prim, f"fabric:{which}:threads"))
-    return ThreadSet(sequence=sequence, **_read_numbers(prim, attributes.thread_set(which)))
-
-
-def read_thread(prim: Usd.Prim) -> Thread:
-    """A WovenThread prim without faults -> Thread."""
-    angles = (a * DEGREE for a in value(prim, "thread:curve:angles"))
-    curve = TangentCurve(
-        positions=tuple(value(prim, "thread:curve:positions")),
-        angles=tuple(min(max(a, -math.pi / 2), math.pi / 2) for a in angles),
-    )
-    model = str(value(prim, "thread:model"))
-    return Thread(
-        curve=curve,
-        model="" if model == "inherit" else model,
-        documentation=_documentation(prim),
-        **_read_numbers(prim, attributes.THREAD),
-    )
 
 
 def read_binding(prim: Usd.Prim, note: Note | None = None) -> Binding:
@@ -155,10 +105,5 @@ def read_binding(prim: Usd.Prim, note: Note | None = None) -> Binding:
     return Binding(
         fabric=read_fabric(fabric, note),
         uv_set=str(value(prim, "fabric:binding:uvSet")),
-        **_read_numbers(prim, attributes.BINDING),
+        **build_numbers(prim, attributes.BINDING),
     )
-
-
-def _documentation(prim: Usd.Prim) -> str:
-    # Without this test USD answers with the schema's own documentation.
-    return str(prim.GetDocumentation()) if prim.HasAuthoredDocumentation() else ""

@@ -7,15 +7,12 @@ its cloth has another number of threads.
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.scene.scene import Mesh
-
-if TYPE_CHECKING:
-    from fabricusd.bake.layout.garment import Garment
 
 SAME = 1e-6
 """Distance, over a mesh's extent, within which two points are one: single precision moves a point
@@ -60,7 +57,19 @@ class Shape(Protocol):
         """(m, 3) int."""
 
 
-def are_alike(a: Garment, b: Garment) -> bool:
+class Laid(Shape, Protocol):
+    """A shape that lies in UV: a garment."""
+
+    @property
+    def uv(self) -> NDArray[np.float64]:
+        """(m, 3, 2) float64."""
+
+    @property
+    def lay(self) -> NDArray[np.int32]:
+        """(m,) int - which of its lays a triangle has."""
+
+
+def are_alike(a: Laid, b: Laid) -> bool:
     """Whether two garments are one that was moved and turned, in the same UVs."""
     same_uv = a.uv.shape == b.uv.shape and np.array_equal(a.uv, b.uv)
     same = same_uv and np.array_equal(a.triangles, b.triangles) and np.array_equal(a.lay, b.lay)

@@ -1,0 +1,51 @@
+"""What the rules find on one prim."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+from pxr import Usd
+
+from fabricusd.schema.rules.rules import RULES, applies, kinds, run
+
+_OF_ANY_PRIM = [rule for rule in RULES if not rule.schema_types]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one rule found in one place.
+
+    severity : "error" or "warning"
+    file : the file that was checked
+    prim : path of the prim
+    property : name, "" where the whole prim is meant
+    problem : reads on from the place: "is 0.8; it must be at least 1"
+    """
+
+    rule: str
+    severity: str
+    file: str
+    prim: str
+    property: str
+    problem: str
+
+    def __str__(self) -> str:
+        words = " ".join(filter(None, (self.prim, self.property, self.problem)))
+        return f"{self.file}: {words} [{self.rule}]"
+
+    def as_dict(self) -> dict[str, str]:
+        """For JSON."""
+        return asdict(self)
+
+
+def check_prim(prim: Usd.Prim, file: str = "", *, fatal: bool = False) -> Iterator[Finding]:
+    """The findings on one prim; where `fatal`, those alone that keep it from being read."""
+    of = kinds(prim)
+    # Most prims of a garment are none of ours.
+    for checked in RULES if of else _OF_ANY_PRIM:
+        if (checked.blocks or not fatal) and applies(checked, prim, of):
+            for name, problem in run(checked, prim):
+                yield Finding(
+                    checked.name, checked.severity, file, str(prim.GetPath()), name, problem
+                )
