@@ -44,19 +44,23 @@ class FabricError(ValueError):
         return FabricError(f"{where} {self.where}".strip(), self.problem)
 
 
+class FabricWarning(UserWarning):
+    """Input that is used, though not all of it as it stands: one line, as of a `FabricError`."""
+
+
 @contextmanager
 def reading(source: object, kind: str) -> Iterator[None]:
     """Turn whatever a reader raises in the block into a FabricError with the file's name.
 
     source : the file, or what else is read; kind : what it is read as, "a WIF draft"
 
-    A FabricError goes through as it is. Warnings that the caller has made errors go through too:
+    A FabricError goes through as it is, and so does the lack of a library. Warnings that the caller has made errors go through too:
     they are not the file's. What raised it is the FabricError's `__cause__`, which FABRICUSD_DEBUG
     shows.
     """
     try:
         yield
-    except (FabricError, Warning):
+    except (FabricError, ImportError, Warning):
         raise
     except OSError as error:
         problem = f"cannot be read: {error.strerror or described(error)}"

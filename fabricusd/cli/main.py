@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
@@ -19,7 +20,8 @@ from typing import NoReturn
 
 from fabricusd import __version__
 from fabricusd.cli.stdout import drop_stdout, ready_stdout
-from fabricusd.errors import FabricError, debugging, described, one_line
+from fabricusd.errors import FabricError, FabricWarning, debugging, described, one_line
+from fabricusd.host import MISSING
 from fabricusd.partial_files import remove_own_partial_files
 from fabricusd.stop import Stop
 
@@ -85,6 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # argparse would point at the help that lists the commands.
         _Parser(prog=f"fabricusd {command}").error(f"unrecognized arguments: {' '.join(unknown)}")
     ready_stdout()
+    warnings.formatwarning = _format_warning
     try:
         with Stop():
             status: int = options.run(options)
@@ -101,10 +104,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _status_of(error)
 
 
+_python_format = warnings.formatwarning
+
+
+def _format_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    line: str | None = None,
+) -> str:
+    """One line for a warning of fabricusd's; any other with its place, as Python prints it."""
+    if issubclass(category, FabricWarning):
+        return f"fabricusd: {one_line(str(message))}\n"
+    return _python_format(message, category, filename, lineno, line)
+
+
 def _status_of(error: Exception) -> int:
     """Say in one line what a command raised; returns the status for it."""
     if isinstance(error, FabricError):
         return refused(str(error))
+    if isinstance(error, ModuleNotFoundError) and error.name == "pxr":
+        return refused(MISSING)
     if isinstance(error, BrokenPipeError):
         # A reader such as `head` has had enough.
         drop_stdout()

@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--validators",
         action="store_true",
-        help="also the rules' folder, for programs whose Python has fabricusd",
+        help="also the rules' folder, for programs of USD 26.5 or newer whose Python has fabricusd",
     )
 
 

@@ -137,6 +137,15 @@ def value(prim: Usd.Prim, name: str) -> Any:
     return _fallbacks()[name] if found is None else found
 
 
+def is_authored(attribute: Usd.Attribute, *, at_rest: bool) -> bool:
+    """Whether a layer gives an attribute a value: at the default time, or at any."""
+    # `ResolveInfo.HasAuthoredValue` is younger than the oldest USD that this runs with.
+    info = (
+        attribute.GetResolveInfo(Usd.TimeCode.Default()) if at_rest else attribute.GetResolveInfo()
+    )
+    return info.GetSource() not in (Usd.ResolveInfoSourceNone, Usd.ResolveInfoSourceFallback)
+
+
 def allowed_tokens(prim: Usd.Prim, name: str) -> tuple[str, ...]:
     """What the schema allows an attribute of a prim to be."""
     return tuple(definition(type_of(prim))[name].GetInfo("allowedTokens") or ())

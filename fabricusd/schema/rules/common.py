@@ -13,6 +13,7 @@ from fabricusd.schema.access import (
     allowed_tokens,
     definitions,
     earlier_names,
+    is_authored,
     lost_targets,
     over_above,
     type_of,
@@ -56,12 +57,12 @@ def value_at_rest(prim: Usd.Prim) -> Iterator[Fault]:
             attribute = prim.GetAttribute(name)
             if not attribute or not isinstance(wanted, Sdf.AttributeSpec):
                 continue
-            at_rest = attribute.GetResolveInfo(Usd.TimeCode.Default())
+            at_rest = is_authored(attribute, at_rest=True)
             if attribute.HasAuthoredConnections():
                 yield name, "is connected to another attribute; it must have a value instead"
-            elif attribute.GetResolveInfo().HasAuthoredValue() and not at_rest.HasAuthoredValue():
+            elif is_authored(attribute, at_rest=False) and not at_rest:
                 yield name, "has values in time but none at rest; it must have a default value"
-            elif at_rest.ValueIsBlocked():
+            elif attribute.GetResolveInfo(Usd.TimeCode.Default()).ValueIsBlocked():
                 yield name, "is blocked with None; it must have a value"
 
 
