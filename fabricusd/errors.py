@@ -54,9 +54,9 @@ def reading(source: object, kind: str) -> Iterator[None]:
 
     source : the file, or what else is read; kind : what it is read as, "a WIF draft"
 
-    A FabricError goes through as it is, and so does the lack of a library. Warnings that the caller has made errors go through too:
-    they are not the file's. What raised it is the FabricError's `__cause__`, which FABRICUSD_DEBUG
-    shows.
+    A FabricError goes through as it is. So do the lack of a library and the warnings that the
+    caller has made errors: they are not the file's. What raised a FabricError is its `__cause__`,
+    which FABRICUSD_DEBUG shows.
     """
     try:
         yield

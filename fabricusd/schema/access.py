@@ -146,6 +146,12 @@ def is_authored(attribute: Usd.Attribute, *, at_rest: bool) -> bool:
     return info.GetSource() not in (Usd.ResolveInfoSourceNone, Usd.ResolveInfoSourceFallback)
 
 
+def varies(attribute: Usd.Attribute) -> bool:
+    """Whether an attribute has values in time: samples, clips, or a spline, where USD has them."""
+    has_spline = getattr(attribute, "HasSpline", lambda: False)
+    return bool(attribute.GetNumTimeSamples() or has_spline())
+
+
 def allowed_tokens(prim: Usd.Prim, name: str) -> tuple[str, ...]:
     """What the schema allows an attribute of a prim to be."""
     return tuple(definition(type_of(prim))[name].GetInfo("allowedTokens") or ())

@@ -24,6 +24,6 @@ def load_any(source: str | os.PathLike[str]) -> tuple[Fabric, tuple[str, ...]]:
 
         draft = read_draft(text)
         return to_fabric(draft, name=Path(text).stem), (*draft.warnings, *losses(draft))
-    from fabricusd.schema.read import load
+    from fabricusd.schema.read import load_noted
 
-    return load(text), ()
+    return load_noted(text)

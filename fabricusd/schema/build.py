@@ -11,6 +11,7 @@ from fabricusd.fabric import Fabric, TangentCurve, Thread, ThreadSet, Weave
 from fabricusd.schema import attributes, weave_rows
 from fabricusd.schema.access import thread_prims, value
 from fabricusd.schema.attributes import DEGREE, Attribute, to_si
+from fabricusd.schema.colors import color
 from fabricusd.schema.names import free_name
 
 
@@ -52,7 +53,8 @@ def build_thread(prim: Usd.Prim) -> Thread:
 
 def build_numbers(prim: Usd.Prim, table: tuple[Attribute, ...]) -> dict[str, Any]:
     """Fields of a dataclass by name, in SI units."""
-    return {entry.field: to_si(value(prim, entry.name), entry) for entry in table}
+    read = {True: color, False: value}
+    return {entry.field: to_si(read[entry.is_color](prim, entry.name), entry) for entry in table}
 
 
 def _build_set(prim: Usd.Prim, which: str) -> ThreadSet:

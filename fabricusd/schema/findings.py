@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 
 from pxr import Usd
 
-from fabricusd.schema.rules.rules import RULES, applies, kinds, run
+from fabricusd.schema.rules.rules import RULES, Rule, applies, kinds, run
 
 _OF_ANY_PRIM = [rule for rule in RULES if not rule.schema_types]
 
@@ -39,13 +39,25 @@ class Finding:
         return asdict(self)
 
 
-def check_prim(prim: Usd.Prim, file: str = "", *, fatal: bool = False) -> Iterator[Finding]:
-    """The findings on one prim; where `fatal`, those alone that keep it from being read."""
+def check_prim(
+    prim: Usd.Prim, file: str = "", *, of_rules: Callable[[Rule], bool] = lambda _: True
+) -> Iterator[Finding]:
+    """The findings on one prim, of every rule or of some."""
     of = kinds(prim)
     # Most prims of a garment are none of ours.
     for checked in RULES if of else _OF_ANY_PRIM:
-        if (checked.blocks or not fatal) and applies(checked, prim, of):
+        if of_rules(checked) and applies(checked, prim, of):
             for name, problem in run(checked, prim):
                 yield Finding(
                     checked.name, checked.severity, file, str(prim.GetPath()), name, problem
                 )
+
+
+def faults(prim: Usd.Prim) -> list[Finding]:
+    """The findings that keep a prim from being read."""
+    return list(check_prim(prim, of_rules=lambda checked: checked.blocks))
+
+
+def remarks(prim: Usd.Prim) -> list[Finding]:
+    """The findings that readers pass on as notes."""
+    return list(check_prim(prim, of_rules=lambda checked: checked.noted))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from pxr import Sdf, Usd
@@ -18,8 +19,10 @@ from fabricusd.schema.access import (
     over_above,
     type_of,
     value,
+    varies,
 )
 from fabricusd.schema.attributes import Attribute
+from fabricusd.schema.colors import LINEAR, NAMED, color, is_known, space_name
 from fabricusd.schema.rules.table import BINDING, FABRIC, THREAD, Fault, rule
 
 
@@ -64,6 +67,19 @@ def value_at_rest(prim: Usd.Prim) -> Iterator[Fault]:
                 yield name, "has values in time but none at rest; it must have a default value"
             elif attribute.GetResolveInfo(Usd.TimeCode.Default()).ValueIsBlocked():
                 yield name, "is blocked with None; it must have a value"
+
+
+@rule(FABRIC, THREAD, BINDING, severity="warning", noted=True)
+def value_is_constant(prim: Usd.Prim) -> Iterator[Fault]:
+    """No attribute has values in time besides the one at rest, which alone is read."""
+    for definition in definitions(prim):
+        for name, wanted in definition.items():
+            attribute = prim.GetAttribute(name)
+            if not attribute or not isinstance(wanted, Sdf.AttributeSpec):
+                continue
+            # Of one without a value at rest another rule tells.
+            if varies(attribute) and is_authored(attribute, at_rest=True):
+                yield name, "has values in time; only its value at rest is read, for every frame"
 
 
 @rule(FABRIC, THREAD, BINDING, severity="warning")
@@ -117,14 +133,31 @@ def number_in_range(prim: Usd.Prim) -> Iterator[Fault]:
         held = value(prim, entry.name)
         if entry.sentinel is not None and held == entry.sentinel:
             continue
+        space = ""
+        if entry.is_color and all(math.isfinite(x) for x in held):
+            authored, held = held, color(prim, entry.name)
+            space = " in linear Rec. 709" if tuple(held) != tuple(authored) else ""
         for number in tuple(held) if hasattr(held, "__len__") else (held,):
             # Compared in SI, where the bounds are; told in the file's unit.
             if not within_limits(number * entry.scale, entry.limits):
                 accepted = describe_limits(entry.limits, 1.0 / entry.scale, entry.unit)
                 if entry.sentinel is not None:
                     accepted += f", or {entry.sentinel:g} to derive it"
-                yield entry.name, f"is {number:g}; it must be {accepted or 'finite'}"
+                yield entry.name, f"is {number:g}{space}; it must be {accepted or 'finite'}"
                 break
+
+
+@rule(THREAD)
+def color_space_known(prim: Usd.Prim) -> Iterator[Fault]:
+    """A colour's color space, or that of a prim above, is one of USD's or is defined there."""
+    for entry in filter(lambda each: each.is_color, attributes.THREAD):
+        attribute = prim.GetAttribute(entry.name)
+        if attribute and is_authored(attribute, at_rest=True) and not is_known(attribute):
+            yield (
+                entry.name,
+                f"has the color space '{space_name(attribute)}'; it must be one of {LINEAR}, "
+                f"{', '.join(NAMED)}, raw, or one that ColorSpaceDefinitionAPI defines",
+            )
 
 
 @rule(FABRIC, THREAD)

@@ -25,6 +25,7 @@ class Rule:
     fatal : whether a prim with an error of this rule cannot be read
     undefined : whether it looks only at prims that USD does not take for defined
     sound : whether it looks only at prims that can be read, their threads included
+    noted : whether readers pass a warning of this rule on
     """
 
     name: str
@@ -35,6 +36,7 @@ class Rule:
     fatal: bool
     undefined: bool
     sound: bool
+    noted: bool
 
     @property
     def blocks(self) -> bool:
@@ -51,13 +53,16 @@ def rule(
     fatal: bool = True,
     undefined: bool = False,
     sound: bool = False,
+    noted: bool = False,
 ) -> Callable[[RuleFunction], RuleFunction]:
     """Register a function as the rule whose name is the function's in CamelCase."""
 
     def register(function: RuleFunction) -> RuleFunction:
         name = "".join(word.capitalize() for word in function.__name__.split("_"))
         doc = " ".join((function.__doc__ or "").split())
-        RULES.append(Rule(name, severity, schema_types, doc, function, fatal, undefined, sound))
+        RULES.append(
+            Rule(name, severity, schema_types, doc, function, fatal, undefined, sound, noted)
+        )
         return function
 
     return register
