@@ -115,6 +115,7 @@ def Camera "Front"
 def DistantLight "Sun"
 {{
     float inputs:intensity = 3
+    bool inputs:normalize = 1
 }}
 """
 

@@ -49,6 +49,8 @@ GAMUTS = {
 """USD's names of primaries, and colour-science's."""
 
 GAMMAS = {"lin": 1.0, "g18": 1.8, "g22": 2.2, "g24": 2.4}
+ADOBE_GAMMA = 563 / 256
+"""What Adobe RGB's gamma of "2.2" is exactly."""
 
 
 def space_name(attribute: Usd.Attribute) -> str:
@@ -102,7 +104,8 @@ def _from_named(held: Any, name: str) -> tuple[float, ...]:
     if curve == "srgb":
         linear = np.asarray(colour.models.eotf_sRGB(encoded))
     else:
-        linear = np.sign(encoded) * np.abs(encoded) ** GAMMAS[curve]
+        gamma = ADOBE_GAMMA if (curve, gamut) == ("g22", "adobergb") else GAMMAS[curve]
+        linear = np.sign(encoded) * np.abs(encoded) ** gamma
     spaces = colour.RGB_COLOURSPACES
     ours = spaces[GAMUTS["rec709"]]
     if gamut == "ciexyzd65":

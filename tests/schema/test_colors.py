@@ -11,6 +11,9 @@ from fabricusd.schema import check, load, preset_names, save
 from fabricusd.schema.colors import AS_IT_IS, NAMED
 from fabricusd.schema.source import PRESETS
 
+EARLIER = "lin_displayp3_scene"
+"""What USD 24.11 calls lin_p3d65_scene."""
+
 ALBEDO = (0.5, 0.2, 0.1)
 
 
@@ -40,7 +43,7 @@ def inside(name: str) -> bool:
 
 
 @pytest.mark.skipif(Usd.GetVersion() < (0, 26), reason="ACES was not adapted to D65")
-@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("name", [name for name in NAMED if name != EARLIER])
 @pytest.mark.parametrize("where", ["metadata", "above"])
 def test_a_color_is_converted_as_usd_converts_it(name, where, tmp_path):
     path = cloth(tmp_path, **{where: name})
@@ -50,12 +53,18 @@ def test_a_color_is_converted_as_usd_converts_it(name, where, tmp_path):
         return
     assert albedo(path) == pytest.approx(by_usd(name), rel=2e-4, abs=2e-5)
     assert albedo(path) != pytest.approx(ALBEDO, rel=1e-2)
-    assert check(path) == []
+    assert [finding for finding in check(path) if finding.severity == "error"] == []
 
 
 def test_every_color_space_that_usd_names_is_read():
     names = {getattr(Gf.ColorSpaceNames, n) for n in dir(Gf.ColorSpaceNames) if n[0] != "_"}
     assert names - {*AS_IT_IS, *NAMED} == set()
+
+
+def test_an_earlier_name_of_a_color_space_is_read(tmp_path):
+    earlier = albedo(cloth(tmp_path, metadata=EARLIER))
+    (tmp_path / "cloth.usda").unlink()
+    assert earlier == pytest.approx(by_usd("lin_p3d65_scene"), rel=2e-4)
 
 
 @pytest.mark.parametrize("name", [name for name in AS_IT_IS if name])

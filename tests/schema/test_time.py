@@ -31,7 +31,8 @@ def test_a_note_is_given_in_place_of_the_warning():
     notes: list[str] = []
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        read_fabric(Usd.Stage.Open(str(MOVING)).GetPrimAtPath("/Cloth"), notes.append)
+        stage = Usd.Stage.Open(str(MOVING))
+        read_fabric(stage.GetPrimAtPath("/Cloth"), notes.append)
         _, told = load_any(MOVING)
     assert [line.startswith(WORDS) for line in (*notes, *told)] == [True, True]
 
