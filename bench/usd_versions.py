@@ -38,10 +38,16 @@ for path in sorted(Path(sys.argv[1]).glob("*.usda")):
 print(f"{count} presets")
 """
 LOAD = """
-import hashlib, json
+import hashlib, json, sys, tempfile
+from pathlib import Path
 from fabricusd.schema import load, preset_names
 from fabricusd.schema.describe import as_dict
-text = json.dumps([as_dict(load(name)) for name in preset_names()], sort_keys=True)
+fabrics = [load(name) for name in preset_names()]
+with tempfile.TemporaryDirectory() as folder:
+    path = Path(folder, "aces.usda")
+    path.write_text(sys.argv[1])
+    fabrics.append(load(path))
+text = json.dumps([as_dict(fabric) for fabric in fabrics], sort_keys=True)
 print(f"{len(preset_names())} presets, digest {hashlib.sha256(text.encode()).hexdigest()[:8]}")
 """
 CHECK = """
@@ -84,6 +90,21 @@ beauty = np.asarray(made.layers["beauty"], np.float64)
 assert np.isfinite(beauty).all()
 print(f"mean {beauty[..., :3].mean():.6f}")
 """
+ACES = """#usda 1.0
+def Scope "World" (
+    prepend apiSchemas = ["ColorSpaceAPI"]
+)
+{
+    uniform token colorSpace:name = "lin_ap1_scene"
+    def WovenFabric "Cloth"
+    {
+        def WovenThread "Thread"
+        {
+            color3d thread:albedo = (0.3, 0.2, 0.15)
+        }
+    }
+}
+"""
 SCENE = f"""#usda 1.0
 (
     metersPerUnit = 1
@@ -122,7 +143,7 @@ def DistantLight "Sun"
 # Column -> (script, its arguments, the folders of PXR_PLUGINPATH_NAME).
 TRIES: dict[str, tuple[str, list[str], list[Path]]] = {
     "presets typed, plugin path alone": (TYPED, [str(PRESETS)], [PLUGIN]),
-    "`load`": (LOAD, [], []),
+    "`load`": (LOAD, [ACES], []),
     "`check`": (CHECK, [str(BAD)], []),
     "rules in USD's validation": (VALIDATORS, [str(BAD)], [PLUGIN, PLUGIN / "validators"]),
     "`render`": (RENDER, [SCENE], []),
@@ -163,7 +184,8 @@ def page(rows: dict[str, dict[str, str]]) -> str:
         "Made by `python bench/usd_versions.py --versions " + " ".join(rows) + "`: one environment",
         "for each version of `usd-core`. *Typed*: plain USD with `PXR_PLUGINPATH_NAME` and without",
         "fabricusd opens every preset with types and fallbacks. *Digest*: of every number that is",
-        "read. *Mean*: of a picture of 64x64 pixels, 4 samples each.",
+        "read, of the presets and of a fabric in ACES colours. *Mean*: of a picture of 64x64",
+        "pixels, 4 samples each.",
         "",
         "| USD | " + " | ".join(TRIES) + " |",
         "|---|" + "---|" * len(TRIES),

@@ -1,9 +1,10 @@
-"""What a prim says in the schema's terms, whether USD knows the schema or not.
+"""Read prims in the schema's terms, whether or not USD knows the schema.
 
-USD builds its table of prim definitions once, when the first one is asked for. In a program that
-used a stage before it imported fabricusd, the schema comes too late for that table: USD then leaves
-WovenBindingAPI out of a prim's applied schemas, and attributes have no fallbacks. Everything here
-reads the authored opinions and the schema's own layer instead, so both orders give one answer.
+USD builds its table of prim definitions once, when the first definition is asked for. A program
+that uses a stage before it imports fabricusd registers the schema too late for that table: USD then
+leaves WovenBindingAPI out of a prim's applied schemas, and attributes have no fallbacks. The
+functions here read the authored opinions and the schema's own layer instead, so that both orders
+give one answer.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ EARLIER_NAMES = {
     "FabricThread": "WovenThread",
     "FabricBindingAPI": BINDING_API,
 }
-"""What layers from before the types had a prefix call them. Another plugin may define a type of one
-of these names, which is then none of ours."""
+"""The names that the types had before they had a prefix. Where another plugin defines a type of one
+of these names, the name means that plugin's type."""
 
 
 PRESENT = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
@@ -46,10 +47,10 @@ def definition(name: str) -> dict[str, Sdf.PropertySpec]:
 
 
 def type_of(prim: Usd.Prim) -> str:
-    """The name of a prim's type, an earlier name of ours as the one that replaced it; "" for none.
+    """Return the name of a prim's type, with an earlier name replaced; "" for an untyped prim.
 
-    A prim with an earlier name counts as ours where USD knows no type of that name, and where its
-    properties, its children or its parent say that it belongs to a fabric.
+    An earlier name is replaced where USD knows no type of that name, and where the prim's
+    properties, its children or its parent show that the prim belongs to a fabric.
     """
     name = str(prim.GetTypeName())
     if name not in EARLIER_NAMES or _is_known(name):
@@ -73,7 +74,7 @@ def _is_known(name: str) -> bool:
 
 
 def earlier_names(prim: Usd.Prim) -> Iterator[str]:
-    """The earlier names under which a prim has its type and its binding, of those that are ours."""
+    """Yield the earlier names that a prim has as its type and among its applied schemas."""
     name = str(prim.GetTypeName())
     if name in EARLIER_NAMES and type_of(prim) != name:
         yield name
@@ -87,7 +88,7 @@ def kind_of(prim: Usd.Prim) -> str:
 
 
 def definitions(prim: Usd.Prim) -> Iterator[dict[str, Sdf.PropertySpec]]:
-    """The definitions that a prim's type and its applied or authored binding ask for."""
+    """Yield the definitions of a prim's type and of its binding, applied or only authored."""
     type_name = type_of(prim)
     if type_name in TYPES:
         yield definition(type_name)
@@ -131,7 +132,7 @@ def _fallbacks() -> dict[str, Any]:
 
 
 def value(prim: Usd.Prim, name: str) -> Any:
-    """An attribute's value at the default time, or the schema's fallback where it has none."""
+    """Return an attribute's value at the default time, or the schema's fallback if it has none."""
     attribute = prim.GetAttribute(name)
     found = attribute.Get() if attribute else None
     return _fallbacks()[name] if found is None else found
@@ -153,23 +154,23 @@ def varies(attribute: Usd.Attribute) -> bool:
 
 
 def allowed_tokens(prim: Usd.Prim, name: str) -> tuple[str, ...]:
-    """What the schema allows an attribute of a prim to be."""
+    """Return the tokens that the schema allows for an attribute of a prim."""
     return tuple(definition(type_of(prim))[name].GetInfo("allowedTokens") or ())
 
 
 def targets(prim: Usd.Prim, name: str) -> list[Sdf.Path]:
-    """Where a relationship leads in the end; [] where it is not authored or leads nowhere."""
+    """Return the prims that a relationship leads to, through other relationships; [] for none."""
     relationship = prim.GetRelationship(name)
     return list(relationship.GetForwardedTargets()) if _has_targets(relationship) else []
 
 
 def next_targets(relationship: Usd.Relationship) -> list[Sdf.Path]:
-    """Where a relationship leads first: prims, or relationships that lead on."""
+    """Return a relationship's own targets: prims, or relationships that lead on."""
     return list(relationship.GetTargets()) if _has_targets(relationship) else []
 
 
 def _has_targets(relationship: Usd.Relationship) -> bool:
-    """Whether to ask USD for targets: it warns of each that it drops, as `lost_targets` does."""
+    """Whether to ask USD for targets. USD warns of each target that it drops; so does a rule."""
     if not relationship:
         return False
     kept, lost = _by_fate(relationship.GetPrim(), relationship.GetName())
@@ -177,26 +178,26 @@ def _has_targets(relationship: Usd.Relationship) -> bool:
 
 
 def thread_prims(prim: Usd.Prim) -> list[Usd.Prim]:
-    """The fabric's thread prims in index order; an invalid prim where a target is missing."""
+    """Return a fabric's thread prims in index order, an invalid prim where a target is missing."""
     relationship = prim.GetRelationship("fabric:threads")
     if relationship and relationship.HasAuthoredTargets():
         return [prim.GetStage().GetPrimAtPath(path) for path in targets(prim, "fabric:threads")]
-    # An instance shows its children to those who ask for them alone; below an over none is defined.
+    # Plain GetChildren returns no children of an instance, and none below an over.
     children = prim.GetFilteredChildren(Usd.TraverseInstanceProxies(PRESENT))
     return [c for c in children if c.HasDefiningSpecifier() and type_of(c) == "WovenThread"]
 
 
 def lost_targets(prim: Usd.Prim, name: str) -> list[tuple[Sdf.Path, str]]:
-    """Targets that composition drops, with the layers that author them.
+    """Return the targets that composition drops, with the layers that author them.
 
-    A reference brings what lies below the prim that it names. A target outside of that has no path
+    A reference brings only what lies below the referenced prim. A target outside of it has no path
     on the stage.
     """
     return _by_fate(prim, name)[1]
 
 
 def _by_fate(prim: Usd.Prim, name: str) -> tuple[list[Sdf.Path], list[tuple[Sdf.Path, str]]]:
-    """Targets authored anywhere for a relationship: those that composition keeps, and others."""
+    """Return a relationship's authored targets: those that composition keeps, and the others."""
     kept: list[Sdf.Path] = []
     lost: list[tuple[Sdf.Path, str]] = []
     source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
@@ -218,7 +219,7 @@ def _by_fate(prim: Usd.Prim, name: str) -> tuple[list[Sdf.Path], list[tuple[Sdf.
                 else:
                     kept.append(path)
             if edit.isExplicit:
-                # Weaker layers do not count.
+                # An explicit list hides those of weaker layers.
                 return kept, lost
     return kept, lost
 
@@ -231,7 +232,7 @@ def _nodes(node: Pcp.NodeRef) -> Iterator[Pcp.NodeRef]:
 
 
 def over_above(prim: Usd.Prim) -> Usd.Prim | None:
-    """The uppermost `over` that a prim lies below, which keeps USD from taking it for defined."""
+    """Return the uppermost `over` above a prim, because of which USD holds it for undefined."""
     for path in prim.GetPath().GetPrefixes():
         above = prim.GetStage().GetPrimAtPath(path)
         if above and not above.HasDefiningSpecifier():

@@ -17,10 +17,10 @@ __all__ = ["Finding", "check"]
 
 @reads("a fabric")
 def check(source: str | os.PathLike[str]) -> list[Finding]:
-    """Every finding in a USD file or a preset, in stage order; of a draft, what its import assumed.
+    """Return the findings in a USD file or a preset, in stage order, or a draft's import notes.
 
-    `FILE:/PRIM` is that prim and what is below it. FabricError where the file cannot be opened as
-    USD, or does not compose, or is no draft, or has no such prim.
+    `FILE:/PRIM` checks that prim and what is below it. Raises FabricError where the file cannot be
+    opened as USD or read as a draft, does not compose, or has no such prim.
     """
     if is_draft(source):
         _, notes = load_any(source)
@@ -30,7 +30,7 @@ def check(source: str | os.PathLike[str]) -> list[Finding]:
     top = find_prim(stage, file, split_source(source)[1] or "/")
     with usd_errors(file, "checked"), no_warnings():
         for prim in Usd.PrimRange(top, Usd.TraverseInstanceProxies(PRESENT)):
-            # A prim that is only overridden here is defined in a layer that is not.
+            # A prim that is only overridden here is defined in a layer that is not checked.
             if prim.IsDefined() or prim.HasDefiningSpecifier():
                 findings.extend(check_prim(prim, file))
     return findings

@@ -94,8 +94,8 @@ def color(prim: Usd.Prim, name: str) -> Any:
 def _from_named(held: Any, name: str) -> tuple[float, ...]:
     """A colour from a color space of USD's.
 
-    By colour-science, as `Gf.ColorSpace` does not adapt the white of ACES before USD 25.11; where
-    it does, by the same transform [Bradford].
+    colour-science converts it: `Gf.ColorSpace` of USD 24.11 and 25.5 does not adapt the white point
+    of ACES. USD 25.11 does, by the same Bradford transform, and the results agree.
     """
     import colour
 

@@ -35,7 +35,7 @@ class Finding:
         return f"{self.file}: {words} [{self.rule}]"
 
     def as_dict(self) -> dict[str, str]:
-        """For JSON."""
+        """Return the fields for JSON."""
         return asdict(self)
 
 
@@ -44,7 +44,7 @@ def check_prim(
 ) -> Iterator[Finding]:
     """The findings on one prim, of every rule or of some."""
     of = kinds(prim)
-    # Most prims of a garment are none of ours.
+    # Most prims of a garment are neither fabrics nor bound to one.
     for checked in RULES if of else _OF_ANY_PRIM:
         if of_rules(checked) and applies(checked, prim, of):
             for name, problem in run(checked, prim):

@@ -1,8 +1,8 @@
 """Registers the codeless schema and the validators with USD.
 
-It runs when `fabricusd.schema` is imported. USD builds its table of prim definitions once, when the
-first one is asked for, and a schema that is registered later stays unknown to it: `access` is how
-fabricusd itself does without.
+Importing `fabricusd.schema` does so. USD builds its table of prim definitions once, when the first
+definition is asked for, and never learns of a schema that is registered later. fabricusd itself
+does not need that table: it reads prims through `access`.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ FOLDER = Path(__file__).resolve().parent / "plugin"
 """What PXR_PLUGINPATH_NAME must contain for other tools to find the schema."""
 
 VALIDATORS = FOLDER / "validators"
-"""The plugin of the rules. Not part of `FOLDER`: in a program whose Python has no fabricusd, USD
-would fail to import it, and with it every validation there."""
+"""The plugin of the rules. It is not part of what `FOLDER` includes: in a program whose Python has
+no fabricusd, USD could not import it, and every validation there would fail."""
 
 
 def register() -> None:

@@ -30,7 +30,7 @@ def save_all(
 ) -> None:
     """Write fabrics as root prims of a new layer, the first as its default prim.
 
-    Of several with one name the first is written.
+    Of fabrics that share a name, the first is written.
     """
     target = os.fspath(path)
     if not target.lower().endswith(EXTENSIONS):
@@ -60,7 +60,7 @@ def _layer(fabrics: Sequence[Fabric]) -> Sdf.Layer:
             prim = write_fabric(stage, path, fabric)
             if not stage.HasDefaultPrim():
                 stage.SetDefaultPrim(prim)
-    # No geometry here, but USD's own validators ask every layer for both.
+    # The layer has no geometry, but USD's validators want both on every layer.
     stage.SetMetadata("upAxis", "Y")
     stage.SetMetadata("metersPerUnit", 0.01)
     return layer
@@ -69,8 +69,8 @@ def _layer(fabrics: Sequence[Fabric]) -> Sdf.Layer:
 def write_fabric(stage: Usd.Stage, path: Sdf.Path | str, fabric: Fabric) -> Usd.Prim:
     """Define a WovenFabric prim; its threads and its back are children, which a reference brings.
 
-    A name that is no prim's becomes the nearest; threads of one name, and a back that is called
-    as a thread, have a number put after theirs.
+    A name that USD does not accept becomes the nearest one that it does. Threads that share a name,
+    and a back with the name of a thread, get a number after theirs.
     """
     path = Sdf.Path(path)
     prim = stage.DefinePrim(path, "WovenFabric")
@@ -121,7 +121,7 @@ def write_binding(prim: Usd.Prim, fabric_path: Sdf.Path | str, binding: Binding)
 
 
 def _unique_names(names: Sequence[str]) -> list[str]:
-    """Valid prim names; two that fall together are told apart by a number."""
+    """Return valid prim names, with a number after each that repeats an earlier one."""
     taken: dict[str, None] = {}
     for name in names:
         taken[free_name(prim_name(name), taken)] = None

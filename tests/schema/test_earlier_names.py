@@ -130,7 +130,7 @@ def test_a_prim_called_fabric_that_holds_nothing_of_ours_is_left_alone(tmp_path)
     path = tmp_path / "other.usda"
     path.write_text('#usda 1.0\ndef Fabric "Network"\n{\n    int nodes = 3\n}\n')
     assert check(path) == []
-    with pytest.raises(FabricError, match="holds no WovenFabric prim"):
+    with pytest.raises(FabricError, match="has no WovenFabric prim"):
         load(path)
 
 

@@ -30,28 +30,28 @@ def binding_names_a_fabric(prim: Usd.Prim) -> Iterator[Fault]:
         return
     target = prim.GetStage().GetPrimAtPath(found[0])
     if not target:
-        yield name, f"targets {found[0]}, which is no prim; it must be a WovenFabric"
+        yield name, f"targets {found[0]}, which does not exist; it must be a WovenFabric"
     elif type_of(target) != "WovenFabric":
         yield name, f"targets {found[0]}, {kind_of(target)}; it must be a WovenFabric"
 
 
 @rule(BINDING, fatal=False)
 def bound_fabric_defined(prim: Usd.Prim) -> Iterator[Fault]:
-    """A fabric that is bound lies below no `over`, where programs that list fabrics miss it."""
+    """No `over` lies above a fabric that is bound: programs that list fabrics would miss it."""
     for path in targets(prim, "fabric:binding")[:1]:
         target = prim.GetStage().GetPrimAtPath(path)
         over = over_above(target) if target and prim.IsDefined() else None
         if over:
             yield (
                 "fabric:binding",
-                f"targets {path}, which is not defined, as {over.GetPath()} is an over; "
-                "it must lie below defs alone",
+                f"targets {path}, which lies below {over.GetPath()}, an over; "
+                "every prim above it must be a def",
             )
 
 
 @rule(BINDING)
 def binding_on_mesh_or_subset(prim: Usd.Prim) -> Iterator[Fault]:
-    """Only meshes and subsets of their faces are bound."""
+    """Only a mesh, or a subset of its faces, has a binding."""
     if prim.GetTypeName() not in ("Mesh", "GeomSubset"):
         yield "fabric:binding", f"is on {kind_of(prim)}; it must be on a Mesh or a GeomSubset"
 
@@ -88,7 +88,7 @@ def binding_api_applied(prim: Usd.Prim) -> Iterator[Fault]:
     if not prim.HasRelationship("fabric:binding"):
         return
     relationship = prim.GetRelationship("fabric:binding")
-    # A stronger layer unbinds a fabric by leaving no target.
+    # A stronger layer removes a binding by an empty list of targets.
     name = "fabric:binding"
     bound = targets(prim, name) or not relationship.HasAuthoredTargets()
     if bound and not applies_binding(prim):

@@ -26,10 +26,10 @@ from fabricusd.schema.colors import LINEAR, NAMED, color, is_known, space_name
 from fabricusd.schema.rules.table import BINDING, FABRIC, THREAD, Fault, rule
 
 
-# Of no type, or USD would not run it on prims of types that it does not know.
+# Registered for all prims: USD would not run it on a type that it does not know.
 @rule(severity="warning")
 def name_is_current(prim: Usd.Prim) -> Iterator[Fault]:
-    """No prim has its type or its binding under a name that the schema has given up."""
+    """No prim uses a name that the schema has replaced, for its type or its binding."""
     for name in earlier_names(prim):
         what = "applies" if name.endswith("API") else "is of the type"
         yield "", f"{what} {name}, an earlier name of the schema; write {EARLIER_NAMES[name]}"
@@ -54,7 +54,7 @@ def property_type_matches(prim: Usd.Prim) -> Iterator[Fault]:
 
 @rule(FABRIC, THREAD, BINDING)
 def value_at_rest(prim: Usd.Prim) -> Iterator[Fault]:
-    """Every attribute has a value of its own at the default time, which is what is read."""
+    """Every authored attribute has a value at the default time, the only one that is read."""
     for definition in definitions(prim):
         for name, wanted in definition.items():
             attribute = prim.GetAttribute(name)
@@ -71,13 +71,13 @@ def value_at_rest(prim: Usd.Prim) -> Iterator[Fault]:
 
 @rule(FABRIC, THREAD, BINDING, severity="warning", noted=True)
 def value_is_constant(prim: Usd.Prim) -> Iterator[Fault]:
-    """No attribute has values in time besides the one at rest, which alone is read."""
+    """No attribute has values in time: only the value at the default time is read."""
     for definition in definitions(prim):
         for name, wanted in definition.items():
             attribute = prim.GetAttribute(name)
             if not attribute or not isinstance(wanted, Sdf.AttributeSpec):
                 continue
-            # Of one without a value at rest another rule tells.
+            # ValueAtRest covers an attribute without a value at rest.
             if varies(attribute) and is_authored(attribute, at_rest=True):
                 yield name, "has values in time; only its value at rest is read, for every frame"
 
@@ -93,28 +93,32 @@ def property_known(prim: Usd.Prim) -> Iterator[Fault]:
 
 @rule(FABRIC, BINDING)
 def targets_kept(prim: Usd.Prim) -> Iterator[Fault]:
-    """Every target of a relationship lies inside what a reference brings along."""
+    """Every target of a relationship lies inside of what a reference brings along."""
     for definition in definitions(prim):
         for name, wanted in definition.items():
             if isinstance(wanted, Sdf.RelationshipSpec):
                 for path, layer in lost_targets(prim, name):
                     yield (
                         name,
-                        f"loses its target {path} of {layer}, which is outside of what is "
-                        "referenced; it must be below the referenced prim, or be named anew here",
+                        f"loses its target {path} of {layer}, which lies outside of the "
+                        "referenced prim; it must lie below it, or be authored again here",
                     )
 
 
 @rule(FABRIC, THREAD, BINDING, severity="warning", undefined=True)
 def below_defs_alone(prim: Usd.Prim) -> Iterator[Fault]:
-    """A fabric, a thread of a library and what wears a fabric lie below no `over`."""
+    """No `over` lies above a fabric, a thread of a library, or a prim that wears a fabric."""
     above = prim.GetParent()
     while above and type_of(above) != "WovenFabric":
         above = above.GetParent()
     over = over_above(prim)
-    # The threads and the back of a fabric are told with it.
+    # The finding on a fabric covers its threads and its back.
     if over and not above and prim.HasDefiningSpecifier():
-        yield "", f"is not defined, as {over.GetPath()} is an over; it must lie below defs alone"
+        yield (
+            "",
+            f"lies below {over.GetPath()}, an over, so USD holds it for undefined; every prim "
+            "above it must be a def",
+        )
 
 
 def _numbers(prim: Usd.Prim) -> tuple[Attribute, ...]:
@@ -138,7 +142,7 @@ def number_in_range(prim: Usd.Prim) -> Iterator[Fault]:
             authored, held = held, color(prim, entry.name)
             space = " in linear Rec. 709" if tuple(held) != tuple(authored) else ""
         for number in tuple(held) if hasattr(held, "__len__") else (held,):
-            # Compared in SI, where the bounds are; told in the file's unit.
+            # The bounds are in SI; the message uses the unit of the file.
             if not within_limits(number * entry.scale, entry.limits):
                 accepted = describe_limits(entry.limits, 1.0 / entry.scale, entry.unit)
                 if entry.sentinel is not None:

@@ -43,7 +43,7 @@ def _forwarding_cycle(relationship: Usd.Relationship) -> list[str]:
 
 @rule(FABRIC)
 def relationship_acyclic(prim: Usd.Prim) -> Iterator[Fault]:
-    """No relationship of a fabric leads back to itself, nor a fabric to itself as its back."""
+    """No relationship of a fabric leads back to itself, and no fabric is its own back."""
     for name in ("fabric:threads", "fabric:back"):
         relationship = prim.GetRelationship(name)
         if not relationship:
@@ -59,24 +59,27 @@ def relationship_acyclic(prim: Usd.Prim) -> Iterator[Fault]:
 def threads_exist(prim: Usd.Prim) -> Iterator[Fault]:
     """A fabric has at least one thread, and every target of its thread list is a WovenThread."""
     if not thread_prims(prim) and not lost_targets(prim, "fabric:threads"):
-        yield "fabric:threads", "names no thread; it must name at least one WovenThread prim"
+        yield "fabric:threads", "targets no thread; it must target at least one WovenThread prim"
     for path in targets(prim, "fabric:threads"):
         target = prim.GetStage().GetPrimAtPath(path)
         if not target:
-            yield "fabric:threads", f"targets {path}, which is no prim; it must be one"
+            yield (
+                "fabric:threads",
+                f"targets {path}, which does not exist; it must be a WovenThread",
+            )
         elif type_of(target) != "WovenThread" and target != prim:
             yield "fabric:threads", f"targets {path}, {kind_of(target)}; it must be a WovenThread"
 
 
 @rule(FABRIC)
 def thread_indices_in_range(prim: Usd.Prim) -> Iterator[Fault]:
-    """Every index in the warp and weft sequences counts a thread."""
+    """Every index in the warp and weft sequences is that of a thread."""
     count = len(thread_prims(prim))
     for which in ("warp", "weft"):
         name = f"fabric:{which}:threads"
         sequence = np.asarray(value(prim, name) or (), dtype=np.int64)
         if sequence.size == 0:
-            yield name, "is empty; it must name at least one thread"
+            yield name, "is empty; it must have at least one index"
             continue
         wrong = np.flatnonzero((sequence < 0) | (sequence >= count))
         if wrong.size and count:
@@ -113,7 +116,7 @@ def back_is_a_fabric(prim: Usd.Prim) -> Iterator[Fault]:
     for path in found[:1]:
         target = prim.GetStage().GetPrimAtPath(path)
         if not target:
-            yield "fabric:back", f"targets {path}, which is no prim; it must be a WovenFabric"
+            yield "fabric:back", f"targets {path}, which does not exist; it must be a WovenFabric"
         elif type_of(target) != "WovenFabric":
             yield "fabric:back", f"targets {path}, {kind_of(target)}; it must be a WovenFabric"
 
@@ -126,12 +129,15 @@ def threads_used(prim: Usd.Prim) -> Iterator[Fault]:
         used.update(value(prim, f"fabric:{which}:threads") or ())
     for index, thread in enumerate(thread_prims(prim)):
         if thread and index not in used:
-            yield "fabric:threads", f"[{index}], {thread.GetName()}, is in neither warp nor weft"
+            yield (
+                "fabric:threads",
+                f"[{index}], {thread.GetName()}, is used by neither the warp nor the weft",
+            )
 
 
 @rule(FABRIC, severity="warning", sound=True)
 def albedo_is_safe(prim: Usd.Prim) -> Iterator[Fault]:
-    """In no view does the fabric send back more light than it gets."""
+    """The fabric reflects at most the light that it receives, in every view."""
     from fabricusd.appearance.albedo import QUICK, WORST_VIEWS, albedo_by_view, safe_albedo
     from fabricusd.appearance.scattering.models import model_of
 
@@ -141,14 +147,14 @@ def albedo_is_safe(prim: Usd.Prim) -> Iterator[Fault]:
         safe = safe_albedo(fabric, QUICK)
         yield (
             "fabric:threads",
-            f"send back {worst:.3g} of the light in the worst view; thread:albedo must be lower, "
-            f"white is safe up to {safe:.2g}, or fabric:model conserving",
+            f"reflect {worst:.3g} of the light in the worst view; lower thread:albedo (white is "
+            f"safe up to {safe:.2g}), or set fabric:model to conserving",
         )
     for name, thread in fabric.threads.items():
         most = model_of(fabric, thread).most_albedo
         if max(thread.albedo) > most:
             yield (
                 "fabric:threads",
-                f"{name} has an albedo above {most:g}, which {fabric.model_of(thread)} takes as "
-                f"{most:g}",
+                f"{name} has an albedo above {most:g}; the model {fabric.model_of(thread)} uses "
+                f"{most:g} instead",
             )

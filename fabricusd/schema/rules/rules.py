@@ -1,4 +1,4 @@
-"""Every rule of a well-formed fabric, in the order in which findings are told.
+"""Every rule of a well-formed fabric, in the order in which findings are reported.
 
 To add a rule: write a function in the module of what it looks at, decorate it, add a bad sample
 named after its fault to `tests/schema/bad/`, run `make schema`. `fabricusd check`, `schema.read`
