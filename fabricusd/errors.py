@@ -44,19 +44,23 @@ class FabricError(ValueError):
         return FabricError(f"{where} {self.where}".strip(), self.problem)
 
 
+class FabricWarning(UserWarning):
+    """Input that is used, though not all of it as it stands: one line, as of a `FabricError`."""
+
+
 @contextmanager
 def reading(source: object, kind: str) -> Iterator[None]:
     """Turn whatever a reader raises in the block into a FabricError that names the file.
 
     source : the file, or whatever else is read; kind : what it is read as, such as "a WIF draft"
 
-    A FabricError passes through unchanged. So does a warning that the caller has turned into an
-    error: it is not the file's fault. The original exception is the FabricError's `__cause__`,
+    A FabricError passes through unchanged. So do a missing library and a warning that the caller has
+    turned into an error: neither is the file's fault. The original exception is the `__cause__`,
     which FABRICUSD_DEBUG shows.
     """
     try:
         yield
-    except (FabricError, Warning):
+    except (FabricError, ImportError, Warning):
         raise
     except OSError as error:
         problem = f"cannot be read: {error.strerror or described(error)}"

@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
@@ -21,7 +22,8 @@ from typing import NoReturn
 
 from fabricusd import __version__
 from fabricusd.cli.stdout import drop_stdout, ready_stdout
-from fabricusd.errors import FabricError, debugging, described, one_line
+from fabricusd.errors import FabricError, FabricWarning, debugging, described, one_line
+from fabricusd.host import MISSING
 from fabricusd.partial_files import remove_own_partial_files
 from fabricusd.stop import Stop
 
@@ -87,6 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # argparse itself would refer to the help that lists the commands.
         _Parser(prog=f"fabricusd {command}").error(f"unrecognized arguments: {' '.join(unknown)}")
     ready_stdout()
+    warnings.formatwarning = _format_warning
     try:
         with Stop():
             status: int = options.run(options)
@@ -103,10 +106,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _status_of(error)
 
 
+_python_format = warnings.formatwarning
+
+
+def _format_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    line: str | None = None,
+) -> str:
+    """One line for a warning of fabricusd's; any other with its place, as Python prints it."""
+    if issubclass(category, FabricWarning):
+        return f"fabricusd: {one_line(str(message))}\n"
+    return _python_format(message, category, filename, lineno, line)
+
+
 def _status_of(error: Exception) -> int:
     """Report in one line what a command raised, and return the status for it."""
     if isinstance(error, FabricError):
         return refused(str(error))
+    if isinstance(error, ModuleNotFoundError) and error.name == "pxr":
+        return refused(MISSING)
     if isinstance(error, BrokenPipeError):
         # The reader of the output, such as `head`, has closed it.
         drop_stdout()

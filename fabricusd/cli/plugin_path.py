@@ -18,7 +18,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--validators",
         action="store_true",
-        help="add the folder of the validators, for programs whose Python can import fabricusd",
+        help="add the folder of the rules, for programs of USD 26.5 or newer whose Python can "
+        "import fabricusd",
     )
 
 

@@ -44,7 +44,7 @@ LAYER = {
     "not a number": ("ior = 1.5", "ior = nan", "thread:ior is nan; it must be at least 1"),
     "an empty grid": ('["10", "01"]', "[]", "rows is empty; it must have"),
     "rows of two lengths": ('"01"]', '"0"]', r"rows \[1\] has 1 characters; it must have 2"),
-    "no thread": ("</Cloth/Warp>", "</Cloth/Weft>", "no prim; it must be one"),
+    "no thread": ("</Cloth/Warp>", "</Cloth/Weft>", "does not exist; it must be a WovenThread"),
     "values in time alone": ("density = 20", "density.timeSamples = { 1: 20 }", "none at rest"),
 }  # fmt: skip
 
@@ -152,7 +152,7 @@ def test_a_broken_image(fault, kept, capsys):
 
 
 NO_FILE = {
-    "missing": "no file|No such file",
+    "missing": "no file|No such file|does not exist",
     "directory": "is a directory; it must be a file",
     "empty": "is empty; it must hold",
     "pipe": "is a pipe or a device; it must be a file",
