@@ -34,7 +34,8 @@ from fabricusd.scene.usd.mesh import Placed, is_mirrored, read_mesh
 from fabricusd.scene.usd.skeleton import Skeletons
 from fabricusd.scene.usd.units import note_units, stage_units
 from fabricusd.scene.usd.value import note_types, usd_words, value_of
-from fabricusd.schema.access import applies_binding
+from fabricusd.scene.usd.worn import names_fabric
+from fabricusd.schema.rules.rules import place_problem
 from fabricusd.schema.source import compose_stage, usd_errors
 
 _PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
@@ -174,6 +175,12 @@ class _Reader:
     def _add(self, one: _Waiting, inside: tuple[Sdf.Path, ...]) -> None:
         """Add one visible prim, whatever it is."""
         prim, where = one.prim, str(one.prim.GetPath())
+        # Of a mesh's subsets the mesh tells.
+        of_mesh = prim.IsA(UsdGeom.Subset) and prim.GetParent().IsA(UsdGeom.Mesh)
+        if not of_mesh and names_fabric(prim):
+            problem = place_problem(prim)
+            if problem:
+                self.scene.note(where, f"binds a fabric, left out: fabric:binding {problem}")
         if prim.IsA(UsdGeom.Camera):
             self.cameras.append(prim)
         elif not np.isfinite(one.matrix).all():
@@ -188,11 +195,6 @@ class _Reader:
                 self.scene.lights.append(light)
         elif prim.IsA(UsdGeom.Gprim) or prim.GetTypeName() == "Volume":
             self.scene.note(where, f"is a {prim.GetTypeName()}, left out; only meshes are seen")
-        elif prim.IsA(UsdGeom.Subset) and prim.GetParent().IsA(UsdGeom.Mesh):
-            # Its mesh reads it.
-            pass
-        elif applies_binding(prim):
-            self.scene.note(where, "binds a fabric, left out: only meshes and subsets wear one")
 
     def _mesh(self, one: _Waiting) -> None:
         prim, where = one.prim, str(one.prim.GetPath())

@@ -12,7 +12,8 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Sdf, Usd, UsdGeom
+from numpy.typing import NDArray
+from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 from fabricusd.errors import FabricError
 from fabricusd.fabric import describe_limits, within_limits
@@ -25,6 +26,7 @@ from fabricusd.schema.access import (
     next_targets,
     over_above,
     targets,
+    unbinds,
     value,
 )
 from fabricusd.schema.attributes import Attribute
@@ -354,11 +356,11 @@ def curve_angles_in_range(prim: Usd.Prim) -> Iterator[Fault]:
 
 @rule(BINDING)
 def binding_names_a_fabric(prim: Usd.Prim) -> Iterator[Fault]:
-    """A binding targets exactly one prim, a WovenFabric."""
+    """A binding targets exactly one prim, a WovenFabric, or none to take the fabric off."""
     name = "fabric:binding"
     found = targets(prim, name)
-    if not found and lost_targets(prim, name):
-        return  # another rule tells why
+    if unbinds(prim) or (not found and lost_targets(prim, name)):
+        return  # of a target that is lost another rule tells why
     if len(found) != 1:
         yield name, f"has {len(found)} targets; it must have 1, a WovenFabric prim"
         return
@@ -384,12 +386,60 @@ def bound_fabric_defined(prim: Usd.Prim) -> Iterator[Fault]:
             )
 
 
+_WORN = "it must be on a Mesh, a GeomSubset of a mesh's faces, a Material or a prim above meshes"
+
+
+def place_problem(prim: Usd.Prim) -> str:
+    """Why a binding on `prim` has no effect, an empty string where it has one."""
+    kind = str(prim.GetTypeName())
+    if prim.IsA(UsdGeom.Subset):
+        element = UsdGeom.Subset(prim).GetElementTypeAttr().Get()
+        if not prim.GetParent().IsA(UsdGeom.Mesh):
+            return f"is on a GeomSubset of no mesh; {_WORN}"
+        if element not in (UsdGeom.Tokens.face, None):
+            return f"is on a GeomSubset of the type '{element}'; {_WORN}"
+        return ""
+    if not kind or prim.IsA(UsdGeom.Mesh) or prim.IsA(UsdShade.Material):
+        return ""
+    # Meshes hand nothing down, and what is below a light or a camera is not seen.
+    alone = (UsdGeom.Gprim, UsdGeom.Camera, UsdLux.BoundableLightBase, UsdLux.NonboundableLightBase)
+    if prim.IsA(UsdGeom.Imageable) and not any(prim.IsA(one) for one in alone):
+        return ""
+    return f"is on a {kind}; {_WORN}"
+
+
 @rule(BINDING)
-def binding_on_mesh_or_subset(prim: Usd.Prim) -> Iterator[Fault]:
-    """Only meshes and subsets of their faces are bound."""
-    if prim.GetTypeName() not in ("Mesh", "GeomSubset"):
-        kind = prim.GetTypeName() or "an untyped prim"
-        yield "fabric:binding", f"is on {kind}; it must be on a Mesh or a GeomSubset"
+def binding_can_be_worn(prim: Usd.Prim) -> Iterator[Fault]:
+    """A binding is on a mesh, a subset of its faces, a material, or a prim above meshes."""
+    problem = place_problem(prim)
+    if problem:
+        yield "fabric:binding", problem
+
+
+@rule(BINDING, fatal=False)
+def subsets_share_no_face(prim: Usd.Prim) -> Iterator[Fault]:
+    """A face is in one of the subsets that wear fabrics of their own, not in two."""
+    mesh = prim.GetParent()
+    if not prim.IsA(UsdGeom.Subset) or not mesh.IsA(UsdGeom.Mesh) or unbinds(prim):
+        return
+    mine = _faces(prim)
+    for other in UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(mesh)):
+        if other.GetPrim() == prim:
+            return  # a pair is told once, by the later of the two
+        if applies_binding(other.GetPrim()) and not unbinds(other.GetPrim()):
+            both = np.intersect1d(mine, _faces(other.GetPrim()))
+            if both.size:
+                yield (
+                    "indices",
+                    f"has {both.size} faces of {other.GetPrim().GetName()}, the first is "
+                    f"{both[0]}; a face must be in one subset that wears a fabric",
+                )
+
+
+def _faces(prim: Usd.Prim) -> NDArray[np.int64]:
+    """(n,) numbers of a subset's faces."""
+    indices = UsdGeom.Subset(prim).GetIndicesAttr().Get(Usd.TimeCode.EarliestTime())
+    return np.asarray(indices if indices is not None else (), np.int64)
 
 
 @rule(BINDING)
