@@ -8,16 +8,31 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from fabricusd.bake.layout.copies import are_alike
 from fabricusd.bake.layout.garment import Garment, fitted, garments
 from fabricusd.errors import FabricError
+from fabricusd.fabric import Binding
 from fabricusd.materials.bake_folder import MapSet
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.scene import Scene
-from fabricusd.schema import open_stage
-from fabricusd.schema.access import applies_binding, targets, value
+from fabricusd.scene.usd.worn import Bound, bound
+from fabricusd.schema import open_stage, read_binding
+from fabricusd.schema.access import targets
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Worn:
+    """The fabric that the scene itself binds to a prim.
+
+    owner : path of the prim whose `fabric:binding` counts: the wearer, one above it, or a material
+    fabric : path of the WovenFabric prim
+    """
+
+    owner: str
+    fabric: str
+    binding: Binding
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,25 +41,33 @@ class Wearer:
 
     path : of the prim in the scene
     maps : its textures; lay : number of its fabric among theirs
-    worn : whether the scene itself binds the fabric there
+    worn : what the scene makes it wear; None where the fabric was named for the bake alone
     forced : the binding must outdo those below, since `path` is an instance's root
+    purpose : of the scene's own material binding, "" for all purposes
+    outdone : a binding on the prim itself would not count, since another one is stronger
     """
 
     path: str
     maps: MapSet
     lay: int
-    worn: bool
+    worn: Worn | None
     forced: bool = False
+    purpose: str = ""
+    outdone: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NewUV:
-    """A mesh's UVs in the textures' layout: values and indices of primvar `st`."""
+    """A mesh's UVs in the textures' layout: values and indices of primvar `st`.
+
+    fabricless : whether the scene binds no fabric there, which would lie in the UVs as they are
+    """
 
     path: str
     values: NDArray[np.float32]
     indices: NDArray[np.int32] | None
     interpolation: str
+    fabricless: bool
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,10 +103,11 @@ def find_wearers(scene: Path, sets: tuple[MapSet, ...]) -> Dressed:
                 notes.append(f"{path} is not in {scene.name} any more; it gets no look")
                 continue
             _compare(maps, now.get(path), [now[k] for k in maps.prims if k in now], path, notes)
-            wearers += _of(prim, maps, notes)
-            name = _uv_name(prim)
-            if path in now and not (maps.own_uv and name == "st"):
-                uv.append(_moved(prim, name, maps, now[path]))
+            mine = _of(prim, maps, notes)
+            wearers += mine
+            name = next((one.worn.binding.uv_set for one in mine if one.worn), "st")
+            if mine and path in now and not (maps.own_uv and name == "st"):
+                uv.append(_moved(prim, name, maps, now[path], fabricless=mine[0].worn is None))
     if not wearers:
         raise FabricError(str(scene), "has none of the prims that were baked; bake it again")
     return Dressed(stage=stage, wearers=tuple(wearers), uv=tuple(uv), notes=tuple(notes))
@@ -125,15 +149,47 @@ def _of(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
     """The mesh itself, or those of its subsets that wear fabrics of their own."""
     if prim.IsInstanceProxy():
         return _instance(prim, maps, notes)
+    whole = bound(prim)
     found = []
-    for one in (prim, *UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(prim))):
-        one = one.GetPrim() if not isinstance(one, Usd.Prim) else one
-        if applies_binding(one):
-            found_at = targets(one, "fabric:binding")
-            name = found_at[0].name if found_at else ""
-            lay = next((k for k, lay in enumerate(maps.lays) if lay.name == name), 0)
-            found.append(Wearer(path=str(one.GetPath()), maps=maps, lay=lay, worn=True))
-    return found or [Wearer(path=str(prim.GetPath()), maps=maps, lay=0, worn=False)]
+    for one in (prim, *map(Usd.SchemaBase.GetPrim, _subsets(prim))):
+        said = whole if one == prim else bound(one)
+        worn = None if one != prim and said.place == whole.place else _worn(said)
+        if worn is not None:
+            found.append(_wearer(one, maps, said, worn))
+    return found or [_wearer(prim, maps, whole, None)]
+
+
+def _subsets(prim: Usd.Prim) -> list[UsdGeom.Subset]:
+    return list(UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(prim)))
+
+
+def _wearer(prim: Usd.Prim, maps: MapSet, said: Bound, worn: Worn | None) -> Wearer:
+    name = Sdf.Path(worn.fabric).name if worn else ""
+    lay = next((k for k, lay in enumerate(maps.lays) if lay.name == name), 0)
+    return Wearer(
+        path=str(prim.GetPath()), maps=maps, lay=lay, worn=worn, purpose=said.purpose,
+        outdone=_outdoes_direct(said.relationship, prim),
+    )  # fmt: skip
+
+
+def _worn(said: Bound) -> Worn | None:
+    """What a prim wears in the scene, None where it wears no fabric that can be read."""
+    for owner in said.fabrics:
+        with suppress(FabricError):
+            binding = read_binding(owner)
+            fabric = targets(owner, "fabric:binding")[0]
+            return Worn(owner=str(owner.GetPath()), fabric=str(fabric), binding=binding)
+    return None
+
+
+def _outdoes_direct(relationship: Usd.Relationship | None, prim: Usd.Prim) -> bool:
+    """Whether a material's binding goes before one that is authored on `prim` directly."""
+    if relationship is None or not prim.GetPath().HasPrefix(relationship.GetPrim().GetPath()):
+        return False
+    if relationship.GetPrim() == prim:
+        return "collection" in relationship.SplitName()
+    strength = UsdShade.MaterialBindingAPI.GetMaterialBindingStrength(relationship)
+    return bool(strength == UsdShade.Tokens.strongerThanDescendants)
 
 
 def _instance(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
@@ -141,22 +197,30 @@ def _instance(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
     while root.IsInstanceProxy():
         root = root.GetParent()
     meshes = [p for p in Usd.PrimRange(root, Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
-    if len(meshes) > 1:
+    others = "other meshes" if len(meshes) > 1 else "several fabrics" * (len(maps.lays) > 1)
+    if others:
         notes.append(
-            f"{prim.GetPath()} is in an instance with other meshes, which cannot be changed one by "
+            f"{prim.GetPath()} is in an instance with {others}, which cannot be changed one by "
             "one; it gets no look: bake and dress what the instance refers to"
         )
         return []
-    return [Wearer(path=str(root.GetPath()), maps=maps, lay=0, worn=False, forced=True)]
+    said = bound(prim)
+    return [
+        Wearer(
+            path=str(root.GetPath()), maps=maps, lay=0, worn=_worn(said), forced=True,
+            purpose=said.purpose, outdone=_outdoes_direct(said.relationship, root),
+        )
+    ]  # fmt: skip
 
 
-def _uv_name(prim: Usd.Prim) -> str:
-    """The UV set that the fabric lies in."""
-    return str(value(prim, "fabric:binding:uvSet") or "st")
-
-
-def _moved(prim: Usd.Prim, name: str, maps: MapSet, now: Garment) -> NewUV:
+def _moved(prim: Usd.Prim, name: str, maps: MapSet, now: Garment, *, fabricless: bool) -> NewUV:
     """UVs where `bake --fit` put them, old = span * new + low, as primvar `st`."""
+    if prim.IsInstanceProxy():
+        raise FabricError(
+            str(prim.GetPath()),
+            "is in an instance, where its UVs cannot be moved to where its textures have them; "
+            "bake it in UVs of its own named 'st' without --fit, or leave --scene out",
+        )
     old, new = now.lays[0], maps.lays[0]
     span = float(np.linalg.norm(new.matrix) / np.linalg.norm(old.matrix))
     low = np.linalg.solve(old.matrix, new.offset - old.offset)
@@ -174,5 +238,5 @@ def _moved(prim: Usd.Prim, name: str, maps: MapSet, now: Garment) -> NewUV:
     indices = np.asarray(primvar.GetIndices(), np.int32) if primvar.IsIndexed() else None
     return NewUV(
         path=str(prim.GetPath()), values=values.astype(np.float32), indices=indices,
-        interpolation=str(primvar.GetInterpolation()),
+        interpolation=str(primvar.GetInterpolation()), fabricless=fabricless,
     )  # fmt: skip

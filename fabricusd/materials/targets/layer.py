@@ -27,7 +27,7 @@ from fabricusd.materials.targets.write_usd import write_material
 from fabricusd.materials.wearers import Dressed, NewUV, Wearer
 from fabricusd.schema import export, write_binding, write_fabric
 from fabricusd.schema.access import BINDING_API
-from fabricusd.schema.names import prim_name
+from fabricusd.schema.names import free_name, prim_name
 from fabricusd.schema.source import usd_errors
 
 VARIANT_SET = "fabricLook"
@@ -71,7 +71,7 @@ def write_baked_look(
                     f"has {len(places)} parts; the manifest says {len(one.lays)} lays, bake again",
                 )
             wearers += [
-                Wearer(path=place, maps=one, lay=k, worn=False) for k, place in enumerate(places)
+                Wearer(path=place, maps=one, lay=k, worn=None) for k, place in enumerate(places)
             ]
         _dress(stage, path, wearers, (), recipes)
 
@@ -139,25 +139,81 @@ def _dress(
             with variants.GetVariantEditContext():
                 for wearer in mine:
                     _fill(stage, name, wearer, scope, recipes)
-                if name == "baked":
-                    _refer_uv(stage, path, [u for u in uv if Sdf.Path(u.path).HasPrefix(root)])
+                below = [u for u in uv if Sdf.Path(u.path).HasPrefix(root)]
+                # A fabric that the scene binds lies in the UVs that the scene has.
+                moved = {"baked": below, "procedural": [u for u in below if u.fabricless]}
+                _refer_uv(stage, path, moved.get(name, []), uv)
         variants.SetVariantSelection("baked")
+        _put_first(prim, mine, recipes)
+
+
+def _put_first(root: Usd.Prim, wearers: Sequence[Wearer], recipes: Recipes) -> None:
+    """Order the look's collections on `root` before those of the scene.
+
+    On the prim, not in its variants: USD's text format loses the order of a variant's properties.
+    """
+    api = UsdShade.MaterialBindingAPI(root)
+    names = [
+        api.GetCollectionBindingRel(_collection(recipes[w.maps.name, w.lay, variant].name), purpose)
+        for w in wearers
+        if w.outdone
+        for variant in ("baked", "procedural")
+        for purpose in _purposes(w)
+    ]
+    if names:
+        root.SetPropertyOrder(list(dict.fromkeys(one.GetName() for one in names)))
+
+
+def _purposes(wearer: Wearer) -> list[str]:
+    """Those that the look binds for."""
+    return list(dict.fromkeys((UsdShade.Tokens.allPurpose, wearer.purpose)))
+
+
+def _collection(material: str) -> str:
+    """Name of the collection of all that wears a material of the look."""
+    return f"{VARIANT_SET}_{material}"
 
 
 def _write_looks(
     stage: Usd.Stage, scope: Sdf.Path, wearers: Sequence[Wearer], recipes: Recipes, folder: Path
 ) -> None:
+    """The materials of `wearers` below `scope`; the procedural ones carry their fabrics."""
+    fabrics = scope.AppendChild(free_name("Fabrics", {one.name for one in recipes.values()}))
     for wearer in wearers:
         for variant in ("baked", "procedural"):
             recipe = recipes[wearer.maps.name, wearer.lay, variant]
             where = scope.AppendChild(recipe.name)
-            if not stage.GetPrimAtPath(where):
-                write_material(stage, where, list(recipe.graphs), dict(recipe.parameters), folder)
-        fabric = wearer.maps.lays[wearer.lay].fabric
-        if fabric is not None and not wearer.worn:
-            where = scope.AppendChild(prim_name(fabric.name))
-            if not stage.GetPrimAtPath(where):
-                write_fabric(stage, where, fabric)
+            if stage.GetPrimAtPath(where):
+                continue
+            material = write_material(
+                stage, where, list(recipe.graphs), dict(recipe.parameters), folder
+            )
+            binding = _binding(wearer)
+            if variant == "procedural" and binding is not None:
+                fabric = _fabric_path(stage, fabrics, wearer, binding)
+                write_binding(material.GetPrim(), fabric, binding)
+
+
+def _binding(wearer: Wearer) -> Binding | None:
+    """How the fabric lies: as the scene says, or else where the bake laid it."""
+    if wearer.worn is not None:
+        return wearer.worn.binding
+    lay = wearer.maps.lays[wearer.lay]
+    return None if lay.fabric is None else binding_of(lay)
+
+
+def _fabric_path(stage: Usd.Stage, fabrics: Sdf.Path, wearer: Wearer, binding: Binding) -> Sdf.Path:
+    """The scene's own fabric where the look can name it, or else a copy below `fabrics`."""
+    root = fabrics.GetPrefixes()[0]
+    if wearer.worn is not None and Sdf.Path(wearer.worn.fabric).HasPrefix(root):
+        own = stage.GetPrimAtPath(wearer.worn.fabric)
+        if own and not own.IsInstanceProxy():
+            return own.GetPath()
+    UsdGeom.Scope.Define(stage, fabrics)
+    where = fabrics.AppendChild(prim_name(binding.fabric.name))
+    if not stage.GetPrimAtPath(where):
+        write_fabric(stage, where, binding.fabric)
+    return where
 
 
 def _fill(
@@ -165,21 +221,44 @@ def _fill(
 ) -> None:
     """One prim in one variant: `off` is the garment as any tool shows it without fabrics."""
     prim = stage.OverridePrim(wearer.path)
-    lay = wearer.maps.lays[wearer.lay]
-    if variant == "procedural":
-        if not wearer.worn and lay.fabric is not None:
-            write_binding(prim, scope.AppendChild(prim_name(lay.fabric.name)), binding_of(lay))
-    elif wearer.worn:
-        prim.RemoveAppliedSchema(BINDING_API)
-        prim.CreateRelationship("fabric:binding", custom=False).SetTargets([])
+    worn = wearer.worn
+    if worn is not None and (variant == "off" or (variant, worn.owner) == ("baked", wearer.path)):
+        _take_off(stage, worn.owner, Sdf.Path(wearer.path).GetPrefixes()[0])
     if variant != "off":
         recipe = recipes[wearer.maps.name, wearer.lay, variant]
-        UsdShade.MaterialBindingAPI.Apply(prim).Bind(
-            UsdShade.Material(stage.GetPrimAtPath(scope.AppendChild(recipe.name))),
-            UsdShade.Tokens.strongerThanDescendants
-            if wearer.forced
-            else UsdShade.Tokens.fallbackStrength,
-        )
+        material = UsdShade.Material(stage.GetPrimAtPath(scope.AppendChild(recipe.name)))
+        for purpose in _purposes(wearer):
+            _bind(stage, prim, material, wearer, purpose)
+
+
+def _take_off(stage: Usd.Stage, owner: str, root: Sdf.Path) -> None:
+    """Empty a prim's `fabric:binding`. What an instance holds, or another root, keeps it."""
+    prim = stage.GetPrimAtPath(owner)
+    if not prim or not prim.GetPath().HasPrefix(root) or prim.IsInstanceProxy():
+        return
+    prim.RemoveAppliedSchema(BINDING_API)
+    prim.CreateRelationship("fabric:binding", custom=False).SetTargets([])
+
+
+def _bind(
+    stage: Usd.Stage, prim: Usd.Prim, material: UsdShade.Material, wearer: Wearer, purpose: str
+) -> None:
+    """Bind a material to a wearer: directly, or where that is outdone in a collection at the root.
+
+    No binding is stronger than one at the root that is stronger than all below; of several
+    collections there, the first counts.
+    """
+    strong = UsdShade.Tokens.strongerThanDescendants
+    if not wearer.outdone:
+        strength = strong if wearer.forced else UsdShade.Tokens.fallbackStrength
+        UsdShade.MaterialBindingAPI.Apply(prim).Bind(material, strength, purpose)
+        return
+    root = stage.GetPrimAtPath(prim.GetPath().GetPrefixes()[0])
+    name = _collection(material.GetPath().name)
+    collection = Usd.CollectionAPI.Apply(root, name)
+    collection.IncludePath(prim.GetPath())
+    api = UsdShade.MaterialBindingAPI.Apply(root)
+    api.Bind(collection, material, name, strong, purpose)
 
 
 def binding_of(lay: BakedLay) -> Binding:
@@ -217,7 +296,9 @@ def _uv_prim(number: int) -> str:
     return f"/UV{number}"
 
 
-def _refer_uv(stage: Usd.Stage, path: Path, uv: Sequence[NewUV]) -> None:
-    for number, one in enumerate(uv):
-        prim = stage.OverridePrim(one.path)
-        prim.GetReferences().AddReference(f"./{path.stem}.uv.usdc", _uv_prim(number))
+def _refer_uv(stage: Usd.Stage, path: Path, uv: Sequence[NewUV], written: Sequence[NewUV]) -> None:
+    """Refer the meshes of `uv` to their UVs; `written` : those of the layer, in its order."""
+    for number, one in enumerate(written):
+        if any(one is mine for mine in uv):
+            prim = stage.OverridePrim(one.path)
+            prim.GetReferences().AddReference(f"./{path.stem}.uv.usdc", _uv_prim(number))
