@@ -12,7 +12,10 @@ HERE = Path(__file__).resolve().parent
 TYPES = (
     ("WovenFabric", "A prim type."),
     ("WovenThread", "A prim type; a child of its Fabric, or anywhere by relationship."),
-    ("WovenBindingAPI", "A single-apply API schema, on a Mesh or a GeomSubset."),
+    (
+        "WovenBindingAPI",
+        "A single-apply API schema, on a Mesh, a GeomSubset, a Material, or a prim above meshes.",
+    ),
 )
 
 
