@@ -42,7 +42,7 @@ def _targets(options: argparse.Namespace) -> dict[str, Path | None]:
     """The targets that are asked for, and where; refused before the work where they cannot be."""
     wanted: dict[str, Path | None] = {}
     for target in TARGETS:
-        given = getattr(options, target.name)
+        given = getattr(options, target.name.replace("-", "_"))
         if given is not None and given is not False:
             wanted[target.name] = Path(given) if target.metavar else None
             target.functions.check(wanted[target.name], not options.no_clobber)

@@ -12,7 +12,7 @@ line's options come from here, so this file imports no USD.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -43,7 +43,11 @@ class Target:
 
 TARGETS = (
     Target(
-        name="usdz", metavar="FILE", module="package", help="also package the look in one file"
+        name="usdz", metavar="FILE", module="package", help="also package the garment in one file"
+    ),
+    Target(
+        name="usdz-web", metavar="FILE", module="package_web",
+        help="the same for readers that know no EXR (three.js, AR): 8-bit PNG textures",
     ),
     Target(name="osl", module="osl", help="also each fabric's threads as an OSL shader"),
     Target(
@@ -51,6 +55,9 @@ TARGETS = (
         help="also a U3M swatch of each fabric, for garment CAD",
     ),
 )  # fmt: skip
+
+Note = Callable[[str], None]
+"""Gets one line about what is left out."""
 
 Wanted = Mapping[str, Path | None]
 """Names of targets that are asked for -> where."""
@@ -63,12 +70,14 @@ class Job:
     look : the layer, which has been written
     fabrics : those of the bake by their names
     fitted : whether parameters are sought; otherwise textures stand as they are
+    note : gets a line about what the target leaves out
     """
 
     look: Path
     fabrics: Mapping[str, Fabric]
     fitted: bool
     clobber: bool
+    note: Note
 
 
 def chosen(wanted: Wanted) -> list[tuple[Target, Path | None]]:

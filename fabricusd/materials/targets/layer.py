@@ -22,6 +22,7 @@ from fabricusd.fabric import Binding
 from fabricusd.files import whole_file
 from fabricusd.materials.bake_folder import BakedLay, MapSet
 from fabricusd.materials.networks.graph import Graph, Value
+from fabricusd.materials.targets.flat import SCOPE
 from fabricusd.materials.targets.paths import asset_path
 from fabricusd.materials.targets.write_usd import write_material
 from fabricusd.materials.wearers import Dressed, NewUV, Wearer
@@ -33,8 +34,6 @@ from fabricusd.schema.source import usd_errors
 VARIANT_SET = "fabricLook"
 VARIANTS = ("baked", "procedural", "off")
 """Textures; the fabric itself, with constants for tools that do not know it; neither."""
-
-SCOPE = "FabricLooks"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +57,7 @@ def write_baked_look(
         root = UsdGeom.Xform.Define(stage, "/Garment").GetPrim()
         stage.SetDefaultPrim(root)
         Usd.ModelAPI(root).SetKind("component")
+        _name_asset(root, path)
         wearers = []
         for one in sets:
             mesh = root.GetPath().AppendChild(prim_name(one.name))
@@ -91,6 +91,7 @@ def write_scene_look(
         for prim in source.GetPseudoRoot().GetAllChildren():
             over = stage.DefinePrim(prim.GetPath())
             over.GetReferences().AddReference(asset_path(scene, path.parent), prim.GetPath())
+            _name_asset(over, path)
             if prim == source.GetDefaultPrim():
                 stage.SetDefaultPrim(over)
         for name in ("startTimeCode", "endTimeCode", "timeCodesPerSecond", "framesPerSecond"):
@@ -100,6 +101,15 @@ def write_scene_look(
             first = Sdf.Path(dressed.wearers[0].path).GetPrefixes()[0]
             stage.SetDefaultPrim(stage.GetPrimAtPath(first))
         _dress(stage, path, dressed.wearers, dressed.uv, recipes)
+
+
+def _name_asset(root: Usd.Prim, path: Path) -> None:
+    """The look's own name: a garment's would come through the reference."""
+    model = Usd.ModelAPI(root)
+    model.SetAssetIdentifier(f"./{path.name}")
+    model.SetAssetName(path.stem)
+    if model.GetAssetVersion():
+        model.SetAssetVersion("")
 
 
 @contextmanager

@@ -59,6 +59,8 @@ _FLAT = (0.0, 0.0, 1.0)
 
 _MODES = ("repeat", "clamp", "mirror", "black")
 
+_OPACITY_MODES = ("transparent", "presence")
+
 _CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 
 
@@ -110,8 +112,22 @@ class PreviewNetwork:
                 left_out.append(name)
         if left_out:
             self._note(f"has {', '.join(left_out)}, left out")
+        self._note_opacity(shader)
         if self._source(shader, "useSpecularWorkflow")[0] == 1:
             self._note("asks for the specular workflow; the metallic one is rendered")
+
+    def _note_opacity(self, shader: UsdShade.Shader) -> None:
+        """Opacity is rendered as the share of the surface that is there: `presence`."""
+        mode = str(self._source(shader, "opacityMode")[0] or "transparent")
+        opacity = self._source(shader, "opacity")[0]
+        threshold = self._source(shader, "opacityThreshold")[0]
+        if mode not in _OPACITY_MODES:
+            self._note(f"has opacityMode '{mode}'; it must be one of {', '.join(_OPACITY_MODES)}")
+        elif mode == "transparent" and opacity not in (None, 0, 1) and not threshold:
+            self._note(
+                "has an opacity of opacityMode 'transparent', rendered as 'presence': its "
+                "reflection fades with it"
+            )
 
     def _source(self, shader: UsdShade.Shader, name: str) -> tuple[Any, str]:
         """(an input's value, "") or (the shader that it is connected to, its output's name)."""
