@@ -38,7 +38,7 @@ def written(tmp_path_factory) -> Path:
     make_samples.make_drape(folder / "samples", cells=8, factor=1, steps=2)
     make_samples.make_skirt(folder / "samples", around=24, down=8, steps=2)
     assert main(["demo", "-o", str(folder / "demo"), "--quiet"]) == 0
-    scene, baked = bake_shirt(folder)
+    bake_shirt(folder)
     bake(
         write_shot(folder / "shot.usda"), folder / "shot_baked",
         BakeSettings(resolution=64, maps=MAPS), workers=1,
@@ -119,9 +119,7 @@ def test_a_validator_would_find_a_fault(written):
         UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     )
     found = {error.GetName() for error in context.Validate(stage)}
-    assert {"NonCompliantBiasValues", "BindingNamesAFabric"} & found == {"BindingNamesAFabric"} or (
-        "BindingNamesAFabric" in found and any("Bias" in name for name in found)
-    )
+    assert {"BindingNamesAFabric", "NonCompliantBiasValues"} <= found
 
 
 def textures(path: Path) -> dict[str, set[tuple[str, str, str]]]:
@@ -159,10 +157,10 @@ def test_textures_name_colour_spaces_that_their_readers_know(written):
 @pytest.mark.parametrize("tail", ["", "_web"])
 def test_a_package_is_the_garment_and_names_nothing_outside(name, tail, written):
     path = written / f"{name}{tail}.usdz"
-    text = Usd.Stage.Open(str(path)).GetRootLayer().ExportToString()
+    stage = Usd.Stage.Open(str(path))
+    text = stage.GetRootLayer().ExportToString()
     for word in ("fabric:", "thread:", "Woven", str(written), "collection:", "references", "@../"):
         assert word not in text, word
-    stage = Usd.Stage.Open(str(path))
     kinds = {p.GetTypeName() for p in stage.TraverseAll()}
     assert kinds <= {"Xform", "Mesh", "GeomSubset", "Scope", "Material", "Shader", ""}
     assert not UsdUtils.ComputeAllDependencies(str(path))[2]
@@ -205,12 +203,17 @@ def test_materials_say_of_which_materialx_they_are(written):
     assert prim.GetAttribute("config:mtlx:version").Get() == "1.39"
 
 
-def test_a_look_has_a_name_of_its_own(written):
-    scene = Usd.Stage.Open(str(written / "shirt.usda"))
-    garment = Usd.ModelAPI(scene.GetDefaultPrim())
-    garment.SetAssetIdentifier("studio://shirt")
-    garment.SetAssetName("shirt")
-    garment.SetAssetVersion("7")
-    look = Usd.ModelAPI(Usd.Stage.Open(str(written / "over.usda")).GetDefaultPrim())
-    assert look.GetAssetIdentifier().path == "./over.usda"
-    assert look.GetAssetName() == "over"
+def test_a_look_has_a_name_of_its_own(written, tmp_path):
+    garment = Usd.Stage.Open(str(written / "shirt.usda"))
+    model = Usd.ModelAPI(garment.GetDefaultPrim())
+    model.SetAssetIdentifier("studio://shirt")
+    model.SetAssetName("shirt")
+    model.SetAssetVersion("7")
+    garment.GetRootLayer().Export(str(tmp_path / "shirt.usda"))
+    garment.Reload()
+    words = ["material", str(written / "baked"), "--scene", str(tmp_path / "shirt.usda")]
+    assert main([*words, "-o", str(tmp_path / "look.usda"), "--no-fit", "--quiet"]) == 0
+    stage = Usd.Stage.Open(str(tmp_path / "look.usda"))
+    look = Usd.ModelAPI(stage.GetDefaultPrim())
+    assert look.GetAssetIdentifier().path == "./look.usda"
+    assert (look.GetAssetName(), look.GetAssetVersion()) == ("look", "")
