@@ -12,7 +12,8 @@ from fabricusd.materials.targets import TARGETS
 EPILOG = """example:
   fabricusd material baked
   fabricusd material baked --scene coat.usda -o coat_look.usda --surface openpbr gltf_pbr
-  fabricusd material baked --usdz coat.usdz --osl"""
+  fabricusd material baked --usdz coat.usdz --osl
+  fabricusd material baked_red --asset assets/coat --colorway red"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,6 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         given: dict[str, Any] = {"metavar": target.metavar}
         given = given if target.metavar else {"action": "store_true"}
         parser.add_argument(f"--{target.name}", help=target.help, **given)
+    parser.add_argument(
+        "--colorway", default="", metavar="NAME",
+        help="variant of --asset that the bake becomes (default: its fabrics' names)",
+    )  # fmt: skip
     parser.add_argument("--no-fit", action="store_true", help="leave the textures as they are")
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
     parser.add_argument("--no-clobber", action="store_true", help="never overwrite a look")
@@ -60,7 +65,10 @@ def run(options: argparse.Namespace) -> int:
 
     made = write_materials(
         options.bake, options.output,
-        Settings(surfaces=tuple(options.surface), fitted=not options.no_fit, targets=targets),
+        Settings(
+            surfaces=tuple(options.surface), fitted=not options.no_fit, targets=targets,
+            colorway=options.colorway,
+        ),
         scene=options.scene, clobber=not options.no_clobber, dry_run=options.dry_run,
         progress=say if options.verbose else None,
     )  # fmt: skip

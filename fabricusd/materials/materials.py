@@ -96,8 +96,8 @@ def _write(
     write_json(path.with_suffix(".json"), _report(made))
     made.files += [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
     job = Job(
-        look=path, fabrics=_fabrics(folder), fitted=settings.fitted, clobber=clobber,
-        note=made.notes.append,
+        look=path, garments=folder.garments, recipes=made_of, fabrics=_fabrics(folder),
+        fitted=settings.fitted, clobber=clobber, note=made.notes.append, colorway=settings.colorway,
     )  # fmt: skip
     for target, where in chosen(settings.targets):
         made.files += target.functions.write(job, where)

@@ -58,11 +58,13 @@ class Settings:
         document all
     fitted : whether the parameters are sought; otherwise the textures stand as they are
     targets : what is written besides, names of `targets.TARGETS`, and where
+    colorway : name of an asset's variant, "" for the fabrics' names
     """
 
     surfaces: tuple[str, ...] = ("openpbr",)
     fitted: bool = True
     targets: Wanted = field(default_factory=dict)
+    colorway: str = ""
 
 
 @dataclass(kw_only=True)

@@ -47,6 +47,7 @@ def written(tmp_path_factory) -> Path:
         told = [str(folder / w) if (folder / w).exists() else w for w in words]
         where = ["-o", str(folder / f"{name}.usda"), "--usdz", str(folder / f"{name}.usdz")]
         where += ["--usdz-web", str(folder / f"{name}_web.usdz")]
+        where += ["--asset", str(folder / f"{name}_asset")]
         assert main(["material", *told, *where, "--no-fit", "--quiet"]) == 0
     return folder
 
@@ -95,7 +96,7 @@ def test_no_rule_and_no_validator_finds_anything(written):
     for name in LOOKS:
         variants = ("baked", "procedural", "off")
         wanted |= {f"{name}.usda", *(f"{name}.{variant}.usda" for variant in variants)}
-        wanted |= {f"{name}.usdz", f"{name}_web.usdz"}
+        wanted |= {f"{name}.usdz", f"{name}_web.usdz", f"{name}_asset.usda", "payload.usda"}
     assert wanted <= names
 
 

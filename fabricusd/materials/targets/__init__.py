@@ -12,7 +12,7 @@ line's options come from here, so this file imports no USD.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fabricusd.fabric import Fabric
+    from fabricusd.materials.bake_folder import MapSet
+    from fabricusd.materials.targets.layer import Recipes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +51,10 @@ TARGETS = (
         name="usdz-web", metavar="FILE", module="package_web",
         help="the same for readers that know no EXR (three.js, AR): 8-bit PNG textures",
     ),
+    Target(
+        name="asset", metavar="FOLDER", module="asset",
+        help="also an asset of payload, geometry and look, or a colourway more in one",
+    ),
     Target(name="osl", module="osl", help="also each fabric's threads as an OSL shader"),
     Target(
         name="u3m", metavar="FOLDER", module="u3m",
@@ -68,16 +74,21 @@ class Job:
     """What a target is made of.
 
     look : the layer, which has been written
+    garments, recipes : what was baked, and the materials that the look has
     fabrics : those of the bake by their names
+    colorway : name of an asset's variant, "" for the fabrics' names
     fitted : whether parameters are sought; otherwise textures stand as they are
     note : gets a line about what the target leaves out
     """
 
     look: Path
+    garments: Sequence[MapSet]
+    recipes: Recipes
     fabrics: Mapping[str, Fabric]
     fitted: bool
     clobber: bool
     note: Note
+    colorway: str = ""
 
 
 def chosen(wanted: Wanted) -> list[tuple[Target, Path | None]]:

@@ -73,7 +73,7 @@ def write_baked_look(
             wearers += [
                 Wearer(path=place, maps=one, lay=k, worn=None) for k, place in enumerate(places)
             ]
-        _dress(stage, path, wearers, (), recipes)
+        dress(stage, path, wearers, (), recipes)
 
 
 def write_scene_look(
@@ -100,7 +100,7 @@ def write_scene_look(
         if not stage.HasDefaultPrim():
             first = Sdf.Path(dressed.wearers[0].path).GetPrefixes()[0]
             stage.SetDefaultPrim(stage.GetPrimAtPath(first))
-        _dress(stage, path, dressed.wearers, dressed.uv, recipes)
+        dress(stage, path, dressed.wearers, dressed.uv, recipes)
 
 
 def _name_asset(root: Usd.Prim, path: Path) -> None:
@@ -131,7 +131,7 @@ def _new_layer(
         layer.Save()
 
 
-def _dress(
+def dress(
     stage: Usd.Stage, path: Path, wearers: Sequence[Wearer], uv: Sequence[NewUV], recipes: Recipes
 ) -> None:
     """Materials and fabrics under each root, and the variants that bind them."""
