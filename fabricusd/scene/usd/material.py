@@ -1,4 +1,4 @@
-"""Which surface a face has: a fabric, a UsdPreviewSurface, or a grey."""
+"""Finds the surface of a face: a fabric, a UsdPreviewSurface, or grey."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ from fabricusd.schema.access import applies_binding, targets
 
 @dataclass(frozen=True)
 class Resolved:
-    """A material's number in the scene, the UV set that it asks for ("" for any), and what for."""
+    """A material of the scene.
+
+    index : in `Scene.materials`
+    uv_set : that the material asks for, "" for any
+    """
 
     index: int
     uv_set: str
@@ -31,7 +35,7 @@ class Resolved:
 class Materials:
     """The scene's materials, each made once.
 
-    binding : the fabric for what has no material of its own, or None
+    binding : the fabric of meshes that have no material of their own, or None
     """
 
     def __init__(self, scene: Scene, binding: Binding | None, time: Usd.TimeCode) -> None:
@@ -40,14 +44,15 @@ class Materials:
         self._fabrics: dict[Sdf.Path, Resolved | None] = {}
 
     def of(self, prim: Usd.Prim) -> Resolved | None:
-        """The surface of a mesh or subset, None where it says nothing about it.
+        """The surface of a mesh or subset; None for a subset without one of its own, and for a mesh
+        without any.
 
         The material's own surface shows where its fabric cannot be read.
         """
         found = bound(prim)
         whole = bound(prim.GetParent()) if prim.IsA(UsdGeom.Subset) else None
         if whole is not None and found.place == whole.place:
-            # The mesh's own, which goes behind a fabric that the mesh wears.
+            # The subset has no binding of its own.
             return None
         self._note_what_is_left_out(prim, found)
         for source in found.fabrics:
@@ -96,7 +101,7 @@ class Materials:
         return self._fabrics[key]
 
     def fallback(self, prim: Usd.Prim) -> Resolved:
-        """The surface of a mesh that has none: the given fabric, its display colour, or grey."""
+        """The surface of an unbound mesh: the given fabric, its display colour, or grey."""
         if self.binding is not None:
             return self._fabric(self.binding)
         color = self._display(prim, "displayColor", 3)
@@ -113,7 +118,7 @@ class Materials:
         return self._known[key]
 
     def _display(self, prim: Usd.Prim, name: str, count: int) -> tuple[float, ...] | None:
-        """The mean of a display primvar of `count` channels; None where it has no usable value."""
+        """The mean of a display primvar of `count` channels; None where no value can be used."""
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
         given = None
         if primvar and primvar.HasValue():
@@ -136,7 +141,7 @@ class Materials:
         return tuple(float(x) for x in np.maximum(sound.mean(axis=0), 0.0))
 
     def without_uv(self) -> Resolved:
-        """The surface where a fabric cannot lie, since there are no UVs."""
+        """The surface of faces that wear a fabric but have no UVs."""
         if "no uv" not in self._known:
             self._known["no uv"] = self._add(PreviewSurface(name="no UVs", roughness=0.6), "")
         return self._known["no uv"]
@@ -160,7 +165,7 @@ class Materials:
 
 
 def _ancestors(prim: Usd.Prim) -> list[Usd.Prim]:
-    """Parents of a prim, the nearest first, without the pseudo-root."""
+    """The prims above a prim, the nearest first, without the pseudo-root."""
     found = []
     parent = prim.GetParent()
     while parent and not parent.IsPseudoRoot():
