@@ -197,7 +197,7 @@ def placed(
         root = roots[number] if 0 <= number < len(roots) else None
         place = as_matrix(moves[k])
         if not root or root.IsAbstract():
-            scene.note(where, f"names prototype {number}, which is no prim to be seen")
+            scene.note(where, f"names prototype {number}, which is not a prim that can be seen")
         elif not np.isfinite(place).all():
             scene.note(where, "has instances whose place is not finite, left out")
         else:

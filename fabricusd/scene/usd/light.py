@@ -109,7 +109,7 @@ def read_light(
         return None
     size = _size(kind, matrix, lengths, angle)
     if size < _NOTHING:
-        inputs.note("is scaled to nothing, left out")
+        inputs.note("has a scale of 0, left out")
         return None
     if normalize:
         radiance = radiance / size

@@ -81,7 +81,7 @@ class Materials:
                 )
             path = UsdShade.MaterialBindingAPI(owner).GetDirectBinding().GetMaterialPath()
             if found.material is None and path and not path.isEmpty:
-                self.scene.note(where, f"is bound to {path}, which is no material, left out")
+                self.scene.note(where, f"is bound to {path}, which is not a material; left out")
 
     def _fabric_of(self, source: Usd.Prim) -> Resolved | None:
         """The fabric that `source` names, None with a note where it cannot be read."""

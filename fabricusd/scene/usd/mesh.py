@@ -84,7 +84,9 @@ def read_mesh(
         scene.note(where, f"{problem}, left out")
         return None
     if (counts < 3).any():
-        scene.note(where, f"has {int((counts < 3).sum())} faces below three corners, left out")
+        scene.note(
+            where, f"has {int((counts < 3).sum())} faces with fewer than three corners, left out"
+        )
     points = _near(points, matrix, metres, where, scene)
     scheme = str(value_of(mesh.GetSubdivisionSchemeAttr(), time, scene) or "none")
     level = None
@@ -233,7 +235,7 @@ def _materials(
         named = array_of(subset.GetIndicesAttr(), time, scene, np.int64)
         chosen = named[(named >= 0) & (named < faces)]
         if len(chosen) < len(named):
-            scene.note(where, f"names {len(named) - len(chosen)} faces that are none, left out")
+            scene.note(where, f"names {len(named) - len(chosen)} faces that do not exist, left out")
         if (which[chosen] > 0).any():
             taken = int((which[chosen] > 0).sum())
             scene.note(where, f"takes {taken} faces from another subset; the last one has them")

@@ -193,12 +193,14 @@ class _Reader:
             if light is not None:
                 self.scene.lights.append(light)
         elif prim.IsA(UsdGeom.Gprim) or prim.GetTypeName() == "Volume":
-            self.scene.note(where, f"is a {prim.GetTypeName()}, left out; only meshes are seen")
+            self.scene.note(where, f"is a {prim.GetTypeName()}, left out; only meshes are rendered")
 
     def _mesh(self, one: _Waiting) -> None:
         prim, where = one.prim, str(one.prim.GetPath())
         if is_light(prim):
-            self.scene.note(where, "shines as a light, left out: it is a mesh alone")
+            self.scene.note(
+                where, "is a light as well, which is left out: it is rendered as a mesh"
+            )
         pose = self.skeletons.pose(prim)
         matrix = one.matrix
         if pose is not None and pose.skeleton is not None:
@@ -250,7 +252,7 @@ class _Reader:
         return self._can_place(prim, self.copies.below(prim).times(1))
 
     def _can_place(self, prim: Usd.Prim, count: Count) -> bool:
-        """Whether that many more instances stay within the bounds; a note tells where they do not."""
+        """Whether so many more instances stay within the bounds; a note tells where they do not."""
         if math.isinf(count.copies):
             self.scene.note(str(prim.GetPath()), "instances itself, left out")
             return False

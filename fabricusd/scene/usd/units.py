@@ -34,7 +34,7 @@ def stage_units(stage: Usd.Stage, scene: Scene) -> tuple[float, str]:
     try:
         metres = float(UsdGeom.GetStageMetersPerUnit(stage))
     except Tf.ErrorException:
-        scene.note(where, f"has a metersPerUnit that is no number; {metres:g} is taken")
+        scene.note(where, f"has a metersPerUnit that is not a number; {metres:g} is taken")
     if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
         scene.note(where, f"has no metersPerUnit; USD's {metres:g} is taken")
     elif not _UNITS[0] <= metres <= _UNITS[1]:

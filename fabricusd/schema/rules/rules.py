@@ -447,7 +447,7 @@ def binding_uv_set_exists(prim: Usd.Prim) -> Iterator[Fault]:
     """The UV set that a binding names is a primvar of the mesh."""
     mesh = prim.GetParent() if prim.GetTypeName() == "GeomSubset" else prim
     wanted = value(prim, "fabric:binding:uvSet")
-    if mesh and mesh.IsA(UsdGeom.Mesh) and wanted:
+    if mesh and mesh.IsA(UsdGeom.Mesh) and wanted and not unbinds(prim):
         primvars = UsdGeom.PrimvarsAPI(mesh)
         if not primvars.FindPrimvarWithInheritance(wanted).HasValue():
             have = [p.GetPrimvarName() for p in primvars.GetPrimvarsWithValues()]
