@@ -76,8 +76,8 @@ def _garment(prim: Usd.Prim) -> Sdf.Path:
 
 def _bind_directly(stage: Usd.Stage, bound: dict[Usd.Prim, UsdShade.Material]) -> None:
     for prim in stage.TraverseAll():
-        _remove_properties(prim, ("material:binding", "collection:"))
-        _remove_schemas(prim, ("MaterialBindingAPI", "CollectionAPI"))
+        remove_properties(prim, ("material:binding", "collection:"))
+        remove_schemas(prim, ("MaterialBindingAPI", "CollectionAPI"))
     for prim, material in bound.items():
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(material)
 
@@ -129,8 +129,8 @@ def _remove_fabrics(stage: Usd.Stage) -> None:
         if prim and prim.GetTypeName() in TYPES:
             stage.RemovePrim(prim.GetPath())
     for prim in stage.TraverseAll():
-        _remove_properties(prim, ("fabric:", "thread:"))
-        _remove_schemas(prim, (BINDING_API,))
+        remove_properties(prim, ("fabric:", "thread:"))
+        remove_schemas(prim, (BINDING_API,))
         # The package is another asset than what it was made of.
         prim.ClearMetadata("assetInfo")
         for rel in prim.GetAuthoredRelationships():
@@ -146,13 +146,13 @@ def _remove_fabrics(stage: Usd.Stage) -> None:
             stage.RemovePrim(prim.GetPath())
 
 
-def _remove_properties(prim: Usd.Prim, begin: tuple[str, ...]) -> None:
+def remove_properties(prim: Usd.Prim, begin: tuple[str, ...]) -> None:
     for name in prim.GetAuthoredPropertyNames():
         if name.startswith(begin):
             prim.RemoveProperty(name)
 
 
-def _remove_schemas(prim: Usd.Prim, names: tuple[str, ...]) -> None:
+def remove_schemas(prim: Usd.Prim, names: tuple[str, ...]) -> None:
     """Drop applied schemas; `RemoveAppliedSchema` would leave a list of what is deleted."""
     given = prim.GetMetadata("apiSchemas")
     if given is None:

@@ -12,7 +12,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdShade
 
 from fabricusd.images.files import read_mip_level, write_png
-from fabricusd.materials.targets.flat import _remove_schemas
+from fabricusd.materials.targets.flat import remove_schemas
 from fabricusd.srgb import srgb_encode
 
 
@@ -43,7 +43,7 @@ def _leave_preview(stage: Usd.Stage, material: UsdShade.Material) -> None:
     for child in prim.GetAllChildren():
         if child.GetPath() not in needed:
             stage.RemovePrim(child.GetPath())
-    _remove_schemas(prim, ("MaterialXConfigAPI",))
+    remove_schemas(prim, ("MaterialXConfigAPI",))
     for name in prim.GetAuthoredPropertyNames():
         if name.startswith(("config:mtlx", "inputs:", "outputs:mtlx")):
             prim.RemoveProperty(name)
