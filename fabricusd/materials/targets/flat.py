@@ -147,6 +147,7 @@ def _remove_fabrics(stage: Usd.Stage) -> None:
 
 
 def remove_properties(prim: Usd.Prim, begin: tuple[str, ...]) -> None:
+    """Drop the properties whose names begin with one of `begin`."""
     for name in prim.GetAuthoredPropertyNames():
         if name.startswith(begin):
             prim.RemoveProperty(name)
