@@ -150,8 +150,8 @@ def no_unit_authored(stage):
     stage.ClearMetadata("metersPerUnit")
 
 
-def fabric_on_a_group(stage):
-    bind_fabric(stage, UsdGeom.Xform.Define(stage, "/bad").GetPrim())
+def fabric_on_a_camera(stage):
+    bind_fabric(stage, UsdGeom.Camera.Define(stage, "/bad").GetPrim())
 
 
 def fabric_without_its_api(stage):
@@ -228,7 +228,7 @@ FAULTS = {
     "subsets that overlap": (overlapping_subsets, "/bad/b takes 1 faces from another subset"),
     "no unit of length": (no_unit, "scene.usda has metersPerUnit 0; 0.01 is taken"),
     "no unit at all": (no_unit_authored, "scene.usda has no metersPerUnit; USD's 0.01 is taken"),
-    "a fabric bound to a group": (fabric_on_a_group, "/bad binds a fabric, left out"),
+    "a fabric bound to a camera": (fabric_on_a_camera, "/bad binds a fabric, left out"),
     "a fabric bound without its API": (fabric_without_its_api, "/bad has fabric:binding but not"),
     "a material bound without its API": (binding_without_its_api, "MaterialBindingAPI is not"),
     "a prototype that is a class": (abstract_prototype, "/bad names prototype 0"),

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from fabricusd.schema.access import applies_binding, unbinds
+from fabricusd.schema.rules.rules import place_problem
 
 PURPOSES = (UsdShade.Tokens.full, UsdShade.Tokens.preview)
 """Material purposes in the order in which they are looked for; each falls back on bindings without
@@ -79,7 +80,7 @@ def _owner(prim: Usd.Prim) -> Usd.Prim | None:
     """The nearest of `prim` and the prims above it that names a fabric; None where a binding
     without a target is nearer."""
     while prim and not prim.IsPseudoRoot():
-        if names_fabric(prim):
+        if names_fabric(prim) and not place_problem(prim):
             return prim
         if unbinds(prim):
             return None
