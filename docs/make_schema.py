@@ -16,7 +16,10 @@ TYPES = (
         "A prim type. A thread is a child of its WovenFabric, or lies anywhere that "
         "`fabric:threads` names.",
     ),
-    ("WovenBindingAPI", "A single-apply API schema, on a Mesh or a GeomSubset."),
+    (
+        "WovenBindingAPI",
+        "A single-apply API schema, on a Mesh, a GeomSubset, a Material, or above meshes.",
+    ),
 )
 
 

@@ -54,8 +54,8 @@ def reading(source: object, kind: str) -> Iterator[None]:
 
     source : the file, or whatever else is read; kind : what it is read as, such as "a WIF draft"
 
-    A FabricError passes through unchanged. So do a missing library and a warning that the caller has
-    turned into an error: neither is the file's fault. The original exception is the `__cause__`,
+    A FabricError passes through unchanged. So do a missing library and a warning that the caller
+    has turned into an error: neither is the file's fault. The original is the `__cause__`,
     which FABRICUSD_DEBUG shows.
     """
     try:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import math
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 from scipy.ndimage import gaussian_filter, zoom
 
 from fabricusd.fabric import Binding
-from fabricusd.schema import load, write_binding, write_fabric
+from fabricusd.materials.uniform import Looks, fitted_looks, write_fabric_material
+from fabricusd.schema import load, write_fabric
 
 Points = NDArray[np.float64]
 
@@ -166,19 +168,29 @@ def grey(stage: Usd.Stage, path: str, color: tuple[float, float, float], roughne
 
 
 def bind(stage: Usd.Stage, mesh: Any, path: str) -> None:
-    """Bind a mesh to a plain material."""
+    """Give a mesh a material."""
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(
         UsdShade.Material(stage.GetPrimAtPath(path))
     )
 
 
 def dress(stage: Usd.Stage, mesh: UsdGeom.Mesh, preset: str, **binding: Any) -> None:
-    """Bind a mesh to a preset's fabric, which is written to the stage; UVs are in metres."""
-    path = f"/World/Looks/{preset}"
-    fabric = load(preset)
-    if not stage.GetPrimAtPath(path):
-        write_fabric(stage, path, fabric)
-    write_binding(mesh.GetPrim(), path, Binding(fabric=fabric, metres_per_uv=1.0, **binding))
+    """Make a mesh of a preset's fabric, by a material of the mesh's name; UVs are in metres.
+
+    The material carries the fabric, and for other viewers a UsdPreviewSurface and OpenPBR.
+    """
+    where, fabric = f"/World/Looks/{preset}", load(preset)
+    if not stage.GetPrimAtPath(where):
+        write_fabric(stage, where, fabric)
+    material = f"/World/Looks/{mesh.GetPrim().GetName()}"
+    laid = Binding(fabric=fabric, metres_per_uv=1.0, **binding)
+    write_fabric_material(stage, material, where, laid, looks=_looks(preset))
+    bind(stage, mesh, material)
+
+
+@cache
+def _looks(preset: str) -> Looks:
+    return fitted_looks(load(preset))
 
 
 def make_cylinders(folder: Path) -> Path:

@@ -12,7 +12,8 @@ from fabricusd.materials.targets import TARGETS
 EPILOG = """example:
   fabricusd material baked
   fabricusd material baked --scene coat.usda -o coat_look.usda --surface openpbr gltf_pbr
-  fabricusd material baked --usdz coat.usdz --osl"""
+  fabricusd material baked --usdz coat.usdz --osl
+  fabricusd material baked_red --asset assets/coat --colorway red"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,8 +37,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         given = given if target.metavar else {"action": "store_true"}
         parser.add_argument(f"--{target.name}", help=target.help, **given)
     parser.add_argument(
-        "--no-fit", action="store_true", help="use the textures as baked, without fitting"
-    )
+        "--colorway", default="", metavar="NAME",
+        help="variant of --asset that the bake becomes (default: its fabrics' names)",
+    )  # fmt: skip
+    parser.add_argument("--no-fit", action="store_true", help="leave the textures as they are")
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
     parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
 
@@ -46,7 +49,7 @@ def _targets(options: argparse.Namespace) -> dict[str, Path | None]:
     """The requested targets and their files; refused before the work if they cannot be written."""
     wanted: dict[str, Path | None] = {}
     for target in TARGETS:
-        given = getattr(options, target.name)
+        given = getattr(options, target.name.replace("-", "_"))
         if given is not None and given is not False:
             wanted[target.name] = Path(given) if target.metavar else None
             target.functions.check(wanted[target.name], not options.no_clobber)
@@ -64,7 +67,10 @@ def run(options: argparse.Namespace) -> int:
 
     made = write_materials(
         options.bake, options.output,
-        Settings(surfaces=tuple(options.surface), fitted=not options.no_fit, targets=targets),
+        Settings(
+            surfaces=tuple(options.surface), fitted=not options.no_fit, targets=targets,
+            colorway=options.colorway,
+        ),
         scene=options.scene, clobber=not options.no_clobber, dry_run=options.dry_run,
         progress=say if options.verbose else None,
     )  # fmt: skip

@@ -8,16 +8,31 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from fabricusd.bake.layout.copies import are_alike
 from fabricusd.bake.layout.garment import Garment, fitted, garments
 from fabricusd.errors import FabricError
+from fabricusd.fabric import Binding
 from fabricusd.materials.bake_folder import MapSet
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.scene import Scene
-from fabricusd.schema import open_stage
-from fabricusd.schema.access import applies_binding, targets, value
+from fabricusd.scene.usd.worn import Bound, bound
+from fabricusd.schema import open_stage, read_binding
+from fabricusd.schema.access import targets
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Worn:
+    """The fabric that the scene itself binds to a prim.
+
+    owner : path of the prim whose `fabric:binding` counts: the prim, one above it, or a material
+    fabric : path of the WovenFabric prim
+    """
+
+    owner: str
+    fabric: str
+    binding: Binding
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,26 +40,34 @@ class BoundPrim:
     """A mesh or subset that a baked material is bound to.
 
     path : of the prim in the scene
-    maps : its textures; lay : index of its fabric in `maps.lays`
-    binds_fabric : whether the scene itself binds the fabric to the prim
-    forced : the binding must be stronger than those of descendants: `path` is an instance's root
+    maps : its textures; lay : number of its fabric among theirs
+    worn : what the scene makes it wear; None where the fabric was named for the bake alone
+    forced : the binding must outdo those below, since `path` is an instance's root
+    purpose : of the scene's own material binding, "" for all purposes
+    outdone : a binding on the prim itself would not count, since another one is stronger
     """
 
     path: str
     maps: MapSet
     lay: int
-    binds_fabric: bool
+    worn: Worn | None
     forced: bool = False
+    purpose: str = ""
+    outdone: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NewUV:
-    """A mesh's UVs in the layout of the textures: values and indices of primvar `st`."""
+    """A mesh's UVs in the textures' layout: values and indices of primvar `st`.
+
+    fabricless : whether the scene binds no fabric there, which would lie in the UVs as they are
+    """
 
     path: str
     values: NDArray[np.float32]
     indices: NDArray[np.int32] | None
     interpolation: str
+    fabricless: bool
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,7 +93,7 @@ def find_bound_prims(scene: Path, sets: tuple[MapSet, ...]) -> BoundScene:
         )
     stage, _ = open_stage(scene)
     now = _garments(scene, sets)
-    bound: list[BoundPrim] = []
+    found: list[BoundPrim] = []
     uv: list[NewUV] = []
     notes: list[str] = []
     for maps in sets:
@@ -82,13 +105,14 @@ def find_bound_prims(scene: Path, sets: tuple[MapSet, ...]) -> BoundScene:
                 notes.append(f"{path} is no longer in {scene.name}; it gets no look")
                 continue
             _compare(maps, now.get(path), [now[k] for k in maps.prims if k in now], path, notes)
-            bound += _of(prim, maps, notes)
-            name = _uv_name(prim)
-            if path in now and not (maps.own_uv and name == "st"):
-                uv.append(_moved(prim, name, maps, now[path]))
-    if not bound:
-        raise FabricError(str(scene), "has none of the prims that were baked; bake again")
-    return BoundScene(stage=stage, prims=tuple(bound), uv=tuple(uv), notes=tuple(notes))
+            mine = _of(prim, maps, notes)
+            found += mine
+            name = next((one.worn.binding.uv_set for one in mine if one.worn), "st")
+            if mine and path in now and not (maps.own_uv and name == "st"):
+                uv.append(_moved(prim, name, maps, now[path], fabricless=mine[0].worn is None))
+    if not found:
+        raise FabricError(str(scene), "has none of the prims that were baked; bake it again")
+    return BoundScene(stage=stage, prims=tuple(found), uv=tuple(uv), notes=tuple(notes))
 
 
 def _garments(scene: Path, sets: tuple[MapSet, ...]) -> dict[str, Garment]:
@@ -132,15 +156,47 @@ def _of(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[BoundPrim]:
     """Return the mesh itself, or those of its subsets that bind fabrics of their own."""
     if prim.IsInstanceProxy():
         return _instance(prim, maps, notes)
+    whole = bound(prim)
     found = []
-    for one in (prim, *UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(prim))):
-        one = one.GetPrim() if not isinstance(one, Usd.Prim) else one
-        if applies_binding(one):
-            found_at = targets(one, "fabric:binding")
-            name = found_at[0].name if found_at else ""
-            lay = next((k for k, lay in enumerate(maps.lays) if lay.name == name), 0)
-            found.append(BoundPrim(path=str(one.GetPath()), maps=maps, lay=lay, binds_fabric=True))
-    return found or [BoundPrim(path=str(prim.GetPath()), maps=maps, lay=0, binds_fabric=False)]
+    for one in (prim, *map(Usd.SchemaBase.GetPrim, _subsets(prim))):
+        said = whole if one == prim else bound(one)
+        worn = None if one != prim and said.place == whole.place else _worn(said)
+        if worn is not None:
+            found.append(_bound_prim(one, maps, said, worn))
+    return found or [_bound_prim(prim, maps, whole, None)]
+
+
+def _subsets(prim: Usd.Prim) -> list[UsdGeom.Subset]:
+    return list(UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(prim)))
+
+
+def _bound_prim(prim: Usd.Prim, maps: MapSet, said: Bound, worn: Worn | None) -> BoundPrim:
+    name = Sdf.Path(worn.fabric).name if worn else ""
+    lay = next((k for k, lay in enumerate(maps.lays) if lay.name == name), 0)
+    return BoundPrim(
+        path=str(prim.GetPath()), maps=maps, lay=lay, worn=worn, purpose=said.purpose,
+        outdone=_outdoes_direct(said.relationship, prim),
+    )  # fmt: skip
+
+
+def _worn(said: Bound) -> Worn | None:
+    """What a prim wears in the scene, None where it wears no fabric that can be read."""
+    for owner in said.fabrics:
+        with suppress(FabricError):
+            binding = read_binding(owner)
+            fabric = targets(owner, "fabric:binding")[0]
+            return Worn(owner=str(owner.GetPath()), fabric=str(fabric), binding=binding)
+    return None
+
+
+def _outdoes_direct(relationship: Usd.Relationship | None, prim: Usd.Prim) -> bool:
+    """Whether a material's binding goes before one that is authored on `prim` directly."""
+    if relationship is None or not prim.GetPath().HasPrefix(relationship.GetPrim().GetPath()):
+        return False
+    if relationship.GetPrim() == prim:
+        return "collection" in relationship.SplitName()
+    strength = UsdShade.MaterialBindingAPI.GetMaterialBindingStrength(relationship)
+    return bool(strength == UsdShade.Tokens.strongerThanDescendants)
 
 
 def _instance(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[BoundPrim]:
@@ -148,22 +204,30 @@ def _instance(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[BoundPrim]
     while root.IsInstanceProxy():
         root = root.GetParent()
     meshes = [p for p in Usd.PrimRange(root, Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
-    if len(meshes) > 1:
+    others = "other meshes" if len(meshes) > 1 else "several fabrics" * (len(maps.lays) > 1)
+    if others:
         notes.append(
-            f"{prim.GetPath()} gets no look: it shares an instance with other meshes, which cannot "
-            "be changed individually; bake the prim that the instance refers to"
+            f"{prim.GetPath()} is in an instance with {others}, which cannot be changed one by "
+            "one; it gets no look: bake and dress what the instance refers to"
         )
         return []
-    return [BoundPrim(path=str(root.GetPath()), maps=maps, lay=0, binds_fabric=False, forced=True)]
+    said = bound(prim)
+    return [
+        BoundPrim(
+            path=str(root.GetPath()), maps=maps, lay=0, worn=_worn(said), forced=True,
+            purpose=said.purpose, outdone=_outdoes_direct(said.relationship, root),
+        )
+    ]  # fmt: skip
 
 
-def _uv_name(prim: Usd.Prim) -> str:
-    """Return the name of the UV set that the fabric uses."""
-    return str(value(prim, "fabric:binding:uvSet") or "st")
-
-
-def _moved(prim: Usd.Prim, name: str, maps: MapSet, now: Garment) -> NewUV:
-    """Return the UVs as `bake --fit` moved them: old = span * new + low."""
+def _moved(prim: Usd.Prim, name: str, maps: MapSet, now: Garment, *, fabricless: bool) -> NewUV:
+    """UVs where `bake --fit` put them, old = span * new + low, as primvar `st`."""
+    if prim.IsInstanceProxy():
+        raise FabricError(
+            str(prim.GetPath()),
+            "is in an instance, where its UVs cannot be moved to where its textures have them; "
+            "bake it in UVs of its own named 'st' without --fit, or leave --scene out",
+        )
     old, new = now.lays[0], maps.lays[0]
     span = float(np.linalg.norm(new.matrix) / np.linalg.norm(old.matrix))
     low = np.linalg.solve(old.matrix, new.offset - old.offset)
@@ -181,5 +245,5 @@ def _moved(prim: Usd.Prim, name: str, maps: MapSet, now: Garment) -> NewUV:
     indices = np.asarray(primvar.GetIndices(), np.int32) if primvar.IsIndexed() else None
     return NewUV(
         path=str(prim.GetPath()), values=values.astype(np.float32), indices=indices,
-        interpolation=str(primvar.GetInterpolation()),
+        interpolation=str(primvar.GetInterpolation()), fabricless=fabricless,
     )  # fmt: skip

@@ -97,7 +97,10 @@ def _write(
     write_mtlx(path.with_suffix(".mtlx"), documents)
     write_json(path.with_suffix(".json"), _report(made))
     made.files += [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
-    job = Job(look=path, fabrics=_fabrics(folder), fitted=settings.fitted, clobber=clobber)
+    job = Job(
+        look=path, garments=folder.garments, recipes=made_of, fabrics=_fabrics(folder),
+        fitted=settings.fitted, clobber=clobber, note=made.notes.append, colorway=settings.colorway,
+    )  # fmt: skip
     for target, where in chosen(settings.targets):
         made.files += target.functions.write(job, where)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from fabricusd.materials.bake_folder import BakeFolder, MapSet
 from fabricusd.materials.fit.fit import Fitted, fit, fit_threads, thread_factors, with_threads
 from fabricusd.materials.fit.texels import draw_texels, mean_texel
 from fabricusd.materials.fit.thread_maps import COLUMNS, Factors, write_thread_maps
-from fabricusd.materials.networks.graph import Texture, Value
+from fabricusd.materials.networks.graph import Graph, Texture, Value
 from fabricusd.materials.networks.hair import hair
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import (
@@ -54,15 +54,17 @@ NEUTRAL = {
 class Settings:
     """What to write.
 
-    surfaces : MaterialX surfaces, names of `surfaces.GRAPHS` or "hair"; the USD layer uses the
-        first, the document all of them
-    fitted : whether parameters are fitted to the fabric; otherwise the textures are used unchanged
-    targets : additional targets, by name in `targets.TARGETS`, and where to write them
+    surfaces : MaterialX surfaces, names of `surfaces.GRAPHS` or "hair"; USD takes the first, the
+        document all
+    fitted : whether the parameters are sought; otherwise the textures stand as they are
+    targets : what is written besides, names of `targets.TARGETS`, and where
+    colorway : name of an asset's variant, "" for the fabrics' names
     """
 
     surfaces: tuple[str, ...] = ("openpbr",)
     fitted: bool = True
     targets: Wanted = field(default_factory=dict)
+    colorway: str = ""
 
 
 @dataclass(kw_only=True)
@@ -103,20 +105,28 @@ def recipes(
                     s: GRAPHS[s](inputs, opaque) if s in GRAPHS else hair(inputs, opaque, lay)
                     for s in settings.surfaces
                 }
-                first = settings.surfaces[0]
-                found[maps.name, number, variant] = MaterialRecipe(
-                    name=title,
-                    graphs=(
-                        ("", preview(plain, looks["preview"], opaque)),
-                        ("", graphs[first]),
-                    ),
-                    parameters=parameter_values(looks[first])
-                    | parameter_values(looks["principled"], BLENDER),
+                found[maps.name, number, variant] = material_recipe(
+                    title, graphs, plain, looks, opaque
                 )
                 for surface, graph in graphs.items():
                     tail = "" if len(graphs) == 1 else f"_{surface}"
                     documents.append((title + tail, graph, parameter_values(looks[surface])))
     return found, documents
+
+
+def material_recipe(
+    name: str, graphs: Mapping[str, Graph], plain: Inputs, looks: Mapping[str, Look], opaque: bool
+) -> MaterialRecipe:
+    """A material of UsdPreviewSurface over `plain` and the first of `graphs`.
+
+    looks : by kind of surface, "preview", "principled" and those of `graphs`
+    """
+    first = next(iter(graphs))
+    return MaterialRecipe(
+        name=name,
+        graphs=(("", preview(plain, looks["preview"], opaque)), ("", graphs[first])),
+        parameters=parameter_values(looks[first]) | parameter_values(looks["principled"], BLENDER),
+    )
 
 
 def texture_inputs(maps: MapSet, path: Path, made: Written) -> Inputs:

@@ -238,3 +238,15 @@ def over_above(prim: Usd.Prim) -> Usd.Prim | None:
         if above and not above.HasDefiningSpecifier():
             return above
     return None
+
+
+def unbinds(prim: Usd.Prim) -> bool:
+    """Whether a prim takes its fabric off, by a `fabric:binding` that is authored without a target.
+
+    A target that composition drops is one: whoever authored it named a fabric.
+    """
+    name = "fabric:binding"
+    relationship = prim.GetRelationship(name)
+    if not relationship or not relationship.HasAuthoredTargets():
+        return False
+    return not targets(prim, name) and not lost_targets(prim, name)

@@ -57,9 +57,9 @@ def broken_fabric(stage):
     stage.GetPrimAtPath("/Looks/Cloth").GetAttribute("fabric:warp:density").Set(-1.0)
 
 
-def fabric_on_a_group(stage):
+def fabric_on_a_camera(stage):
     square(stage, "/group/square")
-    bind_fabric(stage, stage.GetPrimAtPath("/group"))
+    bind_fabric(stage, UsdGeom.Camera.Define(stage, "/group").GetPrim())
 
 
 def far_points(stage):
@@ -90,7 +90,7 @@ CAUSES = {
     "UVs that are no numbers": (mistyped_uvs, "has a UV set 'st' that does not fit its faces"),
     "the API is missing": (no_api, "has fabric:binding but not WovenBindingAPI applied"),
     "a fabric with a fault": (broken_fabric, "rendered without a fabric"),
-    "a fabric on a group": (fabric_on_a_group, "/group binds a fabric, left out"),
+    "a fabric on a camera": (fabric_on_a_camera, "/group binds a fabric, left out"),
     "points beyond the world": (far_points, "1 points beyond 1e+09 m"),
     "an instancer that does not fit": (short_instancer, "has arrays of different lengths"),
     "a point that is not there": (names_missing_points, "/square names point 9 of 4, left out"),
@@ -121,7 +121,7 @@ def test_a_mesh_asked_for_by_name_that_was_left_out_says_why(tmp_path):
 def test_many_reasons_are_cut_short(tmp_path):
     stage = new_stage(tmp_path)
     for k in range(9):
-        bind_fabric(stage, UsdGeom.Xform.Define(stage, f"/group{k}").GetPrim())
+        bind_fabric(stage, UsdGeom.Camera.Define(stage, f"/group{k}").GetPrim())
     stage.GetRootLayer().Save()
     with pytest.raises(FabricError, match=r"/group0 binds.*and \d more") as error:
         plan(stage.GetRootLayer().realPath, Settings())

@@ -27,7 +27,8 @@ from tests.materials.scenes import bake_shirt
 def packed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("packed")
     _, baked = bake_shirt(folder)
-    settings = Settings(fitted=False, targets={"usdz": folder / "shirt.usdz", "osl": None})
+    targets = {"usdz": folder / "shirt.usdz", "usdz-web": folder / "web.usdz", "osl": None}
+    settings = Settings(fitted=False, targets=targets)
     return write_materials(baked, folder / "look.usda", settings), folder / "shirt.usdz"
 
 
@@ -46,12 +47,13 @@ def test_another_usd_reader_finds_geometry_uvs_and_textures(packed):
     tinyusdz = pytest.importorskip("tinyusdz")
     from tinyusdz import tydra
 
-    scene = tydra.convert_to_render_scene(tinyusdz.load(str(packed[1])))
+    web = packed[1].with_name("web.usdz")
+    scene = tydra.convert_to_render_scene(tinyusdz.load(str(web)))
     (mesh,) = scene.meshes()
     assert mesh.texcoord_slot_ids() == [0]
     assert len(scene.textures()) >= 3
     assert {t.varname_uv for t in scene.textures()} == {"st"}
-    assert any("base_color.exr" in i.asset_identifier for i in scene.images())
+    assert any("base_color.png" in i.asset_identifier for i in scene.images())
     assert all(m.has_preview_surface for m in scene.materials())
 
 

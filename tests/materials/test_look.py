@@ -14,6 +14,7 @@ from fabricusd.materials.materials import write_materials
 from fabricusd.materials.recipes import Settings
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.scene import FabricSurface
+from fabricusd.scene.usd import worn
 from tests.materials.scenes import bake_shirt
 
 PLAIN = Settings(fitted=False)
@@ -49,7 +50,7 @@ def bound(stage, variant):
             material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
             found[prim.GetName()] = (
                 material.GetPath().name if material else None,
-                "WovenBindingAPI" in prim.GetAppliedSchemas(),
+                bool(worn.bound(prim).fabrics),
             )
     return found
 
@@ -86,7 +87,7 @@ def test_the_tracer_renders_textures_or_the_fabric_by_the_variant(alone):
 def test_a_procedural_binding_lays_the_fabric_where_the_textures_have_it(alone, shirt):
     stage = Usd.Stage.Open(str(alone[1]))
     stage.GetDefaultPrim().GetVariantSets().SetSelection("fabricLook", "procedural")
-    per_unit = stage.GetPrimAtPath("/Garment/Body/lay_0").GetAttribute(
+    per_unit = stage.GetPrimAtPath("/Garment/FabricLooks/Body_0_plain").GetAttribute(
         "fabric:binding:threadsPerUnit"
     )
     assert tuple(per_unit.Get()) == pytest.approx((24.0, 24.0))

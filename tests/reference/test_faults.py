@@ -150,8 +150,8 @@ def no_unit_authored(stage):
     stage.ClearMetadata("metersPerUnit")
 
 
-def fabric_on_a_group(stage):
-    bind_fabric(stage, UsdGeom.Xform.Define(stage, "/bad").GetPrim())
+def fabric_on_a_camera(stage):
+    bind_fabric(stage, UsdGeom.Camera.Define(stage, "/bad").GetPrim())
 
 
 def fabric_without_its_api(stage):
@@ -214,7 +214,7 @@ FAULTS = {
     "a reference to a file that is not there": (missing_reference, "lost.usda"),
     "a transform that is not finite": (infinite_transform, "/bad has a transform that is not fin"),
     "a point beyond 32-bit numbers": (far_point, "/bad has 1 points beyond 1e+09 m"),
-    "a face of two corners": (two_corners, "/bad has 1 faces below three corners"),
+    "a face of two corners": (two_corners, "/bad has 1 faces with fewer than three corners"),
     "a mesh lost in its scene": (lost_in_the_distance, "/bad is 2.83 m wide in a scene of 1e+07"),
     "UVs that are not finite": (
         uv_of([(0, 0), (1, 0), (math.nan, 1), (0, 1)]), "/bad has UVs that are not finite",
@@ -224,11 +224,11 @@ FAULTS = {
         uv_of(["a"] * 4, Sdf.ValueTypeNames.StringArray), "/bad has a UV set 'st' that does not",
     ),
     "too few normals": (normals_too_few, "/bad has normals that do not fit its faces"),
-    "a subset of faces that are none": (overlapping_subsets, "/bad/a names 1 faces that are none"),
+    "a subset of lost faces": (overlapping_subsets, "/bad/a names 1 faces that do not exist"),
     "subsets that overlap": (overlapping_subsets, "/bad/b takes 1 faces from another subset"),
     "no unit of length": (no_unit, "scene.usda has metersPerUnit 0; 0.01 is taken"),
     "no unit at all": (no_unit_authored, "scene.usda has no metersPerUnit; USD's 0.01 is taken"),
-    "a fabric bound to a group": (fabric_on_a_group, "/bad binds a fabric, left out"),
+    "a fabric bound to a camera": (fabric_on_a_camera, "/bad binds a fabric, left out"),
     "a fabric bound without its API": (fabric_without_its_api, "/bad has fabric:binding but not"),
     "a material bound without its API": (binding_without_its_api, "MaterialBindingAPI is not"),
     "a prototype that is a class": (abstract_prototype, "/bad names prototype 0"),

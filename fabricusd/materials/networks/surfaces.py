@@ -298,6 +298,8 @@ def preview(maps: Inputs, look: Look, opaque: bool) -> Graph:
     }
     if not opaque:
         inputs["opacity"] = read("opacity", "r", (1.0, 1.0, 1.0, 1.0))
+        # In a gap there is nothing that could reflect; by default the reflection stays whole.
+        inputs["opacityMode"] = Value("token", "presence")
     b.nodes["Preview"] = Node("Preview", "", "", "UsdPreviewSurface", inputs)
     return Graph(tuple(b.nodes.values()), "Preview", "surface", "")
 

@@ -12,7 +12,7 @@ The command line's options are generated from this file, so it imports no USD.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fabricusd.fabric import Fabric
+    from fabricusd.materials.bake_folder import MapSet
+    from fabricusd.materials.targets.layer import Recipes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +45,15 @@ class Target:
 
 TARGETS = (
     Target(
-        name="usdz", metavar="FILE", module="package", help="also package the look as a USDZ file"
+        name="usdz", metavar="FILE", module="package", help="also package the garment in one file"
+    ),
+    Target(
+        name="usdz-web", metavar="FILE", module="package_web",
+        help="the same for readers that know no EXR (three.js, AR): 8-bit PNG textures",
+    ),
+    Target(
+        name="asset", metavar="FOLDER", module="asset",
+        help="also an asset of payload, geometry and look, or a colourway more in one",
     ),
     Target(name="osl", module="osl", help="also write each fabric's threads as an OSL shader"),
     Target(
@@ -51,6 +61,9 @@ TARGETS = (
         help="also write a U3M swatch of each fabric, for garment CAD",
     ),
 )  # fmt: skip
+
+Note = Callable[[str], None]
+"""Gets one line about what is left out."""
 
 Wanted = Mapping[str, Path | None]
 """Values of `where` by the name of each requested target."""
@@ -60,16 +73,22 @@ Wanted = Mapping[str, Path | None]
 class Job:
     """The input of a target.
 
-    look : the look's layer, which exists already
-    fabrics : fabrics of the bake by name
-    fitted : whether parameters are fitted; otherwise textures are used unchanged
-    clobber : whether existing files may be overwritten
+    look : the layer, which has been written
+    garments, recipes : what was baked, and the materials that the look has
+    fabrics : those of the bake by their names
+    colorway : name of an asset's variant, "" for the fabrics' names
+    fitted : whether parameters are sought; otherwise textures stand as they are
+    note : gets a line about what the target leaves out
     """
 
     look: Path
+    garments: Sequence[MapSet]
+    recipes: Recipes
     fabrics: Mapping[str, Fabric]
     fitted: bool
     clobber: bool
+    note: Note
+    colorway: str = ""
 
 
 def chosen(wanted: Wanted) -> list[tuple[Target, Path | None]]:

@@ -23,18 +23,17 @@ from fabricusd.files import whole_file
 from fabricusd.materials.bake_folder import BakedLay, MapSet
 from fabricusd.materials.bound_prims import BoundPrim, BoundScene, NewUV
 from fabricusd.materials.networks.graph import Graph, Value
+from fabricusd.materials.targets.flat import SCOPE
 from fabricusd.materials.targets.paths import asset_path
 from fabricusd.materials.targets.write_usd import write_material
 from fabricusd.schema import export, write_binding, write_fabric
 from fabricusd.schema.access import remove_binding
-from fabricusd.schema.names import prim_name
+from fabricusd.schema.names import free_name, prim_name
 from fabricusd.schema.source import usd_errors
 
 VARIANT_SET = "fabricLook"
 VARIANTS = ("baked", "procedural", "off")
 """Textures; the fabric itself, with constants for tools that cannot render it; neither."""
-
-SCOPE = "FabricLooks"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +57,7 @@ def write_baked_look(
         root = UsdGeom.Xform.Define(stage, "/Garment").GetPrim()
         stage.SetDefaultPrim(root)
         Usd.ModelAPI(root).SetKind("component")
+        _name_asset(root, path)
         bound = []
         for one in sets:
             mesh = root.GetPath().AppendChild(prim_name(one.name))
@@ -71,10 +71,9 @@ def write_baked_look(
                     f"has {len(places)} parts; the manifest says {len(one.lays)} lays, bake again",
                 )
             bound += [
-                BoundPrim(path=place, maps=one, lay=k, binds_fabric=False)
-                for k, place in enumerate(places)
+                BoundPrim(path=place, maps=one, lay=k, worn=None) for k, place in enumerate(places)
             ]
-        _bind_materials(stage, path, bound, (), recipes)
+        dress(stage, path, bound, (), recipes)
 
 
 def write_scene_look(
@@ -92,6 +91,7 @@ def write_scene_look(
         for prim in source.GetPseudoRoot().GetAllChildren():
             over = stage.DefinePrim(prim.GetPath())
             over.GetReferences().AddReference(asset_path(scene, path.parent), prim.GetPath())
+            _name_asset(over, path)
             if prim == source.GetDefaultPrim():
                 stage.SetDefaultPrim(over)
         for name in ("startTimeCode", "endTimeCode", "timeCodesPerSecond", "framesPerSecond"):
@@ -100,7 +100,16 @@ def write_scene_look(
         if not stage.HasDefaultPrim():
             first = Sdf.Path(bound.prims[0].path).GetPrefixes()[0]
             stage.SetDefaultPrim(stage.GetPrimAtPath(first))
-        _bind_materials(stage, path, bound.prims, bound.uv, recipes)
+        dress(stage, path, bound.prims, bound.uv, recipes)
+
+
+def _name_asset(root: Usd.Prim, path: Path) -> None:
+    """The look's own name: a garment's would come through the reference."""
+    model = Usd.ModelAPI(root)
+    model.SetAssetIdentifier(f"./{path.name}")
+    model.SetAssetName(path.stem)
+    if model.GetAssetVersion():
+        model.SetAssetVersion("")
 
 
 @contextmanager
@@ -122,7 +131,7 @@ def _new_layer(
         layer.Save()
 
 
-def _bind_materials(
+def dress(
     stage: Usd.Stage, path: Path, bound: Sequence[BoundPrim], uv: Sequence[NewUV], recipes: Recipes
 ) -> None:
     """Write materials and fabrics under each root prim, and the variants that bind them."""
@@ -140,47 +149,126 @@ def _bind_materials(
             with variants.GetVariantEditContext():
                 for one in mine:
                     _fill(stage, name, one, scope, recipes)
-                if name == "baked":
-                    _refer_uv(stage, path, [u for u in uv if Sdf.Path(u.path).HasPrefix(root)])
+                below = [u for u in uv if Sdf.Path(u.path).HasPrefix(root)]
+                # A fabric that the scene binds lies in the UVs that the scene has.
+                moved = {"baked": below, "procedural": [u for u in below if u.fabricless]}
+                _refer_uv(stage, path, moved.get(name, []), uv)
         variants.SetVariantSelection("baked")
+        _put_first(prim, mine, recipes)
+
+
+def _put_first(root: Usd.Prim, bound: Sequence[BoundPrim], recipes: Recipes) -> None:
+    """Order the look's collections on `root` before those of the scene.
+
+    On the prim, not in its variants: USD's text format loses the order of a variant's properties.
+    """
+    api = UsdShade.MaterialBindingAPI(root)
+    names = [
+        api.GetCollectionBindingRel(_collection(recipes[w.maps.name, w.lay, variant].name), purpose)
+        for w in bound
+        if w.outdone
+        for variant in ("baked", "procedural")
+        for purpose in _purposes(w)
+    ]
+    if names:
+        root.SetPropertyOrder(list(dict.fromkeys(one.GetName() for one in names)))
+
+
+def _purposes(one: BoundPrim) -> list[str]:
+    """Those that the look binds for."""
+    return list(dict.fromkeys((UsdShade.Tokens.allPurpose, one.purpose)))
+
+
+def _collection(material: str) -> str:
+    """Name of the collection of all that wears a material of the look."""
+    return f"{VARIANT_SET}_{material}"
 
 
 def _write_looks(
     stage: Usd.Stage, scope: Sdf.Path, bound: Sequence[BoundPrim], recipes: Recipes, folder: Path
 ) -> None:
+    """The materials of `bound` below `scope`; the procedural ones carry their fabrics."""
+    fabrics = scope.AppendChild(free_name("Fabrics", {one.name for one in recipes.values()}))
     for one in bound:
         for variant in ("baked", "procedural"):
             recipe = recipes[one.maps.name, one.lay, variant]
             where = scope.AppendChild(recipe.name)
-            if not stage.GetPrimAtPath(where):
-                write_material(stage, where, list(recipe.graphs), dict(recipe.parameters), folder)
-        fabric = one.maps.lays[one.lay].fabric
-        if fabric is not None and not one.binds_fabric:
-            where = scope.AppendChild(prim_name(fabric.name))
-            if not stage.GetPrimAtPath(where):
-                write_fabric(stage, where, fabric)
+            if stage.GetPrimAtPath(where):
+                continue
+            material = write_material(
+                stage, where, list(recipe.graphs), dict(recipe.parameters), folder
+            )
+            binding = _binding(one)
+            if variant == "procedural" and binding is not None:
+                fabric = _fabric_path(stage, fabrics, one, binding)
+                write_binding(material.GetPrim(), fabric, binding)
+
+
+def _binding(one: BoundPrim) -> Binding | None:
+    """How the fabric lies: as the scene says, or else where the bake laid it."""
+    if one.worn is not None:
+        return one.worn.binding
+    lay = one.maps.lays[one.lay]
+    return None if lay.fabric is None else binding_of(lay)
+
+
+def _fabric_path(stage: Usd.Stage, fabrics: Sdf.Path, one: BoundPrim, binding: Binding) -> Sdf.Path:
+    """The scene's own fabric where the look can name it, or else a copy below `fabrics`."""
+    root = fabrics.GetPrefixes()[0]
+    if one.worn is not None and Sdf.Path(one.worn.fabric).HasPrefix(root):
+        own = stage.GetPrimAtPath(one.worn.fabric)
+        if own and not own.IsInstanceProxy():
+            return own.GetPath()
+    UsdGeom.Scope.Define(stage, fabrics)
+    where = fabrics.AppendChild(prim_name(binding.fabric.name))
+    if not stage.GetPrimAtPath(where):
+        write_fabric(stage, where, binding.fabric)
+    return where
 
 
 def _fill(
     stage: Usd.Stage, variant: str, one: BoundPrim, scope: Sdf.Path, recipes: Recipes
 ) -> None:
-    """Write one prim in one variant; `off` is the garment as tools show it without fabrics."""
+    """One prim in one variant: `off` is the garment as any tool shows it without fabrics."""
     prim = stage.OverridePrim(one.path)
-    lay = one.maps.lays[one.lay]
-    if variant == "procedural":
-        if not one.binds_fabric and lay.fabric is not None:
-            write_binding(prim, scope.AppendChild(prim_name(lay.fabric.name)), binding_of(lay))
-    elif one.binds_fabric:
-        remove_binding(prim)
-        prim.CreateRelationship("fabric:binding", custom=False).SetTargets([])
+    worn = one.worn
+    if worn is not None and (variant == "off" or (variant, worn.owner) == ("baked", one.path)):
+        _take_off(stage, worn.owner, Sdf.Path(one.path).GetPrefixes()[0])
     if variant != "off":
         recipe = recipes[one.maps.name, one.lay, variant]
-        UsdShade.MaterialBindingAPI.Apply(prim).Bind(
-            UsdShade.Material(stage.GetPrimAtPath(scope.AppendChild(recipe.name))),
-            UsdShade.Tokens.strongerThanDescendants
-            if one.forced
-            else UsdShade.Tokens.fallbackStrength,
-        )
+        material = UsdShade.Material(stage.GetPrimAtPath(scope.AppendChild(recipe.name)))
+        for purpose in _purposes(one):
+            _bind(stage, prim, material, one, purpose)
+
+
+def _take_off(stage: Usd.Stage, owner: str, root: Sdf.Path) -> None:
+    """Empty a prim's `fabric:binding`. What an instance holds, or another root, keeps it."""
+    prim = stage.GetPrimAtPath(owner)
+    if not prim or not prim.GetPath().HasPrefix(root) or prim.IsInstanceProxy():
+        return
+    remove_binding(prim)
+    prim.CreateRelationship("fabric:binding", custom=False).SetTargets([])
+
+
+def _bind(
+    stage: Usd.Stage, prim: Usd.Prim, material: UsdShade.Material, one: BoundPrim, purpose: str
+) -> None:
+    """Bind a material to a one: directly, or where that is outdone in a collection at the root.
+
+    No binding is stronger than one at the root that is stronger than all below; of several
+    collections there, the first counts.
+    """
+    strong = UsdShade.Tokens.strongerThanDescendants
+    if not one.outdone:
+        strength = strong if one.forced else UsdShade.Tokens.fallbackStrength
+        UsdShade.MaterialBindingAPI.Apply(prim).Bind(material, strength, purpose)
+        return
+    root = stage.GetPrimAtPath(prim.GetPath().GetPrefixes()[0])
+    name = _collection(material.GetPath().name)
+    collection = Usd.CollectionAPI.Apply(root, name)
+    collection.IncludePath(prim.GetPath())
+    api = UsdShade.MaterialBindingAPI.Apply(root)
+    api.Bind(collection, material, name, strong, purpose)
 
 
 def binding_of(lay: BakedLay) -> Binding:
@@ -218,7 +306,9 @@ def _uv_prim(number: int) -> str:
     return f"/UV{number}"
 
 
-def _refer_uv(stage: Usd.Stage, path: Path, uv: Sequence[NewUV]) -> None:
-    for number, one in enumerate(uv):
-        prim = stage.OverridePrim(one.path)
-        prim.GetReferences().AddReference(f"./{path.stem}.uv.usdc", _uv_prim(number))
+def _refer_uv(stage: Usd.Stage, path: Path, uv: Sequence[NewUV], written: Sequence[NewUV]) -> None:
+    """Refer the meshes of `uv` to their UVs; `written` : those of the layer, in its order."""
+    for number, one in enumerate(written):
+        if any(one is mine for mine in uv):
+            prim = stage.OverridePrim(one.path)
+            prim.GetReferences().AddReference(f"./{path.stem}.uv.usdc", _uv_prim(number))

@@ -10,6 +10,12 @@ from pxr import Sdf, Usd, UsdShade
 from fabricusd.materials.networks.graph import Graph, Link, Parameter, Source, Texture, Value
 from fabricusd.materials.targets.paths import asset_path
 
+MTLX_VERSION = "1.39"
+"""Of MaterialX's node definitions that the networks name."""
+
+_LINEAR, _RAW = "lin_rec709_scene", "raw"
+"""USD's names of colour spaces; MaterialX's for the first is without the ending."""
+
 _TYPES = {
     "float": Sdf.ValueTypeNames.Float,
     "color3": Sdf.ValueTypeNames.Color3f,
@@ -48,6 +54,12 @@ def write_material(
     layer_folder : folder of the layer, which texture paths are relative to
     """
     material = UsdShade.Material.Define(stage, path)
+    if any(graph.context == "mtlx" for _, graph in graphs):
+        # By name: USD without MaterialX does not know the schema.
+        material.GetPrim().AddAppliedSchema("MaterialXConfigAPI")
+        material.GetPrim().CreateAttribute(
+            "config:mtlx:version", Sdf.ValueTypeNames.String, custom=False
+        ).Set(MTLX_VERSION)
     for name, value in parameters.items():
         _set(material.CreateInput(name, _TYPES[value.kind]), value)
     for prefix, graph in graphs:
@@ -74,7 +86,7 @@ def _write_graph(
             elif isinstance(source, Parameter):
                 given.ConnectToSource(material.GetInput(source.name))
             else:
-                _set(given, source, folder)
+                _set(given, source, folder, graph.context)
     surface = shaders[graph.terminal].CreateOutput(graph.output, Sdf.ValueTypeNames.Token)
     material.CreateSurfaceOutput(graph.context).ConnectToSource(surface)
 
@@ -98,11 +110,13 @@ def _output_type(graph: Graph, link: Link) -> Any:
     return _TYPES[node.kind] if node.kind else _PREVIEW_TYPES[link.output]
 
 
-def _set(given: UsdShade.Input, source: Value | Texture, folder: Path | None = None) -> None:
+def _set(
+    given: UsdShade.Input, source: Value | Texture, folder: Path | None = None, context: str = ""
+) -> None:
     if isinstance(source, Texture):
         assert folder is not None
         given.Set(Sdf.AssetPath(asset_path(source.path, folder)))
-        if source.color:
-            given.GetAttr().SetColorSpace("lin_rec709")
+        linear = _LINEAR.removesuffix("_scene") if context == "mtlx" else _LINEAR
+        given.GetAttr().SetColorSpace(linear if source.color else _RAW)
     else:
         given.Set(source.value)

@@ -1,4 +1,4 @@
-"""Files that a stage names, also those inside a .usdz package."""
+"""Opens the files that a stage names, including those inside a .usdz package."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ from fabricusd.errors import FabricError
 
 @contextmanager
 def asset_file(asset: Sdf.AssetPath) -> Iterator[str]:
-    """Yield the name of a file that holds `asset`; what is in a package lies there meanwhile.
+    """Yield the name of a file that holds `asset`.
 
-    Raises `FabricError` where there is none, and names the asset in what the block raises.
+    An asset inside a package is copied to a temporary file, which lives as long as the block.
+    Raises `FabricError` where there is no such file; a `FabricError` of the block then names the
+    asset.
     """
     path = str(asset.resolvedPath or asset.path)
     if not path:

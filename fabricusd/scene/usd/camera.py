@@ -1,4 +1,4 @@
-"""UsdGeomCamera prims as cameras."""
+"""Reads UsdGeomCamera prims as cameras."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from fabricusd.scene.scene import Camera, Scene
 from fabricusd.scene.usd.value import value_of
 
 _WIDEST = 1e4
-"""Apertures, and offsets of one, over the focal length that are rendered: an angle of 179.99
-degrees. Far beyond it a ray's direction is no 32-bit number."""
+"""Largest ratio of an aperture, or of its offset, to the focal length: an angle of 179.99 degrees.
+Far beyond it a 32-bit number cannot hold a ray's direction."""
 
 _FARTHEST = 1e9
-"""Metres that a length may have: beyond it squares leave the range of 32-bit numbers."""
+"""Largest length [m]: the squares of longer ones leave the range of 32-bit numbers."""
 
 _MOST_STOPS = 64.0
-"""Stops of exposure, up or down, that are believed."""
+"""Largest exposure in stops, up or down; beyond it the camera is rendered without exposure."""
 
 
 def read_camera(prim: Usd.Prim, time: Usd.TimeCode, metres: float, scene: Scene) -> Camera | None:
-    """The camera of a prim, or None with a note where it sees nothing.
+    """The camera of a prim; None, with a note, where the camera sees nothing.
 
     metres : in one scene unit; a camera's lengths on film are in tenths of a scene unit
     """
@@ -80,9 +80,9 @@ def read_camera(prim: Usd.Prim, time: Usd.TimeCode, metres: float, scene: Scene)
 
 
 def _length_problem(lengths: dict[str, float], film: float, orthographic: bool) -> str:
-    """Why nothing can be seen by such lengths on film, or an empty string.
+    """Why a camera with these lengths sees nothing, or an empty string.
 
-    film : metres in their unit
+    film : metres in one unit of the lengths
     """
     for name, length in lengths.items():
         if not (math.isfinite(length) and 0 < length * film <= _FARTHEST):
@@ -124,8 +124,11 @@ def _frame_problem(frame: np.ndarray[Any, Any], matrix: np.ndarray[Any, Any]) ->
 
 
 def _frame(matrix: Gf.Matrix4d, metres: float) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """(4, 4) orthonormal axes and position [m]; as in other viewers scale and shear are left out,
-    and a mirrored camera does not mirror what it sees."""
+    """(4, 4) orthonormal axes and position [m].
+
+    As in other viewers, scale and shear are left out, and a mirrored camera does not mirror what it
+    sees.
+    """
     frustum = Gf.Frustum()
     frustum.SetPositionAndRotationFromMatrix(matrix)
     frame = np.array(frustum.ComputeViewInverse(), np.float64).T
@@ -141,7 +144,7 @@ def _lens(
     orthographic: bool,
     scene: Scene,
 ) -> tuple[float, float]:
-    """(f-stop, focus distance [m]); (0, 0), which is sharp, with a note where they make no lens."""
+    """(f-stop, focus distance [m]); (0, 0), which is sharp, with a note where they are no lens."""
     f_stop = float(value_of(camera.GetFStopAttr(), time, scene))
     focus = float(value_of(camera.GetFocusDistanceAttr(), time, scene)) * metres
     if orthographic or f_stop == 0:
@@ -160,7 +163,7 @@ def _lens(
 
 
 def _vertical(length: float) -> float:
-    """An aperture's height [m], which no picture depends on: its own format is what counts."""
+    """An aperture's height [m]. No picture depends on it: the picture's own format counts."""
     return length if 0 < length <= _FARTHEST else 0.0
 
 

@@ -1,7 +1,7 @@
-"""Instances: what a point instancer places, and how much all instances come to.
+"""Instances: what a point instancer places, and how many triangles all instances have together.
 
-They are counted before any is placed, and each prototype once: a thousand billion triangles may be
-a product of small numbers.
+Instances are counted before any is placed, and each prototype is counted once: small numbers may
+multiply to a thousand billion triangles.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from fabricusd.scene.scene import Scene
 from fabricusd.scene.usd.value import array_of, type_problem, value_of
 
 MOST_COPIES = 100_000
-"""Instances that a scene may have, those inside others too: some minutes of reading."""
+"""Most instances in a scene, including those inside others: reading takes some minutes."""
 
 _MOST_NAMED = 10 * MOST_COPIES
-"""Instances of one instancer above which nobody asks which of them are hidden."""
+"""Instances of one instancer above which hidden ones are not looked for."""
 
 MOST_TRIANGLES = 10_000_000
-"""Triangles that a scene's instances may have together: some 8 GB when rendered."""
+"""Most triangles of all instances together: some 8 GB when rendered."""
 
 OF_PROTOTYPES = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
-"""Prototypes often lie below an `over`, where nothing else would be seen."""
+"""Which prims of a prototype are read: it often lies below an `over`, whose prims are undefined."""
 
 _PER_INSTANCE = (
     "positions", "orientations", "orientationsf", "scales", "velocities", "accelerations",
     "angularVelocities", "ids",
 )  # fmt: skip
-"""Arrays of a point instancer that have one value an instance, or none."""
+"""Arrays of a point instancer that hold one value for each instance, or are empty."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Count:
-    """Instances and triangles; infinite where instances hold themselves."""
+    """Numbers of instances and triangles; infinite where an instance contains itself."""
 
     copies: float = 0
     triangles: float = 0
@@ -47,14 +47,14 @@ class Count:
         return Count(copies=self.copies + other.copies, triangles=self.triangles + other.triangles)
 
     def times(self, number: int) -> Count:
-        """As many in `number` copies, each of which is an instance too."""
+        """The count of `number` copies, each of which is an instance as well."""
         if not number:
             return Count()
         return Count(copies=number * (1 + self.copies), triangles=number * self.triangles)
 
     @property
     def too_many(self) -> str:
-        """What is above its bound, in words; an empty string where nothing is."""
+        """Which count exceeds its bound, in words; an empty string where none does."""
         if self.copies > MOST_COPIES:
             return f"{_told(self.copies)} instances; at most {MOST_COPIES} are placed"
         if self.triangles > MOST_TRIANGLES:
@@ -68,7 +68,7 @@ def _told(number: float) -> str:
 
 
 class Copies:
-    """Counts of prims with all that they instance."""
+    """Counts prims together with everything that they instance."""
 
     def __init__(self, stage: Usd.Stage, time: Usd.TimeCode, scene: Scene) -> None:
         self.stage, self.time, self.scene = stage, time, scene
@@ -76,7 +76,7 @@ class Copies:
         self._open: set[Sdf.Path] = set()
 
     def below(self, root: Usd.Prim) -> Count:
-        """What lies below `root` and itself, an instance's prototype or an instancer's."""
+        """The count of `root` and all below it, the prototype of an instance or of an instancer."""
         if root.IsInstanceProxy():
             root = root.GetPrimInPrototype()
         if root.IsInstance():
@@ -106,7 +106,7 @@ class Copies:
         return total
 
     def of_instancer(self, instancer: UsdGeom.PointInstancer) -> Count:
-        """All that a point instancer places, without those that its mask hides."""
+        """The count of all that a point instancer places, without what its mask hides."""
         named = value_of(instancer.GetProtoIndicesAttr(), self.time, self.scene)
         targets = instancer.GetPrototypesRel().GetForwardedTargets()
         if not named or not targets or array_problem(instancer, self.time):
@@ -123,8 +123,7 @@ class Copies:
         return total
 
     def _mesh(self, mesh: UsdGeom.Mesh) -> Count:
-        """Its faces as triangles, before they are refined; what is wrong with them is noted where
-        they are read."""
+        """The count of a mesh's triangles before refinement; faults are noted when it is read."""
         arrays = []
         for attribute in (mesh.GetFaceVertexIndicesAttr(), mesh.GetFaceVertexCountsAttr()):
             value = attribute.Get(self.time)
@@ -133,13 +132,13 @@ class Copies:
 
 
 def is_invisible(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
-    """Whether a prim hides itself and all below it."""
+    """Whether a prim hides itself and all prims below it."""
     imageable = UsdGeom.Imageable(prim)
     return bool(imageable) and (imageable.GetVisibilityAttr().Get(time) == UsdGeom.Tokens.invisible)
 
 
 def array_problem(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode) -> str:
-    """Why a point instancer's arrays cannot be used together; an empty string where they can."""
+    """Why a point instancer's arrays do not fit together; an empty string where they do."""
     prim = instancer.GetPrim()
     count = len(instancer.GetProtoIndicesAttr().Get(time))
     for name in _PER_INSTANCE:
@@ -149,7 +148,7 @@ def array_problem(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode) -> str:
         if wrong:
             return f"has an array of a wrong type: {name} {wrong}"
         length = 0 if value is None else len(value)
-        # USD would read on behind the end of an array that is too short.
+        # USD would read past the end of an array that is too short.
         if length != count and (length or name == "positions"):
             return f"has arrays of different lengths, {count} protoIndices and {length} {name}"
     return ""
@@ -158,7 +157,7 @@ def array_problem(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode) -> str:
 def shown_instances(
     instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, count: int
 ) -> NDArray[np.int64]:
-    """Numbers of the instances that are neither invisible nor inactive."""
+    """Indices of the instances that are neither invisible nor inactive."""
     mask = instancer.ComputeMaskAtTime(time)
     if not mask or len(mask) != count:
         return np.arange(count)
@@ -168,8 +167,11 @@ def shown_instances(
 def placed(
     prim: Usd.Prim, time: Usd.TimeCode, scene: Scene
 ) -> list[tuple[Usd.Prim, NDArray[np.float64]]]:
-    """(prototype, (4, 4) from where the prototype's parent would be to the instancer's space) of
-    each instance that is seen; none, with a note, where the instancer makes no sense."""
+    """(prototype, matrix) of each visible instance; none, with a note, where the instancer makes no
+    sense.
+
+    The (4, 4) matrix leads from the space of the prototype's parent to that of the instancer.
+    """
     where = str(prim.GetPath())
     instancer = UsdGeom.PointInstancer(prim)
     indices = array_of(instancer.GetProtoIndicesAttr(), time, scene, np.int64)
@@ -195,15 +197,15 @@ def placed(
         root = roots[number] if 0 <= number < len(roots) else None
         place = as_matrix(moves[k])
         if not root or root.IsAbstract():
-            scene.note(where, f"names prototype {number}, which is no prim to be seen")
+            scene.note(where, f"names prototype {number}, which is not a prim that can be seen")
         elif not np.isfinite(place).all():
             scene.note(where, "has instances whose place is not finite, left out")
         else:
-            # The prototype keeps its own transform, not those of its parents.
+            # A prototype keeps its own transform, but not those of its parents.
             found.append((root, place))
     return found
 
 
 def as_matrix(matrix: Any) -> NDArray[np.float64]:
-    """A Gf matrix, which multiplies rows from the left, as one for columns."""
+    """A Gf matrix, which transforms row vectors, as a NumPy matrix for column vectors."""
     return np.array(matrix, np.float64).T

@@ -1,5 +1,8 @@
-"""UsdLux prims as lights. Radiance follows the schema: intensity times 2^exposure times colour,
-times the colour of a black body where asked for, over the light's area where it is normalised."""
+"""Reads UsdLux prims as lights.
+
+Radiance follows the schema: intensity times 2^exposure times colour; times the colour of a black
+body where the light asks for one; divided by the light's area where the light is normalised.
+"""
 
 from __future__ import annotations
 
@@ -20,28 +23,28 @@ from fabricusd.scene.usd.value import value_of
 _NUMBERS = {name: number for number, kind in enumerate(KINDS) for name in kind.usd}
 
 _SMALLEST = 1e-3
-"""Scene units that a normalised light without extent gets: it has power, and needs a surface."""
+"""Size, in scene units, of a normalised light without extent: it has power and needs a surface."""
 
 _BRIGHTEST = 1e16
-"""Radiance whose square, in a picture's variance, is a 32-bit number."""
+"""Largest radiance: a picture's variance holds its square as a 32-bit number."""
 
 _FARTHEST = 1e15
-"""Metres beyond which a light's area is no 32-bit number."""
+"""Metres beyond which a 32-bit number cannot hold a light's area."""
 
 _NOTHING = 1e-30
-"""Square scene units below which a light has no surface."""
+"""Area [square scene units] below which a light counts as having no surface."""
 
 _UNEVEN = 1e-3
-"""Relative difference of scales from which a sphere is no sphere any more."""
+"""Relative difference of scales above which a sphere is no longer round."""
 
 
 def is_light(prim: Usd.Prim) -> bool:
-    """Whether a prim, mesh or not, claims to shine."""
+    """Whether a prim, mesh or not, is a light."""
     return bool(prim.HasAPI(UsdLux.LightAPI)) or prim.GetTypeName().endswith("Light")
 
 
 class _Inputs:
-    """A light's inputs, by the names of today or those before USD 21.02, which had no prefix."""
+    """A light's inputs by their names, with or without the prefix that USD 21.02 introduced."""
 
     def __init__(self, prim: Usd.Prim, time: Usd.TimeCode, scene: Scene) -> None:
         self.prim, self.time, self.scene = prim, time, scene
@@ -56,7 +59,7 @@ class _Inputs:
         return otherwise if given is None else given
 
     def numbers(self, name: str, otherwise: tuple[float, ...]) -> NDArray[np.float64]:
-        """As many numbers as `otherwise`, which is taken, with a note, for what are none."""
+        """As many numbers as `otherwise` has; `otherwise`, with a note, for another value."""
         given = self.get(name, otherwise if len(otherwise) > 1 else otherwise[0])
         try:
             values = np.array(given, np.float64).reshape(-1)
@@ -71,7 +74,7 @@ class _Inputs:
         return float(self.numbers(name, (otherwise,))[0])
 
     def file(self, name: str) -> Sdf.AssetPath | None:
-        """The file that is named there, or None where none is."""
+        """The file that the input names, or None."""
         asset = self.get(name, None)
         return asset if isinstance(asset, Sdf.AssetPath) and asset.path else None
 
@@ -86,7 +89,7 @@ def read_light(
     metres: float,
     scene: Scene,
 ) -> Light | None:
-    """The light of a prim, or None with a note where it cannot be rendered.
+    """The light of a prim; None, with a note, where it cannot be rendered.
 
     matrix : (4, 4) local to world, in scene units of `metres`
     """
@@ -106,7 +109,7 @@ def read_light(
         return None
     size = _size(kind, matrix, lengths, angle)
     if size < _NOTHING:
-        inputs.note("is scaled to nothing, left out")
+        inputs.note("has a scale of 0, left out")
         return None
     if normalize:
         radiance = radiance / size
@@ -136,7 +139,7 @@ def read_light(
 
 
 def _radiance(inputs: _Inputs) -> NDArray[np.float64] | None:
-    """(3,) emission before it is normalised, or None with a note where it is no light."""
+    """(3,) emission before normalisation; None, with a note, where it is not finite."""
     color = inputs.numbers("color", (1.0, 1.0, 1.0))
     if inputs.get("enableColorTemperature", False):
         color = color * _of_black_body(inputs)
@@ -152,10 +155,10 @@ def _radiance(inputs: _Inputs) -> NDArray[np.float64] | None:
 
 
 def _of_black_body(inputs: _Inputs) -> NDArray[np.float64]:
-    """(3,) colour of the light's temperature, which UsdLux knows from 1000 to 10000 K."""
+    """(3,) colour of the light's temperature; UsdLux defines it from 1000 to 10000 K."""
     given = inputs.number("colorTemperature", 6500.0)
     if math.isnan(given):
-        # USD's own function would end the process.
+        # USD's own function would abort the process.
         return np.full(3, math.nan)
     kelvin = min(max(given, 1000.0), 10000.0)
     if kelvin != given:
@@ -164,7 +167,7 @@ def _of_black_body(inputs: _Inputs) -> NDArray[np.float64]:
 
 
 def _lengths(inputs: _Inputs, kind: int, normalize: bool) -> dict[str, float] | None:
-    """The light's lengths by their names, or None with a note where they make no light."""
+    """The light's lengths by name; None, with a note, where one is not positive."""
     found = {}
     for name, otherwise in KINDS[kind].lengths.items():
         length = inputs.number(name, otherwise)
@@ -176,7 +179,7 @@ def _lengths(inputs: _Inputs, kind: int, normalize: bool) -> dict[str, float] | 
 
 
 def _note_left_out(inputs: _Inputs, kind: int, matrix: NDArray[np.float64]) -> None:
-    """What a light asks for that is not rendered, one line each."""
+    """Note, in one line each, what a light asks for and is not rendered."""
     for name in ("diffuse", "specular"):
         share = inputs.number(name, 1.0)
         if share != 1:
@@ -207,7 +210,7 @@ def _is_shaped(inputs: _Inputs) -> bool:
 
 
 def _is_linked(prim: Usd.Prim, name: str) -> bool:
-    """Whether a light's collection is anything else than the whole stage."""
+    """Whether a light's collection is anything but the whole stage."""
     if not prim.HasAPI(Usd.CollectionAPI, name):
         return False
     collection = Usd.CollectionAPI(prim, name)
@@ -219,20 +222,20 @@ def _is_linked(prim: Usd.Prim, name: str) -> bool:
 
 
 def _reach(frame: NDArray[np.float64], lengths: dict[str, float], metres: float) -> float:
-    """The farthest that anything of a light may be from the origin [m], or more."""
+    """An upper bound of the distance from the origin to any point of a light [m]."""
     extent = float(np.abs(frame[:3, :3]).max()) * max(lengths.values()) * metres
     return float(np.abs(frame[:3, 3]).max()) + extent
 
 
 def _size(kind: int, matrix: NDArray[np.float64], lengths: dict[str, float], angle: float) -> float:
-    """What `normalize` divides by."""
+    """The size that `normalize` divides the radiance by."""
     x, y, z = (float(np.linalg.norm(matrix[:3, k])) for k in range(3))
     flat = float(np.linalg.norm(np.cross(matrix[:3, 0], matrix[:3, 1])))
     return KINDS[kind].size(Size(x, y, z, flat, lengths, angle))
 
 
 def _pole(inputs: _Inputs, frame: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A dome's frame with its pole along +y: DomeLight_1 may have it along the stage's axis."""
+    """A dome's frame, turned so that its pole is +y; a DomeLight_1 may name another pole."""
     axis = inputs.prim.GetAttribute("poleAxis")
     pole = axis.Get() if axis else None
     if pole == "scene":
@@ -245,7 +248,7 @@ def _pole(inputs: _Inputs, frame: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _picture(inputs: _Inputs) -> NDArray[np.float32] | None:
-    """A dome's picture (h, w, 3), or None and a constant dome."""
+    """A dome's picture (h, w, 3); None for a dome of constant radiance."""
     asset = inputs.file("texture:file")
     if asset is None:
         return None
@@ -261,7 +264,7 @@ def _picture(inputs: _Inputs) -> NDArray[np.float32] | None:
         return None
     finite = np.isfinite(picture)
     if not finite.all():
-        # A sun beyond the largest half float is infinite in the file: it stays the brightest.
+        # A sun brighter than the largest half float is infinite in the file; it stays brightest.
         brightest = float(picture[finite].max(initial=0.0))
         inputs.note(
             f"has {int((~finite).sum())} values that are not finite; infinity is taken as "

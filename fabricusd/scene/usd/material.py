@@ -1,4 +1,4 @@
-"""Which surface a face has: a fabric by WovenBindingAPI, a UsdPreviewSurface, or a grey."""
+"""Finds the surface of a face: a fabric, a UsdPreviewSurface, or grey."""
 
 from __future__ import annotations
 
@@ -6,24 +6,25 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pxr import Usd, UsdGeom, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
 from fabricusd.scene.scene import FabricSurface, PreviewSurface, Scene
 from fabricusd.scene.usd.preview_network import PreviewNetwork
 from fabricusd.scene.usd.value import value_of
+from fabricusd.scene.usd.worn import Bound, bound
 from fabricusd.schema import read_binding
 from fabricusd.schema.access import applies_binding, targets
-
-_PURPOSES = (UsdShade.Tokens.full, UsdShade.Tokens.preview)
-"""Material purposes in the order in which they are looked for; each falls back on bindings without
-a purpose."""
 
 
 @dataclass(frozen=True)
 class Resolved:
-    """A material's number in the scene, the UV set that it asks for ("" for any), and what for."""
+    """A material of the scene.
+
+    index : in `Scene.materials`
+    uv_set : that the material asks for, "" for any
+    """
 
     index: int
     uv_set: str
@@ -34,64 +35,73 @@ class Resolved:
 class Materials:
     """The scene's materials, each made once.
 
-    binding : the fabric for what has no material of its own, or None
+    binding : the fabric of meshes that have no material of their own, or None
     """
 
     def __init__(self, scene: Scene, binding: Binding | None, time: Usd.TimeCode) -> None:
         self.scene, self.binding, self.time = scene, binding, time
         self._known: dict[Any, Resolved] = {}
+        self._fabrics: dict[Sdf.Path, Resolved | None] = {}
 
     def of(self, prim: Usd.Prim) -> Resolved | None:
-        """The surface of a mesh or subset, None where it says nothing about it."""
-        fabric = self._bound_fabric(prim)
-        if fabric is not None:
-            return fabric
-        material, relationship = self._bound_material(prim)
-        if not material:
+        """The surface of a mesh or subset; None for a subset without one of its own, and for a mesh
+        without any.
+
+        The material's own surface shows where its fabric cannot be read.
+        """
+        found = bound(prim)
+        whole = bound(prim.GetParent()) if prim.IsA(UsdGeom.Subset) else None
+        if whole is not None and found.place == whole.place:
+            # The subset has no binding of its own.
             return None
-        if prim.IsA(UsdGeom.Subset) and relationship == self._bound_material(prim.GetParent())[1]:
-            # The mesh's own, which goes behind a fabric that the mesh wears.
+        self._note_what_is_left_out(prim, found)
+        for source in found.fabrics:
+            fabric = self._fabric_of(source)
+            if fabric is not None:
+                return fabric
+        if whole is not None and found.owner is not None and found.is_bound_as(whole):
+            # Its fabric cannot be read: the mesh's is nearer to it than the mesh's material.
             return None
-        path = material.GetPath()
+        if found.material is None:
+            # A subset that takes the mesh's fabric off.
+            return None if whole is None or found.owner is not None else self.fallback(prim)
+        path = found.material.GetPath()
         if path not in self._known:
-            surface, uv_set = PreviewNetwork(material, self.time, self.scene).read()
+            surface, uv_set = PreviewNetwork(found.material, self.time, self.scene).read()
             self._known[path] = self._add(surface, uv_set)
         return self._known[path]
 
-    def _bound_fabric(self, prim: Usd.Prim) -> Resolved | None:
-        where = str(prim.GetPath())
-        if not applies_binding(prim):
-            if targets(prim, "fabric:binding"):
+    def _note_what_is_left_out(self, prim: Usd.Prim, found: Bound) -> None:
+        """One line for each binding of `prim`, or of one above it, that binds nothing."""
+        for owner in (prim, *_ancestors(prim)):
+            where = str(owner.GetPath())
+            if targets(owner, "fabric:binding") and not applies_binding(owner):
                 self.scene.note(
                     where, "has fabric:binding but not WovenBindingAPI applied, left out"
                 )
-            return None
-        try:
-            return self._fabric(read_binding(prim, lambda line: self.scene.note(where, line)))
-        except (FabricError, IndexError) as error:
-            words = str(error) if isinstance(error, FabricError) else "names no fabric"
-            line = words if words.startswith(where) else f"{where} {words}"
-            self.scene.note(line, "- rendered without a fabric")
-            return None
-
-    def _bound_material(self, prim: Usd.Prim) -> tuple[UsdShade.Material, Usd.Relationship]:
-        """The material that USD binds to `prim`, and by which relationship; none is noted where
-        one is named that is not there."""
-        api = UsdShade.MaterialBindingAPI(prim)
-        for purpose in _PURPOSES:
-            material, relationship = api.ComputeBoundMaterial(purpose)
-            if material:
-                return material, relationship
-        for owner in (prim, *_ancestors(prim)):
             path = UsdShade.MaterialBindingAPI(owner).GetDirectBinding().GetMaterialPath()
-            if path and not path.isEmpty:
-                self.scene.note(
-                    str(owner.GetPath()), f"is bound to {path}, which is no material, left out"
-                )
-        return material, relationship
+            if found.material is None and path and not path.isEmpty:
+                self.scene.note(where, f"is bound to {path}, which is not a material; left out")
+
+    def _fabric_of(self, source: Usd.Prim) -> Resolved | None:
+        """The fabric that `source` names, None with a note where it cannot be read."""
+        # Instances share what their prototype holds.
+        own = source.GetPrimInPrototype() if source.IsInstanceProxy() else source
+        key = own.GetPath()
+        if key not in self._fabrics:
+            where = str(source.GetPath())
+            try:
+                binding = read_binding(source, lambda line: self.scene.note(where, line))
+                self._fabrics[key] = self._fabric(binding)
+            except FabricError as error:
+                words = str(error)
+                line = words if words.startswith(where) else f"{where} {words}"
+                self.scene.note(line, "- rendered without a fabric")
+                self._fabrics[key] = None
+        return self._fabrics[key]
 
     def fallback(self, prim: Usd.Prim) -> Resolved:
-        """The surface of a mesh that has none: the given fabric, its display colour, or grey."""
+        """The surface of an unbound mesh: the given fabric, its display colour, or grey."""
         if self.binding is not None:
             return self._fabric(self.binding)
         color = self._display(prim, "displayColor", 3)
@@ -108,7 +118,7 @@ class Materials:
         return self._known[key]
 
     def _display(self, prim: Usd.Prim, name: str, count: int) -> tuple[float, ...] | None:
-        """The mean of a display primvar of `count` channels; None where it has no usable value."""
+        """The mean of a display primvar of `count` channels; None where no value can be used."""
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
         given = None
         if primvar and primvar.HasValue():
@@ -131,7 +141,7 @@ class Materials:
         return tuple(float(x) for x in np.maximum(sound.mean(axis=0), 0.0))
 
     def without_uv(self) -> Resolved:
-        """The surface where a fabric cannot lie, since there are no UVs."""
+        """The surface of faces that wear a fabric but have no UVs."""
         if "no uv" not in self._known:
             self._known["no uv"] = self._add(PreviewSurface(name="no UVs", roughness=0.6), "")
         return self._known["no uv"]
@@ -155,7 +165,7 @@ class Materials:
 
 
 def _ancestors(prim: Usd.Prim) -> list[Usd.Prim]:
-    """Parents of a prim, the nearest first, without the pseudo-root."""
+    """The prims above a prim, the nearest first, without the pseudo-root."""
     found = []
     parent = prim.GetParent()
     while parent and not parent.IsPseudoRoot():

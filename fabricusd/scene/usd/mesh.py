@@ -1,4 +1,4 @@
-"""A UsdGeomMesh as triangles: n-gons, subsets, orientation, normals, UVs of every interpolation."""
+"""Reads a UsdGeomMesh as triangles: n-gons, subsets, orientation, normals, UVs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from fabricusd.scene.usd.value import array_of, value_of
 from fabricusd.schema.access import applies_binding
 
 MOST_TRIANGLES = 4_000_000
-"""Triangles that a scene's surfaces are refined to, together: some 3 GB with all that is done."""
+"""Most triangles that all surfaces of a scene are refined to: some 3 GB of memory."""
 
 _OF_UVS = (
     Sdf.ValueTypeNames.TexCoord2fArray,
@@ -34,19 +34,20 @@ _OF_UVS = (
     Sdf.ValueTypeNames.TexCoord2hArray,
     Sdf.ValueTypeNames.Float2Array,
 )
-"""Types of primvars that are taken for UVs whatever their name."""
+"""Types of primvars that are taken as UVs whatever their name is."""
 
 _FARTHEST = 1e9
-"""Metres from the origin: beyond it squares of areas leave the range of 32-bit numbers."""
+"""Largest distance from the origin [m]: beyond it squares of areas leave the range of 32-bit
+numbers."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Placed:
-    """A mesh's prim, and where it stands.
+    """A mesh's prim and its place in the world.
 
-    matrix : (4, 4) from its points to the world, in scene units
-    mirrored : whether the prim's own transform mirrors it
-    pose : its points as a skeleton leaves them; None for those of the prim
+    matrix : (4, 4) from the mesh's points to the world, in scene units
+    mirrored : whether the prim's own transform mirrors the mesh
+    pose : the points that a skeleton has moved; None where the prim's own points count
     """
 
     prim: Usd.Prim
@@ -56,7 +57,7 @@ class Placed:
 
 
 def is_mirrored(matrix: NDArray[np.float64]) -> bool:
-    """Whether a (4, 4) transform turns right hands into left ones."""
+    """Whether a (4, 4) transform changes the handedness."""
     return bool(np.linalg.det(matrix[:3, :3]) < 0)
 
 
@@ -68,7 +69,7 @@ def read_mesh(
     scene: Scene,
     fineness: Fineness,
 ) -> Mesh | None:
-    """The mesh in world space and metres, or None with a note where it has no usable faces.
+    """The mesh in world space and metres; None, with a note, where it has no usable faces.
 
     metres : in one scene unit
     """
@@ -83,7 +84,9 @@ def read_mesh(
         scene.note(where, f"{problem}, left out")
         return None
     if (counts < 3).any():
-        scene.note(where, f"has {int((counts < 3).sum())} faces below three corners, left out")
+        scene.note(
+            where, f"has {int((counts < 3).sum())} faces with fewer than three corners, left out"
+        )
     points = _near(points, matrix, metres, where, scene)
     scheme = str(value_of(mesh.GetSubdivisionSchemeAttr(), time, scene) or "none")
     level = None
@@ -91,7 +94,7 @@ def read_mesh(
         world = (points @ matrix[:3, :3].T + matrix[:3, 3]) * metres
         level = fineness.level(world, counts, indices)
         if scheme == "catmullClark" and fineness.is_auto and not level:
-            # Its cage is as good.
+            # No edge would be halved: the cage is as good.
             level = None
     cut = _tessellate(mesh, time, points, counts, indices, scene, level, mirrored=mirrored)
     resolved, which = _materials(prim, mesh, materials, len(counts), time, scene)
@@ -104,7 +107,7 @@ def read_mesh(
         _authored_normals(placed, mesh, cut, time, scene) if scheme == "none" else cut.normals
     )
     if normals is not None:
-        # Normals turn by the inverse transpose; rows here are normals.
+        # Normals transform by the inverse transpose; here they are rows.
         turn = np.linalg.pinv(matrix[:3, :3]).astype(np.float32)
         normals = np.asarray(normals, np.float32) @ turn
     return Mesh(
@@ -125,7 +128,7 @@ def _near(
     where: str,
     scene: Scene,
 ) -> NDArray[np.float64]:
-    """The points, NaN where they lie beyond what can be traced, which is noted."""
+    """The points, with NaN, and a note, for those that lie too far away to be traced."""
     world = (points @ matrix[:3, :3].T + matrix[:3, 3]) * metres
     beyond = (np.abs(world) > _FARTHEST).any(axis=1)
     far = np.asarray(np.isfinite(world).all(axis=1) & beyond)
@@ -146,7 +149,7 @@ def _tessellate(
     *,
     mirrored: bool,
 ) -> Tessellation:
-    """The faces as triangles, refined where a level is given and they are a surface that can be."""
+    """The faces as triangles, refined where there is a level and the surface can be refined."""
     orientation = value_of(mesh.GetOrientationAttr(), time, scene)
     left_handed = orientation == UsdGeom.Tokens.leftHanded
     hidden = _holes(mesh, time, len(counts), scene)
@@ -164,7 +167,7 @@ def _tessellate(
 
 
 def _affordable(mesh: UsdGeom.Mesh, refinement: Refinement, level: int, scene: Scene) -> int:
-    """`level`, or with a note a lower one for which there is memory."""
+    """`level`, or, with a note, a lower level that fits into memory."""
     topology = refinement.cage.topology
     wanted, asked = scene.refined + triangles_at(topology, level), level
     while level and scene.refined + triangles_at(topology, level) > MOST_TRIANGLES:
@@ -181,7 +184,7 @@ def _affordable(mesh: UsdGeom.Mesh, refinement: Refinement, level: int, scene: S
 
 
 def _holes(mesh: UsdGeom.Mesh, time: Usd.TimeCode, count: int, scene: Scene) -> NDArray[np.bool_]:
-    """(f,) which faces are holes."""
+    """(f,) bool - which faces are holes."""
     hidden = np.zeros(count, bool)
     holes = array_of(mesh.GetHoleIndicesAttr(), time, scene, np.int64)
     known = (holes >= 0) & (holes < count)
@@ -195,7 +198,7 @@ def _holes(mesh: UsdGeom.Mesh, time: Usd.TimeCode, count: int, scene: Scene) -> 
 
 
 def _problem(points: Any, counts: Any, indices: Any) -> str:
-    """Why faces cannot be made of these arrays, or an empty string."""
+    """Why these arrays make no faces, or an empty string."""
     if not len(points) or not len(counts):
         return "has no faces"
     if counts.min() < 0 or counts.sum() != len(indices):
@@ -214,7 +217,7 @@ def _materials(
     time: Usd.TimeCode,
     scene: Scene,
 ) -> tuple[list[Resolved], NDArray[np.int64]]:
-    """The mesh's surfaces, and which of them each face has."""
+    """The mesh's surfaces, and the index among them of each face's."""
     resolved = [materials.of(prim)]
     which = np.zeros(faces, np.int64)
     for subset in UsdGeom.Subset.GetAllGeomSubsets(mesh):
@@ -232,7 +235,7 @@ def _materials(
         named = array_of(subset.GetIndicesAttr(), time, scene, np.int64)
         chosen = named[(named >= 0) & (named < faces)]
         if len(chosen) < len(named):
-            scene.note(where, f"names {len(named) - len(chosen)} faces that are none, left out")
+            scene.note(where, f"names {len(named) - len(chosen)} faces that do not exist, left out")
         if (which[chosen] > 0).any():
             taken = int((which[chosen] > 0).sum())
             scene.note(where, f"takes {taken} faces from another subset; the last one has them")
@@ -251,8 +254,10 @@ def _uv(
     where: str,
     scene: Scene,
 ) -> tuple[NDArray[np.float64] | None, NDArray[np.bool_]]:
-    """(m, 3, 2) UVs, each triangle's from the set that its surface names, and which fabrics
-    have none."""
+    """(m, 3, 2) UVs, and (m,) bool: which triangles wear a fabric and have no UVs.
+
+    Each triangle's UVs are those of the set that its surface names.
+    """
     uv = np.zeros((len(cut.faces), 3, 2))
     missing = np.zeros(len(cut.faces), bool)
     known: dict[str, NDArray[np.float64] | None] = {}
@@ -288,7 +293,7 @@ def _uv(
 def _uv_primvar(
     prim: Usd.Prim, surface: Resolved, where: str, scene: Scene
 ) -> UsdGeom.Primvar | None:
-    """The UV set by name; where that is missing, the first set there is, with a note."""
+    """The UV set that the surface names; where there is none, the first UV set, with a note."""
     api = UsdGeom.PrimvarsAPI(prim)
     name = surface.uv_set or "st"
     primvar = api.GetPrimvar(name)
@@ -308,7 +313,7 @@ def _at_corners(
     primvar: Any, cut: Tessellation, time: Usd.TimeCode, width: int, scene: Scene
 ) -> NDArray[np.float64] | None:
     """(m, 3, width) values of a primvar at the triangles' corners; None where its type or its
-    length are others."""
+    length does not fit."""
     values = value_of(primvar.GetAttr(), time, scene)
     try:
         array = np.array([] if values is None else values, np.float64)
@@ -325,8 +330,8 @@ def _at_corners(
 def _authored_normals(
     placed: Placed, mesh: UsdGeom.Mesh, cut: Tessellation, time: Usd.TimeCode, scene: Scene
 ) -> NDArray[np.float64] | None:
-    """(m, 3, 3) normals of the file, posed as the mesh is, or None; the primvar wins over the
-    attribute."""
+    """(m, 3, 3) authored normals, posed as the mesh is, or None. The primvar `normals` takes
+    precedence over the attribute."""
     prim, pose = placed.prim, placed.pose
     where = str(prim.GetPath())
     primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals")

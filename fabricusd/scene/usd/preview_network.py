@@ -1,4 +1,4 @@
-"""UsdPreviewSurface networks: constants, textures, and where those lie."""
+"""Reads UsdPreviewSurface networks: constants, textures, and the placement of textures."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from fabricusd.scene.scene import PreviewSurface, Scene, Texture
 from fabricusd.scene.usd.asset import asset_file
 
 _LARGEST = 4096
-"""Pixels a side that a texture is shrunk to, all its tiles together."""
+"""Most pixels along a side of a texture, with all its tiles; larger textures are shrunk."""
 
 _MOST_TRANSFORMS = 8
-"""UsdTransform2d one behind another before they are taken for a cycle."""
+"""Most UsdTransform2d nodes in a chain; a longer chain is taken for a cycle."""
 
 
 COLOR, NUMBER, VECTOR = "a colour", "a number", "a vector of three numbers"
-"""Kinds of input."""
+"""The kinds of inputs."""
 
 
 class _Input(NamedTuple):
@@ -34,7 +34,7 @@ class _Input(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many numbers it has."""
+        """How many numbers the input holds."""
         return 1 if self.kind == NUMBER else 3
 
 
@@ -48,22 +48,25 @@ _INPUTS = {
     "opacityThreshold": _Input("opacity_threshold", NUMBER, 0.0, 1.0, False),
     "normal": _Input("normal", VECTOR, -1e3, 1e3, True),
 }
-"""Between which bounds each is rendered; those of colours keep paths inside 32-bit numbers, those
-of normals their squares."""
+"""The inputs that are rendered, and their bounds. The bounds of colours keep the weights of paths,
+and those of normals their squares, within the range of 32-bit numbers."""
 
 _LEFT_OUT = {"clearcoat": 0.0, "displacement": 0.0}
-"""Inputs that are not rendered, and the value that says nothing."""
+"""Inputs that are not rendered, and the value at which they have no effect."""
 
 _FLAT = (0.0, 0.0, 1.0)
-"""The normal that turns nothing."""
+"""The normal that leaves the surface as it is."""
 
 _MODES = ("repeat", "clamp", "mirror", "black")
+
+_OPACITY_MODES = ("transparent", "presence")
 
 _CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 
 
 class PreviewNetwork:
-    """One material's network. What cannot be read is noted and its default is rendered."""
+    """The network of one material. Where an input cannot be read, a note says so and its default is
+    rendered."""
 
     def __init__(self, material: UsdShade.Material, time: Usd.TimeCode, scene: Scene) -> None:
         self.material, self.time, self.scene = material, time, scene
@@ -71,7 +74,7 @@ class PreviewNetwork:
         self.uv_set = ""
 
     def read(self) -> tuple[PreviewSurface, str]:
-        """The surface, and the UV set that its textures read ("" for any)."""
+        """The surface, and the UV set that its textures read, "" for any."""
         shader, _, _ = self.material.ComputeSurfaceSource()
         if not shader or shader.GetIdAttr().Get() != "UsdPreviewSurface":
             self._note("has no UsdPreviewSurface; it is rendered grey")
@@ -95,7 +98,7 @@ class PreviewNetwork:
         self.scene.note(self.where, problem)
 
     def _keep_normal(self, values: dict[str, Any], textures: dict[str, Texture]) -> None:
-        """A constant normal becomes a texture of one texel: it needs the mesh's UVs as one does."""
+        """Make a constant normal a texture of one texel: both need the mesh's UVs."""
         constant = values.pop("normal", None) or _FLAT
         if not any(constant):
             self._note("has a normal of length 0; the surface's own is rendered")
@@ -110,11 +113,25 @@ class PreviewNetwork:
                 left_out.append(name)
         if left_out:
             self._note(f"has {', '.join(left_out)}, left out")
+        self._note_opacity(shader)
         if self._source(shader, "useSpecularWorkflow")[0] == 1:
             self._note("asks for the specular workflow; the metallic one is rendered")
 
+    def _note_opacity(self, shader: UsdShade.Shader) -> None:
+        """Opacity is rendered as the share of the surface that is there: `presence`."""
+        mode = str(self._source(shader, "opacityMode")[0] or "transparent")
+        opacity = self._source(shader, "opacity")[0]
+        threshold = self._source(shader, "opacityThreshold")[0]
+        if mode not in _OPACITY_MODES:
+            self._note(f"has opacityMode '{mode}'; it must be one of {', '.join(_OPACITY_MODES)}")
+        elif mode == "transparent" and opacity not in (None, 0, 1) and not threshold:
+            self._note(
+                "has an opacity of opacityMode 'transparent', rendered as 'presence': its "
+                "reflection fades with it"
+            )
+
     def _source(self, shader: UsdShade.Shader, name: str) -> tuple[Any, str]:
-        """(an input's value, "") or (the shader that it is connected to, its output's name)."""
+        """(value, "") of an input, or (shader, name of the output) of what it is connected to."""
         given = shader.GetInput(name)
         if not given:
             return None, ""
@@ -126,7 +143,7 @@ class PreviewNetwork:
         return None, ""
 
     def _constant(self, name: str, row: _Input, given: Any) -> Any:
-        """A number or three, inside what the input allows; None where it is neither."""
+        """One number or three, within the bounds of the input; None for any other value."""
         values = _numbers(given, row.size)
         if values is None:
             self._note(f"has {name} {given}; it must be {row.kind}, and its default is rendered")
@@ -140,7 +157,7 @@ class PreviewNetwork:
     def _texture(
         self, name: str, row: _Input, node: UsdShade.Shader, output: str
     ) -> Texture | None:
-        """The picture behind a UsdUVTexture, of one channel or three."""
+        """The picture of a UsdUVTexture, of one channel or three."""
         kind = node.GetIdAttr().Get()
         if kind != "UsdUVTexture" or not row.textured:
             self._note(f"reads {name} from a node of the kind '{kind}'; its default is rendered")
@@ -173,7 +190,7 @@ class PreviewNetwork:
     def _pixels(
         self, node: UsdShade.Shader, color: bool, channel: int | None
     ) -> tuple[NDArray[np.float32], NDArray[np.float64] | None]:
-        """((h, w, c) pixels, (3, 3) from UVs to a picture of all UDIM tiles or None)."""
+        """(h, w, c) pixels; for UDIM tiles also the (3, 3) matrix from UVs to their picture."""
         given = node.GetInput("file")
         attributes = UsdShade.Utils.GetValueProducingAttributes(given) if given else []
         asset = attributes[0].Get(self.time) if attributes else None
@@ -184,7 +201,7 @@ class PreviewNetwork:
         def read(file: str, most: int) -> NDArray[np.float32]:
             if channel == _CHANNELS["a"]:
                 return read_alpha(file, most=most)
-            # Data is not encoded unless somebody says so.
+            # Data is taken as linear unless the texture names another colour space.
             kind = "raw" if space == "auto" and not color else space
             pixels = read_image(file, color_space=kind, most=most)
             return (
@@ -201,7 +218,7 @@ class PreviewNetwork:
             return read(file, _LARGEST), None
 
     def _four(self, node: UsdShade.Shader, name: str, otherwise: float) -> NDArray[np.float32]:
-        """A four-channel input of a texture; all `otherwise` where it is missing or mistyped."""
+        """Four numbers of a texture's input; all `otherwise` where it is missing or mistyped."""
         given, _ = self._source(node, name)
         values = None if given is None else _numbers(given, 4)
         if given is not None and values is None:
@@ -222,8 +239,8 @@ class PreviewNetwork:
     def _normals(
         self, node: UsdShade.Shader, codes: NDArray[np.float32], normals: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """`normals` with 0, no normal, where the picture is black: nothing was painted there, or a
-        UDIM tile is missing. What does not look like a normal map is noted.
+        """`normals`, with 0 for no normal where the picture is black: there nothing was painted, or
+        a UDIM tile is missing. A note tells of a picture that does not look like a normal map.
 
         codes : (h, w, 3) - the picture's values before scale and bias
         """
@@ -256,7 +273,7 @@ class PreviewNetwork:
         return "repeat"
 
     def _coordinates(self, node: UsdShade.Shader) -> NDArray[np.float64]:
-        """(3, 3) from the mesh's UVs to the texture's; the UV set is kept in `uv_set`."""
+        """(3, 3) from the mesh's UVs to the texture's; stores the UV set's name in `uv_set`."""
         place = np.eye(3)
         reader, _ = self._source(node, "st")
         for _ in range(_MOST_TRANSFORMS):
@@ -277,7 +294,7 @@ class PreviewNetwork:
         return place
 
     def _transform(self, node: UsdShade.Shader) -> NDArray[np.float64]:
-        """A UsdTransform2d: scaled, then turned counter-clockwise, then moved."""
+        """(3, 3) matrix of a UsdTransform2d, which scales, turns counter-clockwise, then moves."""
         found = []
         for name, count, otherwise in (("scale", 2, 1.0), ("rotation", 1, 0.0),
                                        ("translation", 2, 0.0)):  # fmt: skip
@@ -293,7 +310,7 @@ class PreviewNetwork:
 
 
 def _numbers(given: Any, count: int) -> NDArray[np.float64] | None:
-    """`count` finite numbers, or None where `given` is anything else."""
+    """`count` finite numbers; None where `given` is anything else."""
     try:
         values = np.array(given, np.float64)
     except (TypeError, ValueError):
@@ -306,9 +323,9 @@ def _numbers(given: Any, count: int) -> NDArray[np.float64] | None:
 def _tile_picture(
     tiles: list[tuple[int, str]], read: Any
 ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-    """(one picture of all tiles, black where there is none; (3, 3) from UVs to it).
+    """One picture of all tiles, black where one is missing, and the (3, 3) matrix from UVs to it.
 
-    tiles : (tile's number from 0, its file); ten tiles to a row, rows upwards
+    tiles : (number of the tile from 0, its file); ten tiles make a row, and rows go upwards
     """
     columns, rows = np.array([n % 10 for n, _ in tiles]), np.array([n // 10 for n, _ in tiles])
     left, bottom = int(columns.min()), int(rows.min())

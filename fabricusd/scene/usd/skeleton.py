@@ -1,7 +1,7 @@
-"""Poses of skinned meshes: UsdSkel's skeletons and blend shapes at one time.
+"""Poses skinned meshes by UsdSkel's skeletons and blend shapes at one time.
 
-USD's own queries deform the points. They are asked instead of `UsdSkel.BakeSkinning`, which poses
-only at times that have samples and leaves instances at rest.
+USD's own queries deform the points. `UsdSkel.BakeSkinning` is not used: it poses meshes only at
+times that have samples, and leaves instances at rest.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from fabricusd.scene.scene import Scene
 from fabricusd.scene.usd.value import array_of, note_types, usd_words
 
 _BELOW_ROOTS = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
-"""As for prototypes of instancers, which may lie below an `over`."""
+"""Which prims are asked: skinned meshes may be prototypes, which may lie below an `over`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pose:
-    """A mesh's points as its blend shapes and its skeleton leave them.
+    """A mesh's points after its blend shapes and its skeleton have moved them.
 
-    points : (n, 3) float64 - in the skeleton's space; in the mesh's own where `skeleton` is None
-    skeleton : the prim in whose space the points are, None for a mesh that only blends
+    points : (n, 3) float64 - in the skeleton's space, or in the mesh's where `skeleton` is None
+    skeleton : the prim in whose space the points are; None for a mesh that has blend shapes alone
     influences : (n, k) int32 and (n, k) float32 - joints and their weights
     joints : transforms of those joints
-    keeps_normals : False where blend shapes move the points: they carry no normals that USD reads
+    keeps_normals : False where blend shapes move the points: USD reads no normals of blend shapes
     """
 
     points: NDArray[np.float64]
@@ -43,9 +43,9 @@ class Pose:
     def normals(
         self, normals: NDArray[np.float64], triangles: NDArray[np.int64]
     ) -> NDArray[np.float64] | None:
-        """(m, 3, 3) normals at rest -> normals in the pose; None where they cannot be posed.
+        """(m, 3, 3) normals at rest -> (m, 3, 3) in the pose; None where they cannot be posed.
 
-        normals : at the corners of `triangles`, which name the points
+        normals : at the corners of `triangles`, which hold indices of points
         """
         if not self.keeps_normals:
             return None
@@ -67,7 +67,7 @@ class Pose:
 
 
 class Skeletons:
-    """Every skeleton and what it moves, found when a mesh asks for its pose."""
+    """The skeletons of a stage and the meshes that they move, looked up when a mesh is read."""
 
     def __init__(self, time: Usd.TimeCode, scene: Scene) -> None:
         self.time, self.scene = time, scene
@@ -76,7 +76,7 @@ class Skeletons:
         self._poses: dict[Sdf.Path, Pose | None] = {}
 
     def pose(self, prim: Usd.Prim) -> Pose | None:
-        """How the mesh `prim` is posed; None where it is not, with a note where it asks for it."""
+        """The pose of the mesh `prim`; None where it has none, with a note where it is skinned."""
         path = prim.GetPath()
         if path not in self._poses:
             self._poses[path] = self._find(prim) if _is_skinned(prim) else None
@@ -135,7 +135,7 @@ class Skeletons:
         )
 
     def _note_types(self, mesh: Usd.Prim, *others: Usd.Prim) -> None:
-        """What has a wrong type is as good as missing to USD, which does not say so."""
+        """Note attributes of a wrong type: USD ignores them without a word."""
         note_types(mesh, r"(primvars:)?skel:.*", self.time, self.scene)
         shapes = UsdSkel.BindingAPI(mesh).GetBlendShapeTargetsRel().GetTargets()
         targets = [mesh.GetStage().GetPrimAtPath(path) for path in shapes]
@@ -143,7 +143,7 @@ class Skeletons:
             note_types(prim, ".*", self.time, self.scene)
 
     def _query(self, prim: Usd.Prim) -> tuple[UsdSkel.SkinningQuery, Usd.Prim]:
-        """The mesh's skinning and its skeleton's prim, below the nearest SkelRoot that has it."""
+        """The mesh's skinning and its skeleton's prim, by the nearest SkelRoot that binds them."""
         if not prim.HasAPI(UsdSkel.BindingAPI):
             raise FabricError("", "SkelBindingAPI is not in its apiSchemas")
         roots = 0
@@ -160,7 +160,7 @@ class Skeletons:
         raise FabricError("", "it has no skeleton, or no joint influences or blend shapes that fit")
 
     def _targets(self, root: Usd.Prim) -> dict[Sdf.Path, tuple[UsdSkel.SkinningQuery, Usd.Prim]]:
-        """What the skeletons below a SkelRoot move, by its path."""
+        """What the skeletons below a SkelRoot move, by the path of each mesh."""
         path = root.GetPath()
         if path not in self._bound:
             which = Usd.TraverseInstanceProxies(_BELOW_ROOTS)
@@ -179,7 +179,7 @@ class Skeletons:
         skeletal: UsdSkel.SkeletonQuery,
         points: Vt.Vec3fArray,
     ) -> bool:
-        """Move `points` by the mesh's blend shapes; False where all their weights are 0."""
+        """Move `points` by the mesh's blend shapes; False where every weight is 0."""
         animation = skeletal.GetAnimQuery()
         weights = animation.ComputeBlendShapeWeights(self.time) if animation else None
         if not weights:
@@ -205,7 +205,7 @@ class Skeletons:
 
 
 def _is_skinned(prim: Usd.Prim) -> bool:
-    """Whether a mesh names joints or blend shapes, its own or handed down to it."""
+    """Whether a mesh has blend shapes, or joint indices of its own or inherited."""
     if prim.GetAttribute("skel:blendShapes").HasAuthoredValue():
         return True
     joints = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("skel:jointIndices")
@@ -213,7 +213,7 @@ def _is_skinned(prim: Usd.Prim) -> bool:
 
 
 def _in_order(query: UsdSkel.SkinningQuery, joints: Vt.Matrix4dArray) -> Vt.Matrix4dArray:
-    """A skeleton's transforms in the order in which the mesh numbers its joints."""
+    """A skeleton's transforms, in the order of the mesh's joints."""
     mapper = query.GetJointMapper()
     if not mapper or mapper.IsIdentity():
         return joints
@@ -222,7 +222,7 @@ def _in_order(query: UsdSkel.SkinningQuery, joints: Vt.Matrix4dArray) -> Vt.Matr
 
 
 def _for_normals(matrix: Gf.Matrix4d) -> Gf.Matrix3d:
-    """The inverse transpose, by which normals turn; 0 where the matrix has no inverse."""
+    """The inverse transpose, which transforms normals; 0 where the matrix has no inverse."""
     turn = np.array(matrix.ExtractRotationMatrix())
     if not np.isfinite(turn).all():
         return Gf.Matrix3d(0)

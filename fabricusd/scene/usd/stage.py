@@ -1,6 +1,6 @@
-"""A USD stage as a `Scene`: what is visible, where it lies, in metres.
+"""Reads a USD stage as a `Scene`: all that is visible, in world space and metres.
 
-Whatever cannot be read is left out and noted in one line; the rest is rendered.
+What cannot be read is left out, with a note of one line; everything else is rendered.
 """
 
 from __future__ import annotations
@@ -34,21 +34,22 @@ from fabricusd.scene.usd.mesh import Placed, is_mirrored, read_mesh
 from fabricusd.scene.usd.skeleton import Skeletons
 from fabricusd.scene.usd.units import note_units, stage_units
 from fabricusd.scene.usd.value import note_types, usd_words, value_of
-from fabricusd.schema.access import applies_binding
+from fabricusd.scene.usd.worn import names_fabric
+from fabricusd.schema.rules.binding import place_problem
 from fabricusd.schema.source import compose_stage, usd_errors
 
 _PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 _DEEPEST = 8
-"""Point instancers inside one another before they are taken for a cycle."""
+"""Most point instancers inside one another; deeper ones are taken for a cycle."""
 
 _READ_BY_USD = "xformOp.*|visibility|purpose|invisibleIds|exposure(:.*)?"
-"""Attributes that no reader here asks for: transforms and the like come from USD's functions."""
+"""Attributes that USD's own functions read, and no reader here: transforms and the like."""
 
 _DETAIL = 1e-5
-"""Size of a mesh over that of the scene below which 32-bit coordinates show."""
+"""Ratio of a mesh's size to the scene's below which the steps of 32-bit coordinates are visible."""
 
 _SMALLEST = 1e-6
-"""Width of a scene [m] below which its unit must be wrong; 32-bit numbers end at a thousandth."""
+"""Width of a scene [m] below which its unit must be wrong."""
 
 assert fabricusd.schema.PLUGIN_PATH
 
@@ -61,17 +62,17 @@ def read_usd_scene(
     time_code: float | None = None,
     fineness: Fineness = Fineness(),  # noqa: B008
 ) -> Scene:
-    """Everything visible on the stage at `time_code`; its earliest time where that is None.
+    """Everything that is visible on the stage at `time_code`, or at its earliest time for None.
 
-    binding : on meshes without a material of their own
-    camera : prim path; the first camera on the stage where that is None
-    fineness : of subdivision surfaces; its camera is the one that is found
+    binding : the fabric of meshes without a material of their own
+    camera : path of the camera's prim; None takes the first camera on the stage
+    fineness : of subdivision surfaces; its camera is set to the one that is found
     """
     stage, notes = _open(path)
-    # What USD has to say of a prim would be several lines on standard error.
+    # USD would print several lines about a prim to standard error.
     warnings = UsdUtils.CoalescingDiagnosticDelegate()
     try:
-        # What is not finite is noted; NumPy would write of it to standard error as well.
+        # Notes tell of values that are not finite; NumPy would warn of them as well.
         with np.errstate(all="ignore"):
             scene = _Reader(stage, notes, binding, time_code, fineness).read(path, camera)
         for warning in warnings.TakeUncoalescedDiagnostics():
@@ -89,10 +90,10 @@ def _open(path: Path) -> tuple[Usd.Stage, list[str]]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Waiting:
-    """A mesh that is made when the camera is known.
+    """A prim and its place; a mesh waits until the camera is known.
 
-    matrix : (4, 4) - from the mesh to the world
-    base, before : the prim that `before`, (4, 4), takes to the world, with all below it
+    matrix : (4, 4) - from the prim to the world
+    base, before : a prim, and the (4, 4) matrix that takes it and all below it to the world
     """
 
     prim: Usd.Prim
@@ -127,7 +128,7 @@ class _Reader:
         root = self.stage.GetPseudoRoot()
         self._visit(root, UsdGeom.XformCache(self.time), np.eye(4), ())
         self.scene.camera = self._camera(path, camera)
-        # How finely a mesh is refined may depend on the camera.
+        # The camera may decide how finely a mesh is refined.
         self.fineness = replace(self.fineness, camera=self.scene.camera)
         for one in self.waiting:
             try:
@@ -140,7 +141,7 @@ class _Reader:
         return self.scene
 
     def _note_the_whole(self) -> None:
-        """What is said once for all prims together."""
+        """Add the notes that tell of all prims together."""
         note_units(self.stage, self.metres, self.time, self.scene)
         if self.one_sided:
             first, count = self.one_sided[0], len(self.one_sided)
@@ -160,8 +161,7 @@ class _Reader:
         before: NDArray[np.float64],
         inside: tuple[Sdf.Path, ...],
     ) -> None:
-        """Add what is visible under `root`; `before` comes after each prim's own transform, from
-        `root`'s parent on."""
+        """Add all that is visible under `root`; `before` leads from its parent to the world."""
         base = root if root.IsPseudoRoot() else root.GetParent()
         for prim in self._visible(root, bool(inside)):
             note_types(prim, _READ_BY_USD, self.time, self.scene)
@@ -172,8 +172,14 @@ class _Reader:
                 self._left_out(prim, error)
 
     def _add(self, one: _Waiting, inside: tuple[Sdf.Path, ...]) -> None:
-        """Add one visible prim, whatever it is."""
+        """Add one visible prim of any type."""
         prim, where = one.prim, str(one.prim.GetPath())
+        # A mesh tells of its own subsets.
+        of_mesh = prim.IsA(UsdGeom.Subset) and prim.GetParent().IsA(UsdGeom.Mesh)
+        if not of_mesh and names_fabric(prim):
+            problem = place_problem(prim)
+            if problem:
+                self.scene.note(where, f"binds a fabric, left out: fabric:binding {problem}")
         if prim.IsA(UsdGeom.Camera):
             self.cameras.append(prim)
         elif not np.isfinite(one.matrix).all():
@@ -187,17 +193,14 @@ class _Reader:
             if light is not None:
                 self.scene.lights.append(light)
         elif prim.IsA(UsdGeom.Gprim) or prim.GetTypeName() == "Volume":
-            self.scene.note(where, f"is a {prim.GetTypeName()}, left out; only meshes are seen")
-        elif prim.IsA(UsdGeom.Subset) and prim.GetParent().IsA(UsdGeom.Mesh):
-            # Its mesh reads it.
-            pass
-        elif applies_binding(prim):
-            self.scene.note(where, "binds a fabric, left out: only meshes and subsets wear one")
+            self.scene.note(where, f"is a {prim.GetTypeName()}, left out; only meshes are rendered")
 
     def _mesh(self, one: _Waiting) -> None:
         prim, where = one.prim, str(one.prim.GetPath())
         if is_light(prim):
-            self.scene.note(where, "shines as a light, left out: it is a mesh alone")
+            self.scene.note(
+                where, "is a light as well, which is left out: it is rendered as a mesh"
+            )
         pose = self.skeletons.pose(prim)
         matrix = one.matrix
         if pose is not None and pose.skeleton is not None:
@@ -217,16 +220,16 @@ class _Reader:
             self.one_sided.append(where)
 
     def _relative(self, prim: Usd.Prim, base: Usd.Prim) -> NDArray[np.float64]:
-        """(4, 4) from a skeleton to `base`, or to the world where it does not lie below that."""
+        """(4, 4) from a skeleton to `base`, or to the world where it does not lie below `base`."""
         cache = UsdGeom.XformCache(self.time)
         if not prim.GetPath().HasPrefix(base.GetPath()):
             return as_matrix(cache.GetLocalToWorldTransform(prim))
         return as_matrix(cache.ComputeRelativeTransform(prim, base)[0])
 
     def _visible(self, root: Usd.Prim, inside: bool) -> Iterator[Usd.Prim]:
-        """Prims under `root` in order, without invisible ones and what only serves others.
+        """The prims under `root` in order, without invisible ones, guides and proxies.
 
-        inside : whether they are an instance's, which has been counted with all that it holds
+        inside : whether they belong to an instance, which has been counted with all that it holds
         """
         which = Usd.PrimDefaultPredicate if root.IsPseudoRoot() else OF_PROTOTYPES
         walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(which)))
@@ -238,18 +241,18 @@ class _Reader:
                 walk.PruneChildren()
                 continue
             imageable = UsdGeom.Imageable(prim)
-            # A purpose is handed down only to those that have none of their own.
+            # A prim inherits a purpose only where it has none of its own.
             if not hidden and not (imageable and imageable.ComputePurpose() not in _PURPOSES):
                 yield prim
 
     def _has_room_for(self, prim: Usd.Prim) -> bool:
-        """False for a native instance that there is no room for; inner ones are counted in it."""
+        """False for a native instance that, with inner ones, would exceed the bounds."""
         if not prim.IsInstance() or prim.IsInstanceProxy():
             return True
         return self._can_place(prim, self.copies.below(prim).times(1))
 
     def _can_place(self, prim: Usd.Prim, count: Count) -> bool:
-        """Whether there is room for so many instances more; what there is no room for is noted."""
+        """Whether so many more instances stay within the bounds; a note tells where they do not."""
         if math.isinf(count.copies):
             self.scene.note(str(prim.GetPath()), "instances itself, left out")
             return False
@@ -265,7 +268,7 @@ class _Reader:
     def _instances(
         self, prim: Usd.Prim, world: NDArray[np.float64], inside: tuple[Sdf.Path, ...]
     ) -> None:
-        """Each instance of a point instancer that lies at `world`: its prototype's prims, moved."""
+        """Add the prims of each instance of a point instancer that lies at `world`."""
         if len(inside) >= _DEEPEST or prim.GetPath() in inside:
             self.scene.note(str(prim.GetPath()), "instances itself, left out")
             return
@@ -278,7 +281,7 @@ class _Reader:
             self._visit(root, cache, world @ place, (*inside, prim.GetPath()))
 
     def _camera(self, path: Path, name: str | None) -> Camera | None:
-        """The camera `name`, or the first that sees anything; None where there is none."""
+        """The camera `name`, or the first camera that sees anything; None where there is none."""
         if name is not None:
             prim = self.stage.GetPrimAtPath(name) if Sdf.Path.IsValidPathString(name) else None
             if not prim or not prim.IsA(UsdGeom.Camera):
@@ -306,7 +309,7 @@ class _Reader:
 
 
 def _note_small_meshes(scene: Scene) -> None:
-    """One line for each mesh that is lost in the size of its scene."""
+    """Note each mesh that is too small for the size of its scene."""
     found = [(m, m.points[np.isfinite(m.points).all(axis=1)]) for m in scene.meshes]
     boxes = [(mesh, p.min(axis=0), p.max(axis=0)) for mesh, p in found if len(p)]
     if not boxes:

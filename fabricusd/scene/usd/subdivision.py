@@ -1,4 +1,4 @@
-"""What a UsdGeomMesh says of its subdivision surface; what is wrong is noted and left out."""
+"""Reads the subdivision surface of a UsdGeomMesh; faults are noted and left out."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def read_refinement(
     scene: Scene,
     level: int,
 ) -> Refinement | None:
-    """The mesh's surface, or None with a note where its cage must do.
+    """The mesh's surface; None, with a note, where only its cage can be rendered.
 
-    points, counts, indices : of the mesh, sound; hidden : (f,) bool - its holes
+    points, counts, indices : of the mesh, already checked; hidden : (f,) bool - its holes
     level : 0 for the cage
     """
     where = str(mesh.GetPath())
@@ -75,7 +75,7 @@ def read_refinement(
 def _token(
     attribute: Usd.Attribute, time: Usd.TimeCode, known: tuple[str, ...], where: str, scene: Scene
 ) -> str:
-    """A token's value, or its fallback with a note where that is none of `known`."""
+    """A token's value; its fallback, with a note, where the value is not one of `known`."""
     value = str(value_of(attribute, time, scene))
     if value in known:
         return value
@@ -95,10 +95,11 @@ def _simple(
     where: str,
     scene: Scene,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """(counts, indices, face, corner) of what can be refined, the last two into the mesh's own.
+    """(counts, indices, face, corner) of the faces that can be refined; the last two are indices of
+    the mesh's own faces and corners.
 
-    Corners that repeat the one before, faces of fewer than three and those with points that are not
-    finite are left out; faces of more than MOST_CORNERS become triangles.
+    A corner that repeats the one before is left out. So is a face with fewer than three corners, or
+    with a point that is not finite. A face with more than MOST_CORNERS corners becomes triangles.
     """
     own = Topology(counts, indices, len(points))
     corner = np.flatnonzero(indices != indices[own.after])
@@ -137,7 +138,7 @@ def _simple(
 def _creases(
     mesh: UsdGeom.Mesh, time: Usd.TimeCode, topology: Topology, where: str, scene: Scene
 ) -> NDArray[np.float64]:
-    """(e,) sharpness of the topology's edges; of one named twice, the last."""
+    """(e,) sharpness of the topology's edges; for an edge that is named twice, the last one."""
     crease = np.zeros(len(topology.uses))
     points = array_of(mesh.GetCreaseIndicesAttr(), time, scene, np.int64)
     lengths = array_of(mesh.GetCreaseLengthsAttr(), time, scene, np.int64)
@@ -202,7 +203,7 @@ def _corners(
 def _sound(
     sharpness: NDArray[np.float64], name: str, where: str, scene: Scene
 ) -> NDArray[np.float64]:
-    """Without what is negative or no number, which is noted and taken as 0."""
+    """`sharpness` with 0, and a note, for values that are negative or NaN."""
     wrong = ~(sharpness >= 0)
     if wrong.any():
         bad = sharpness[np.argmax(wrong)]
@@ -211,8 +212,8 @@ def _sound(
 
 
 def _beside_the_border(topology: Topology, crease: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(f,) faces that OpenSubdiv hides where the border is not interpolated: those at a border's
-    point, but for borders that are infinitely sharp."""
+    """(f,) bool - the faces that OpenSubdiv hides where the border is not interpolated: those that
+    touch a point of the border, unless that border is infinitely sharp."""
     loose = np.zeros(topology.count, bool)
     loose[topology.ends[(topology.uses == 1) & (crease < INFINITE)].ravel()] = True
     return np.bincount(topology.face, loose[topology.indices], len(topology.counts)) > 0

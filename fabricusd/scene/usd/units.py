@@ -1,7 +1,6 @@
-"""Assets whose unit or up axis is another than their stage's: USD does not convert them.
+"""Finds assets whose unit or up axis differs from that of the stage: USD does not convert them.
 
-A scale or a turn of the prim that references them may make up for it, as a person or a program
-that knows of it writes; then nothing is said.
+No note is made where the prim that references an asset scales and turns it accordingly.
 """
 
 from __future__ import annotations
@@ -15,26 +14,27 @@ from fabricusd.scene.scene import Scene
 from fabricusd.scene.usd.instances import as_matrix
 
 _ALIKE = 1e-3
-"""Relative difference below which two units are one."""
+"""Relative difference below which two units count as the same."""
 
 _UNITS = (1e-12, 1e16)
-"""Metres that a unit may have: from a thousandth of a nanometre to a light-year."""
+"""Smallest and largest unit [m]: a thousandth of a nanometre, and a light-year."""
 
 _AXES = {"Y": np.array([0.0, 1.0, 0.0]), "Z": np.array([0.0, 0.0, 1.0])}
-"""Axes that may point up."""
+"""The axes that may point up."""
 
 _PLACED = ("Mesh", "Camera", "Points", "BasisCurves", "PointInstancer", "Skeleton")
-"""Types of prims whose lengths are in a layer's unit; lights and others mostly come with them."""
+"""Types of prims whose lengths are in their layer's unit. Lights and others mostly come with one
+of these."""
 
 
 def stage_units(stage: Usd.Stage, scene: Scene) -> tuple[float, str]:
-    """(metres in one unit of a stage, its axis up), with a note where they make no sense."""
+    """(metres in one unit of a stage, its up axis), with a note where either makes no sense."""
     where = stage.GetRootLayer().GetDisplayName()
     metres, up = 0.01, "Y"
     try:
         metres = float(UsdGeom.GetStageMetersPerUnit(stage))
     except Tf.ErrorException:
-        scene.note(where, f"has a metersPerUnit that is no number; {metres:g} is taken")
+        scene.note(where, f"has a metersPerUnit that is not a number; {metres:g} is taken")
     if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
         scene.note(where, f"has no metersPerUnit; USD's {metres:g} is taken")
     elif not _UNITS[0] <= metres <= _UNITS[1]:
@@ -52,7 +52,7 @@ def stage_units(stage: Usd.Stage, scene: Scene) -> tuple[float, str]:
 
 
 def note_units(stage: Usd.Stage, metres: float, time: Usd.TimeCode, scene: Scene) -> None:
-    """One line for each layer with geometry whose unit or up axis is another than the stage's.
+    """Note each layer that holds geometry and whose unit or up axis differs from the stage's.
 
     metres : in one unit of the stage
     """
@@ -89,7 +89,7 @@ def note_units(stage: Usd.Stage, metres: float, time: Usd.TimeCode, scene: Scene
 
 
 def _difference(layer: Sdf.Layer, metres: float, up: str) -> str:
-    """How a layer's unit and up axis differ from the stage's; an empty string where they do not."""
+    """How a layer's unit and up axis differ from the stage's, or an empty string."""
     found = []
     own = _metres(layer)
     if own is not None and abs(own - metres) > _ALIKE * metres:
@@ -101,7 +101,7 @@ def _difference(layer: Sdf.Layer, metres: float, up: str) -> str:
 
 
 def _metres(layer: Sdf.Layer) -> float | None:
-    """Metres in a unit of the layer, where it says so sensibly."""
+    """Metres in one unit of the layer; None where it states none that makes sense."""
     given = layer.pseudoRoot.GetInfo("metersPerUnit") if _says(layer, "metersPerUnit") else None
     return given if isinstance(given, float) and math.isfinite(given) and given > 0 else None
 
@@ -116,7 +116,7 @@ def _says(layer: Sdf.Layer, name: str) -> bool:
 
 
 def _holds_geometry(layer: Sdf.Layer) -> bool:
-    """Whether a layer defines anything that has a size: one of fabrics alone has none."""
+    """Whether a layer defines anything that has a size; a layer of fabrics alone does not."""
     found: list[Sdf.Path] = []
 
     def look(path: Sdf.Path) -> None:
@@ -128,7 +128,7 @@ def _holds_geometry(layer: Sdf.Layer) -> bool:
 
 
 def _referenced(prim: Usd.Prim) -> list[Sdf.Layer]:
-    """Root layers of all that is referenced at `prim` itself, payloads too."""
+    """Root layers of the references and payloads of `prim` itself."""
     query = Usd.PrimCompositionQuery(prim)
     return [
         arc.GetTargetLayer()
@@ -140,7 +140,7 @@ def _referenced(prim: Usd.Prim) -> list[Sdf.Layer]:
 def _made_up_for(
     prim: Usd.Prim, layer: Sdf.Layer, metres: float, up: str, cache: UsdGeom.XformCache
 ) -> bool:
-    """Whether the prim's transform scales and turns the layer's content into the stage's unit."""
+    """Whether the prim's transform converts the layer's content to the stage's unit and up axis."""
     if any("unitsResolve" in str(name) for name in prim.GetPropertyNames()):
         return True
     matrix = as_matrix(cache.GetLocalToWorldTransform(prim))[:3, :3]
@@ -148,7 +148,7 @@ def _made_up_for(
     if not (math.isfinite(size) and size > 0):
         return False
     wanted = math.log((_metres(layer) or metres) / metres)
-    # A scale that is nearer to the units' ratio than to 1 was chosen with the ratio in mind.
+    # A scale nearer to the ratio of the units than to 1 is taken as a conversion.
     if abs(math.log(size) - wanted) > 0.5 * abs(wanted) + _ALIKE and abs(wanted) > _ALIKE:
         return False
     turned = matrix @ _AXES[_up(layer) or up]

@@ -1,6 +1,6 @@
-"""Attribute values of the type that the schema gives them; others are noted and not used.
+"""Reads attribute values, and refuses those whose type is not the one of the schema.
 
-USD hands out whatever a file holds, also a path or a word where the schema has numbers.
+USD returns whatever a file holds, even a path or a word where the schema has numbers.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ _WORDS = (Vt.TokenArray, Vt.StringArray)
 
 
 def value_of(attribute: Usd.Attribute, time: Usd.TimeCode, scene: Scene) -> Any:
-    """The value of `attribute` at `time`; None where it is missing or has none.
+    """The value of `attribute` at `time`; None where the attribute or its value is missing.
 
-    A value of another type gets a note, and the schema's fallback is returned in its place.
+    For a value of another type a note is made, and the schema's fallback is returned.
     """
     value = attribute.Get(time) if attribute else None
     problem = type_problem(attribute, value)
@@ -34,9 +34,9 @@ def value_of(attribute: Usd.Attribute, time: Usd.TimeCode, scene: Scene) -> Any:
 
 
 def note_types(prim: Usd.Prim, names: str, time: Usd.TimeCode, scene: Scene) -> None:
-    """Note the authored attributes of a wrong type among those that USD reads by itself.
+    """Note authored attributes of a wrong type that USD's own functions read.
 
-    names : pattern of their names
+    names : regular expression of the attributes' names
     """
     for attribute in prim.GetAuthoredAttributes():
         if re.fullmatch(names, attribute.GetName()):
@@ -44,13 +44,13 @@ def note_types(prim: Usd.Prim, names: str, time: Usd.TimeCode, scene: Scene) -> 
 
 
 def usd_words(error: Tf.ErrorException) -> str:
-    """What USD found wrong, on one line, without the places in its source."""
+    """USD's error message on one line, without locations in USD's source code."""
     told = [str(one.commentary) for one in error.args if hasattr(one, "commentary")]
     return one_line("; ".join(told) or str(error), 200)
 
 
 def type_problem(attribute: Usd.Attribute, value: Any) -> str:
-    """`is of type T; it must be U` for a value of `attribute` that is; an empty string if sound."""
+    """`is of type T; it must be U` for a value of a wrong type, or an empty string."""
     if value is None:
         return ""
     wanted = attribute.GetTypeName()
@@ -67,15 +67,15 @@ def array_of(
     dtype: DTypeLike = np.float64,
     width: int = 0,
 ) -> NDArray[Any]:
-    """(n,) or (n, width) numbers of an array attribute; none where it is missing or mistyped."""
+    """(n,) or (n, width) numbers of an array attribute; empty where it is missing or mistyped."""
     value = value_of(attribute, time, scene)
     numbers = np.array([] if value is None else value, dtype)
     return numbers.reshape(-1, width) if width else numbers
 
 
 def _fits(value: Any, default: Any, *, is_array: bool) -> bool:
-    """Whether `value` can be used where `default`'s type is asked for: numbers of another precision
-    and whole numbers for real ones can."""
+    """Whether `value` can stand where the type of `default` is asked for. A number of another
+    precision can, and an integer can stand for a real number."""
     if default is None or type(value) is type(default):
         return True
     if isinstance(default, _WORDS):
@@ -94,7 +94,7 @@ def _type_name(value: Any) -> str:
 
 
 def _fallback(attribute: Usd.Attribute) -> Any:
-    """The schema's value for an attribute; None where it has none."""
+    """The schema's fallback for an attribute; None where there is none."""
     definition = attribute.GetPrim().GetPrimDefinition()
     name = attribute.GetName()
     if name not in definition.GetPropertyNames():

@@ -200,7 +200,7 @@ def test_a_light_that_is_scaled_to_nothing_is_noted(tmp_path, kind):
     light(stage, kind, (0, 0, 0, 0, 0), normalize=True)
     scene = read(stage)
     assert scene.lights == []
-    assert "/light is scaled to nothing, left out" in scene.notes
+    assert "/light has a scale of 0, left out" in scene.notes
 
 
 def test_a_mesh_that_shines_is_noted_and_rendered(tmp_path):
@@ -208,7 +208,7 @@ def test_a_mesh_that_shines_is_noted_and_rendered(tmp_path):
     UsdLux.MeshLightAPI.Apply(square(stage).GetPrim())
     scene = read(stage)
     assert len(scene.meshes) == 1
-    assert [n for n in scene.notes if n.startswith("/square shines as a light")]
+    assert [n for n in scene.notes if n.startswith("/square is a light as well")]
 
 
 def test_an_infinite_sun_stays_the_brightest_of_a_sky(tmp_path):

@@ -322,7 +322,7 @@ FAULTS = {
     "a material that is nowhere": (
         lambda stage, _: UsdShade.MaterialBindingAPI.Apply(square(stage).GetPrim())
         .GetDirectBindingRel().SetTargets(["/lost"]),
-        "/square is bound to /lost, which is no material",
+        "/square is bound to /lost, which is not a material",
     ),
 }  # fmt: skip
 
@@ -500,3 +500,31 @@ def test_a_mesh_without_a_material_has_its_display_colour(tmp_path, name):
     assert found.diffuse == pytest.approx(diffuse)
     assert found.opacity == pytest.approx(opacity)
     assert [words] == [words for note in scene.notes if words in note] or not words
+
+
+OPACITY = {
+    # name: (opacity, opacityMode, opacityThreshold, words)
+    "opaque": (1.0, "", 0.0, ""),
+    "a gap by presence": (0.5, "presence", 0.0, ""),
+    "transparent by default": (0.5, "", 0.0, "rendered as 'presence'"),
+    "transparent": (0.5, "transparent", 0.0, "rendered as 'presence'"),
+    "cut out": (0.5, "transparent", 0.4, ""),
+    "an unknown mode": (0.5, "foggy", 0.0, "must be one of transparent, presence"),
+}
+
+
+@pytest.mark.parametrize("name", OPACITY)
+def test_opacity_is_presence_and_another_mode_is_noted(name, tmp_path):
+    opacity, mode, threshold, words = OPACITY[name]
+    stage = new_stage(tmp_path)
+    given = {"opacity": opacity, "opacityThreshold": threshold}
+    surface(stage, **given)
+    if mode:
+        shader = next(
+            UsdShade.Shader(p) for p in stage.Traverse() if p.IsA(UsdShade.Shader)
+        )  # fmt: skip
+        shader.CreateInput("opacityMode", Sdf.ValueTypeNames.Token).Set(mode)
+    bind(stage)
+    shown, scene = rendered(stage)
+    assert shown.opacity == opacity
+    assert (scene.notes == []) if not words else (words in " ".join(scene.notes))

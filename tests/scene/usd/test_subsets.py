@@ -106,7 +106,7 @@ def test_a_subset_of_no_mesh_is_noted(tmp_path):
 def test_a_fabric_on_what_is_no_mesh_is_noted(tmp_path):
     stage = new_stage(tmp_path)
     square(stage)
-    bind_fabric(stage, UsdGeom.Xform.Define(stage, "/group").GetPrim())
+    bind_fabric(stage, UsdGeom.Camera.Define(stage, "/group").GetPrim())
     assert "/group binds a fabric, left out" in " ".join(read(stage).notes)
 
 

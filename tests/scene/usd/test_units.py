@@ -175,7 +175,7 @@ def test_an_asset_in_the_stages_unit_or_brought_to_it_is_not_noted(tmp_path, nam
 
 METADATA = {
     # line of the layer: words of the note
-    "metersPerUnit = </x>": "has a metersPerUnit that is no number; 0.01 is taken",
+    "metersPerUnit = </x>": "has a metersPerUnit that is not a number; 0.01 is taken",
     'metersPerUnit = "a"': "no value of its type",
     "metersPerUnit = nan": "has metersPerUnit nan; 0.01 is taken; it must be from 1e-12 to 1e+16",
     "metersPerUnit = -1": "has metersPerUnit -1; 0.01 is taken",
