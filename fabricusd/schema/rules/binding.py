@@ -71,7 +71,7 @@ def place_problem(prim: Usd.Prim) -> str:
     alone = (UsdGeom.Gprim, UsdGeom.Camera, UsdLux.BoundableLightBase, UsdLux.NonboundableLightBase)
     if prim.IsA(UsdGeom.Imageable) and not any(prim.IsA(one) for one in alone):
         return ""
-    return f"is on {kind_of(prim)}; {_WORN}"
+    return f"is on a {kind}; {_WORN}"
 
 
 @rule(BINDING)
