@@ -18,7 +18,14 @@ from numpy.typing import NDArray
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.curve import peak
-from fabricusd.appearance.weave.lookup import crown_on, lookup, rise_on, wrap
+from fabricusd.appearance.weave.lookup import (
+    crown_on,
+    lookup,
+    lower_run,
+    rise_on,
+    upper_run,
+    wrap,
+)
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE, PART
@@ -95,34 +102,30 @@ def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h
     low, high = 0.5 - 0.5 * width, 0.5 + 0.5 * width
     if width > 0.0 and cloth.pile[above] == 0:
         a, b = _within(over, over_t, low, high, t0, t1)
-        cells = float(cloth.runs[i, j, 0, 1])
+        start, cells = upper_run(np.float64, cloth, i, j, top)
         mine = own and which == top
         k = _cross_thread(
             cloth, 0 if mine else rounded, above,
             crown if mine else float(cloth.half_thickness[top, above]),
             a, b, h, k, cells * float(crossing),
-            (float(cloth.runs[i, j, 0, 0]) + along) / cells, along_t / cells,
+            (start + along) / cells, along_t / cells,
             2.0 * (over - 0.5) / width, 2.0 * over_t / width,
         )  # fmt: skip
-    if cloth.under == 1 - top and cloth.pile[below] == 0:
-        seen = float(cloth.under_width)
+    seen = float(cloth.width[1 - top])
+    if width < 1.0 and seen > 0.0 and cloth.pile[below] == 0:
         a0, b0 = _within(along, along_t, 0.5 - 0.5 * seen, 0.5 + 0.5 * seen, t0, t1)
-        share = 1.0 - width
-        cells = float(cloth.runs[i, j, 1, 1])
         for side in range(2):
             if side == 0:
                 a, b = _within(over, over_t, 0.0, low, a0, b0)
-                skipped = 0.0
             else:
                 a, b = _within(over, over_t, high, 1.0, a0, b0)
-                skipped = width
-            place = float(cloth.runs[i, j, 1, 0]) + (over - skipped) / share
+            start, cells = lower_run(np.float64, cloth, i, j, top, float(side))
             mine = own and which != top
             k = _cross_thread(
                 cloth, 0 if mine else rounded, below,
                 crown if mine else float(cloth.half_thickness[1 - top, below]),
-                a, b, h, k, cells * share * float(below_crossing), place / cells,
-                over_t / share / cells, 2.0 * (along - 0.5) / seen, 2.0 * along_t / seen,
+                a, b, h, k, cells * float(below_crossing), (start + over) / cells,
+                over_t / cells, 2.0 * (along - 0.5) / seen, 2.0 * along_t / seen,
             )  # fmt: skip
     return k
 
@@ -235,32 +238,34 @@ def highest_point(fabric: Fabric, cloth: CompiledFabric) -> float:
     peaks = [peak(t.curve) for t in fabric.thread_list]
     for which, sequence in ((WARP, fabric.warp.sequence), (WEFT, fabric.weft.sequence)):
         crossing = float(cloth.pitch[1 - which])
-        for longest, share in _longest_runs(cloth, which):
+        for longest in _longest_runs(cloth, which):
             common = math.gcd(len(longest), len(sequence))
             for place, kind in enumerate(sequence):
                 cells = longest[place % common :: common].max()
                 if cloth.pile[kind] or cells == 0:
                     continue
                 half = float(cloth.half_thickness[which, kind])
-                found = max(found, peaks[kind] * float(cells) * share * crossing + half)
+                found = max(found, peaks[kind] * float(cells) * crossing + half)
     return found
 
 
-def _longest_runs(cloth: CompiledFabric, which: int) -> list[tuple[NDArray[np.int64], float]]:
-    """(longest visible run of each thread [cells], visible share of a cell) for the threads of a
-    set.
+def _longest_runs(cloth: CompiledFabric, which: int) -> list[NDArray[np.float64]]:
+    """Longest visible run [cells] of each thread of a set, 0 where there is none.
 
-    There is one entry for runs on top and, if the set is seen underneath, another for those.
+    The first entry is for runs on top, the second for the strips of hidden runs.
     """
     axis = 1 if which == WARP else 0
-    on_top = cloth.grid == which
+    on_top, rim = cloth.grid == which, float(cloth.rim[which])
+    endless = float(cloth.grid.shape[axis])
     answer = []
     if cloth.width[which] > 0:
-        lengths = np.where(on_top, cloth.runs[..., 0, 1], 0).max(axis=axis)
-        answer.append((lengths.astype(np.int64), 1.0))
-    if cloth.under == which:
-        lengths = np.where(on_top, 0, cloth.runs[..., 1, 1]).max(axis=axis)
-        answer.append((lengths.astype(np.int64), 1.0 - float(cloth.width[1 - which])))
+        count = cloth.runs[..., 0, 1].astype(np.float64)
+        cells = np.where(count > 0, count + 2.0 * rim, endless)
+        answer.append(np.where(on_top, cells, 0.0).max(axis=axis))
+    if cloth.width[which] > 0 and rim > 0:
+        count = cloth.runs[..., 1, 1].astype(np.float64)
+        strips = np.where(count > 0, count - 1.0, endless)
+        answer.append(np.where(on_top, 0.0, 2.0 * rim * strips).max(axis=axis))
     return answer
 
 

@@ -72,7 +72,7 @@ def horizon_table(
     if min(texels) < 2:
         raise FabricError("texels", f"is {texels}; it must be at least 2 by 2")
     repeat = shape_repeat(fabric)
-    slots = 1 if cloth.under == GAP else 2
+    slots = cloth.runs.shape[2]
     if math.prod((*repeat, slots, *texels, azimuths)) > MOST_BYTES:
         return None
     table = np.zeros((*repeat, slots, *texels, azimuths), np.uint8)
@@ -161,7 +161,7 @@ def mean_light(
         number = np.random.default_rng(0).choice(len(number), MOST_CELLS, replace=False)
     cells = np.stack(np.unravel_index(number, repeat), axis=1)
     if table is None:
-        slots = 1 if cloth.under == GAP else 2
+        slots = cloth.runs.shape[2]
         entries = np.zeros((len(cells), slots, *TEXELS, AZIMUTHS), np.uint8)
         if highest > 0:
             _fill(cloth, rounded, highest, _diamond_directions(AZIMUTHS), cells, entries)
@@ -213,7 +213,7 @@ def _describe_texels(cloth, cells, shape, psi0, sets, area):
         top = int(cloth.grid[i % cloth.grid.shape[0], j % cloth.grid.shape[1]])
         width = float(cloth.width[top])
         for slot in range(slots):
-            whole = width if slot == 0 else (1.0 - width) * float(cloth.under_width)
+            whole = width if slot == 0 else (1.0 - width) * float(cloth.width[1 - top])
             for row in range(rows):
                 for column in range(columns):
                     u, v, seen = _texel_centre(
@@ -236,8 +236,8 @@ def _texel_centre(cloth, i, j, slot, along, across):
     else:
         q = along * (1.0 - width)
         q = q if q < 0.5 * (1.0 - width) else q + width
-        p = 0.5 + float(cloth.under_width) * (across - 0.5)
-        seen = cloth.under == 1 - top and width < 1.0
+        p = 0.5 + float(cloth.width[1 - top]) * (across - 0.5)
+        seen = width < 1.0 and cloth.width[1 - top] > 0.0
     if top == WARP:
         return i + q, j + p, seen
     return i + p, j + q, seen

@@ -44,11 +44,11 @@ def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
         sound = p >= R(0) and which != GAP
         warp = top == WARP
         along, over = (q, p) if warp else (p, q)
-        width = warp_width if warp else weft_width
+        width, other = (warp_width, weft_width) if warp else (weft_width, warp_width)
         on_top = which == top
         seen = (over if over < R(0.5) else over - width) / max(R(1) - width, cloth.tiny)
         across = (over if on_top else along) - R(0.5)
-        across = across / max(width if on_top else cloth.under_width, cloth.tiny) + R(0.5)
+        across = across / max(width if on_top else other, cloth.tiny) + R(0.5)
         row, a = cell_of_texels(R, (along if on_top else seen) if sound else R(0.5), rows)
         column, b = cell_of_texels(R, across if sound else R(0.5), columns)
         m = index(begin, k)

@@ -61,7 +61,9 @@ def horizon_at(R, cloth, table, u, v, which, x, y):
     on_top = which == top
     # Select instead of branching: neither the thread nor the azimuth can be predicted.
     seen = (over if over < R(0.5) else over - width) / max(R(1) - width, cloth.tiny)
-    across = ((over if on_top else along) - R(0.5)) / (width if on_top else cloth.under_width)
+    across = ((over if on_top else along) - R(0.5)) / max(
+        width if on_top else cloth.width[1 - top], cloth.tiny
+    )
     slot = 0 if on_top else table.shape[2] - 1
     along, across = along if on_top else seen, across + R(0.5)
     row, a = cell_of_texels(R, along, table.shape[3])

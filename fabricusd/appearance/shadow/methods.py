@@ -55,7 +55,7 @@ from fabricusd.appearance.shadow.place_blocks import (
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.curve import crest, peak
-from fabricusd.appearance.weave.lookup import find, height_on, wrap
+from fabricusd.appearance.weave.lookup import find, height_on, lower_run, upper_run, wrap
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, index
@@ -270,32 +270,32 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
     """The smaller of `best` and the distance [m] to the highest points of one cell."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
     top = int(cloth.grid[i, j])
-    width = float(cloth.width[top])
-    low = 0.5 - 0.5 * width
-    for slot in range(2 if cloth.under == 1 - top else 1):
-        which = top if slot == 0 else 1 - top
-        visible = width if slot == 0 else float(cloth.under_width)
+    edge = 0.5 - 0.5 * float(cloth.width[top])
+    for part in range(3 if cloth.runs.shape[2] > 1 else 1):
+        # The thread on top, then the thread underneath before and behind it.
+        which = top if part == 0 else 1 - top
         if which == WARP:
             thread = int(cloth.sequence[WARP, wrap(end, cloth.sequence_length[WARP])])
         else:
             thread = int(cloth.sequence[WEFT, wrap(pick, cloth.sequence_length[WEFT])])
-        share = 1.0 if slot == 0 else 1.0 - width
-        place = float(cloth.runs[i, j, slot, 0])
-        cells = float(cloth.runs[i, j, slot, 1])
-        height = cells * share * float(cloth.pitch[1 - which]) * float(
-            shadow.crest_height[thread]
-        ) + float(cloth.half_thickness[which, thread])
+        low, high = 0.0, 1.0
+        if part == 0:
+            start, cells = upper_run(np.float64, cloth, i, j, top)
+        else:
+            start, cells = lower_run(np.float64, cloth, i, j, top, part - 1.0)
+            low, high = (0.0, edge) if part == 1 else (1.0 - edge, 1.0)
+        visible = float(cloth.width[which]) if high > low else 0.0
+        height = cells * float(cloth.pitch[1 - which]) * float(shadow.crest_height[thread]) + float(
+            cloth.half_thickness[which, thread]
+        )
         if visible <= 0.0 or cloth.pile[thread] != 0 or height < 0.999999 * shadow.highest:
             continue
         across = 0.5 * visible
         for q in range(shadow.crest_first.shape[1]):
-            a = max(0.0, float(shadow.crest_first[thread, q]) * cells - place)
-            b = min(1.0, float(shadow.crest_last[thread, q]) * cells - place)
+            a = max(low, float(shadow.crest_first[thread, q]) * cells - start)
+            b = min(high, float(shadow.crest_last[thread, q]) * cells - start)
             if a > b:
                 continue
-            if slot == 1:
-                a, b = a * share, b * share
-                a, b = a if a < low else a + width, b if b < low else b + width
             if which == WARP:
                 du = max(0.0, abs(u - end - 0.5) - across)
                 dv = max(0.0, a - (v - pick), (v - pick) - b)

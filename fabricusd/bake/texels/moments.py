@@ -177,7 +177,7 @@ def _add_horizon(made, u, v, which, out):  # type: ignore[no-untyped-def]
     else:
         slot = 1
         seen = q if q < R(0.5) else q - width
-        along, across = seen / (R(1) - width), (p - R(0.5)) / cloth.under_width + R(0.5)
+        along, across = seen / (R(1) - width), (p - R(0.5)) / cloth.width[1 - top] + R(0.5)
     row = min(max(int(along * table.shape[3]), 0), table.shape[3] - 1)
     column = min(max(int(across * table.shape[4]), 0), table.shape[4] - 1)
     for k in range(AZIMUTHS):

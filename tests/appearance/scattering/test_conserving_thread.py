@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -44,7 +45,7 @@ def _directional_albedo(thread, theta):
     phi = (x + 1) * math.pi / 2
     viewer = np.array([math.sin(theta), 0.0, math.cos(theta)])
     total = 0.0
-    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
+    for low, high in pairwise(cuts):
         out, around = np.meshgrid(low + (high - low) * (x + 1) / 2, phi, indexing="ij")
         wi = np.stack(
             [np.sin(out), np.cos(out) * np.sin(around), np.cos(out) * np.cos(around)], axis=-1

@@ -26,7 +26,7 @@ def cell_rectangles(fabric: Fabric) -> np.ndarray:
     """(n, 4) left, bottom, width, height of rectangles that tile the true repeat, each inside one
     stretch of one thread: cut where any set may begin or end in any cell."""
     share = coverage(fabric)
-    widths = np.array([1.0, *share.width, share.under_width])
+    widths = np.array([1.0, *share.width])
     cuts = np.unique(np.concatenate(([0.5], 0.5 - widths / 2, 0.5 + widths / 2)))
     ends, picks = true_repeat(fabric)
     low, step = cuts[:-1], np.diff(cuts)
