@@ -23,15 +23,16 @@ SAMPLES = 4096
 
 HEAD = """# Directional albedo and safe albedos
 
-Made by `make docs` (`python docs/make_albedo.py`).
+`python docs/make_albedo.py` makes this page; `make docs` runs it.
 
-The share of a white sky's light that reaches the viewer, by the angle between view and normal: the
-brightest channel, at the worst of 16 azimuths (8 for `conserving`). The published models do not
-conserve energy; *safe A* is the largest albedo of white threads at which no view sends back more
-than it gets. `fabricusd check` warns where a fabric's own colours go beyond 1 (`AlbedoIsSafe`).
+The tables give the share of a white sky's light that reaches the viewer, by the angle between view
+and normal. They show the brightest channel, at the worst of 16 azimuths (8 for `conserving`). The
+published models do not conserve energy. *Safe A* is the largest albedo of white threads at which
+the cloth reflects no more light than arrives, in any view. `fabricusd check` warns where a fabric's
+own colours reflect more than that (`AlbedoIsSafe`).
 
-In `conserving` the value is reflection plus transmission, multiple scattering included, from
-{samples} samples a view; an albedo there is one, and any from 0 to 1 is safe.
+For `conserving`, the value is reflection plus transmission, including multiple scattering, from
+{samples} samples per view. An `A` of this model is an albedo, and any value from 0 to 1 is safe.
 """
 
 

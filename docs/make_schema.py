@@ -11,7 +11,11 @@ from fabricusd.schema.rules.rules import RULES
 HERE = Path(__file__).resolve().parent
 TYPES = (
     ("WovenFabric", "A prim type."),
-    ("WovenThread", "A prim type; a child of its Fabric, or anywhere by relationship."),
+    (
+        "WovenThread",
+        "A prim type. A thread is a child of its WovenFabric, or lies anywhere that "
+        "`fabric:threads` names.",
+    ),
     ("WovenBindingAPI", "A single-apply API schema, on a Mesh or a GeomSubset."),
 )
 
@@ -41,13 +45,20 @@ def main() -> None:
     lines = [
         "# The schema",
         "",
-        "Made by `make docs` from the schema itself; edit `schema.usda`.",
+        "`python docs/make_schema.py` makes this page from the registered schema. To change it, "
+        "edit"
+        " `fabricusd/schema/schema.usda` and run `make schema`.",
         "",
     ]
     for name, what in TYPES:
         lines += [f"## {name}", "", what, "", *table(name), ""]
-    lines += ["## Rules", "", "What `fabricusd check` and USD's own validation report.", ""]
-    lines += ["| rule | severity | holds where |", "|---|---|---|"]
+    lines += [
+        "## Rules",
+        "",
+        "`fabricusd check` and USD's own validation report where a rule does not hold.",
+        "",
+    ]
+    lines += ["| rule | severity | the rule |", "|---|---|---|"]
     lines += [f"| {rule.name} | {rule.severity} | {rule.doc} |" for rule in RULES]
     (HERE / "schema.md").write_text("\n".join(lines) + "\n")
 

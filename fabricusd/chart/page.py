@@ -58,11 +58,12 @@ def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: st
     """The page: a picture, the front, and who is dominated by whom, for each panel; the sheets."""
     parts = [
         "# Speed against accuracy\n",
-        f"Made by `{command}`: every method in one process on one machine, in turns. Cost is given "
-        "as a multiple of the cheapest method's in its group; ± is half the range between the "
-        "quartiles over repeats. A method is dominated when another is no dearer and no worse, and "
-        "better in either by more than both spreads. `charts.csv` and `charts.json` hold every "
-        "figure, absolute costs included.\n",
+        f"`{command}` makes this page. It runs every method in one process on one machine, in "
+        "turns. The cost of a method is a multiple of the cost of the cheapest method in its "
+        "group. The figure after ± is half the range between the quartiles over repeats. A method "
+        "is dominated when another method is no dearer and no worse, and is better in cost or "
+        "error by more than both spreads. `charts.csv` and `charts.json` hold every figure, "
+        "including absolute costs.\n",
         "## What --max-error takes\n",
         *_choices(),
         *_limits(),
@@ -118,10 +119,11 @@ def _choices() -> list[str]:
     """The shadowing that each preset gets at some bounds, from the table that is in use."""
     table = read_table()
     lines = [
-        "The shadowing that `fabricusd render --max-error` chooses: the cheapest whose error is "
-        "within the bound, else the nearest (*). In brackets cost over the cheapest method's, and "
-        "error. `fabricusd chart --choice fabricusd/chart/choice.json` remakes the table; "
-        "`render -n` says what would be chosen, and why.\n",
+        "`fabricusd render --max-error` chooses the cheapest shadowing whose error is within the "
+        "bound. If there is none, it chooses the one with the least error (*). In brackets: the "
+        "cost over that of the cheapest method, and the error. "
+        "`fabricusd chart --choice fabricusd/reference/choice.json` remakes the table. "
+        "`fabricusd render -n` prints the choice and the reason.\n",
         "| preset | " + " | ".join(f"{b:g}" for b in BOUNDS) + " |",
         "|---|" + "---|" * len(BOUNDS),
     ]
@@ -139,11 +141,13 @@ def _choices() -> list[str]:
 def _limits() -> list[str]:
     """Where level `auto` changes for each preset at some bounds, from the table that is in use."""
     lines = [
-        "Level `auto` with a bound: `far` from so many repeats under a pixel on / `thread` from so "
-        "many pixels on a thread on, `weave` between. There and at every wider pixel the level is "
-        "within the bound of `thread` filtered: rms over the pixels, over the cloth's mean, the "
-        "worst of three lights, without shadows. Without a bound the levels change "
-        f"about {DEFAULT.repeats:g} / {DEFAULT.pixels:g}, gradually.\n",
+        "The next table is for level `auto` with a bound. A cell holds two limits. `auto` uses "
+        "`far` when a pixel spans at least as many repeats as the first limit, and `thread` when a "
+        "thread spans at least as many pixels as the second limit. Between them it uses `weave`. "
+        "At its limit and at every wider pixel, a level is within the bound of a filtered "
+        "`thread`. This error is the rms over the pixels, over the cloth's mean, for the worst of "
+        "three lights, without shadows. Without a bound, the levels change gradually around "
+        f"{DEFAULT.repeats:g} / {DEFAULT.pixels:g}.\n",
         "| preset | " + " | ".join(f"{b:g}" for b in LEVEL_BOUNDS) + " |",
         "|---|" + "---|" * len(LEVEL_BOUNDS),
     ]

@@ -145,13 +145,13 @@ def _bright(beauty: NDArray[Any]) -> Any:
 
 SHEETS: dict[str, tuple[str, Callable[[Path, bool], list[Path]]]] = {
     "cylinders": (
-        "Figure 5.6: linen, crêpe de Chine and satin on a cylinder, filament threads upright, "
-        "round and aslant; the ticks are where the tangent curve puts the highlights",
+        "Figure 5.6: linen, crêpe de Chine and satin on a cylinder, with the filament threads "
+        "upright, round and aslant; ticks mark where the tangent curve puts the highlights",
         cylinder_sheet,
     ),
     "shadowed": (
-        "Figure 5.3: crêpe de Chine from above, light from the left at 15°: unshadowed, shadowed, "
-        "the mask",
+        "Figure 5.3: crêpe de Chine from above, with light from the left at 15°: unshadowed, "
+        "shadowed, and the mask",
         shadow_sheet,
     ),
     "draped": ("Figure 5.4: six fabrics on a hanging cloth", drape_sheet),

@@ -70,8 +70,8 @@ def mirror_at_grazing() -> Case:
         unit="f_s [1/sr]", x=away,
         published=thread_value(thread, wi, wo, "microcylinder").mean(axis=1),
         ours=thread_value(thread, wi, wo, "conserving").mean(axis=1) * np.cos(theta),
-        said="f_s grows without bound, only f_s cos theta integrates; floors keep it finite, "
-        "and `conserving` times its cosine, drawn, has a limit",
+        said="f_s grows without bound, and only f_s cos theta integrates; floors keep it finite; "
+        "the plot shows `conserving` times its cosine, which has a limit",
         log_x=True,
     )  # fmt: skip
 
@@ -92,8 +92,9 @@ def along_the_thread() -> Case:
     return Case(
         where="w parallel to t or b", axis="distance from the thread's axis",
         unit="azimuth phi [degrees]", x=off, published=azimuth, ours=exact, log_x=True, log_y=False,
-        said="the azimuth of a projection of no length is 0/0, and noise long before: not a number "
-        "below 1e-8; atan2 keeps it to the end, and atan2(0, 0) = 0",
+        said="the azimuth of a projection of no length is 0/0; it is not a number below 1e-8, "
+        "and noise well before that; atan2 keeps the azimuth at every distance, and atan2(0, 0) "
+        "= 0",
     )  # fmt: skip
 
 
@@ -113,7 +114,7 @@ def wide_lobes() -> Case:
         where="gs → 0, gv ≥ 60°", axis="lobe width [degrees]", unit="area of the lobe", x=widths,
         published=published, ours=ours, log_x=True, log_y=False,
         said="the Gaussian's area outside ±90° is lost, a third of it at 90°; K integrates to 1 at "
-        "every width, in a form that stays finite for needles",
+        "every width, in a form that stays finite for very narrow lobes",
     )  # fmt: skip
 
 
@@ -142,8 +143,9 @@ def white_furnace() -> Case:
         where="A at 0 and 1, eta = 1 and large", axis="view from the normal [degrees]",
         unit="albedo of white cloth, single scattering", x=degrees,
         published=values["microcylinder"], ours=values["conserving"], log_y=False,
-        said="A is no albedo: linen sends back all light at A = 1, satin at 0.28; `conserving` "
-        "stays below 1 at every angle, and multiple scattering adds what is missing (albedo.md)",
+        said="A is not an albedo: linen reflects all light at A = 1, satin at A = 0.30; "
+        "`conserving` stays below 1 at every angle, and multiple scattering adds what is missing "
+        "([albedo.md](albedo.md))",
     )  # fmt: skip
 
 
@@ -157,7 +159,7 @@ def steep_curves() -> Case:
         where="±90° tangents", axis="steepest tangent angle [degrees]", unit="height over run",
         x=steepest, published=published, ours=np.where(steepest > 85.0, 0.0, published),
         said="the integral of the tangent diverges; curves beyond 85° are pile, without height or "
-        "shadow; zero lengths are jumps without weight",
+        "shadow; pieces of zero length are jumps without weight",
     )  # fmt: skip
 
 
@@ -201,8 +203,8 @@ def middle_distance() -> Case:
         where="mid distance, a thread per pixel", axis="threads a pixel", unit="alias over mean",
         x=np.array(real), published=np.array(point), ours=np.maximum(np.array(filtered), 1e-4),
         log_x=True,
-        said="point samples fold every frequency into moiré; `auto` with 4×4 samples; see "
-        "[charts.md](charts.md) for alias and blur apart",
+        said="point samples fold every frequency into moiré; ours is `auto` with 4×4 samples; "
+        "[charts.md](charts.md) shows alias and blur separately",
     )  # fmt: skip
 
 
@@ -222,8 +224,8 @@ def growing_energy() -> Case:
     return Case(
         where="A too large", axis="A", unit="energy after 8 bounces", x=scale,
         published=found["microcylinder"], ours=found["conserving"],
-        said="above A of about 1 linen gives back more than it gets, and bounces multiply it; "
-        "`check` warns above the safe value, `conserving` clamps A to 1",
+        said="above an A of about 1, linen reflects more light than arrives, and bounces "
+        "multiply it; `check` warns above the safe value, and `conserving` clamps A to 1",
     )  # fmt: skip
 
 
@@ -245,8 +247,8 @@ def below_the_cloth() -> Case:
         where="light or viewer below opaque cloth", axis="elevation of the viewer [degrees]",
         unit="radiance", x=elevation, published=np.maximum(published, 1e-6),
         ours=np.maximum(evaluate(fabric, wi, wo).mean(axis=1), 1e-6),
-        said="below velvet both the sum and the Q that divides it are 0; at or below the cloth "
-        "ours is 0 before either is asked",
+        said="below velvet both the sum and the Q that divides it are 0; ours returns 0 at or "
+        "below the cloth without evaluating either",
     )  # fmt: skip
 
 
@@ -258,7 +260,8 @@ def upright_threads() -> Case:
         where="n_t·N → 0 (pile) in `conserving`", axis="tangent angle [degrees]",
         unit="facet area over its shadow", x=angle, published=1.0 / cosine,
         ours=1.0 / np.maximum(cosine, math.cos(PILE_ANGLE)),
-        said="1/(n_t·N) diverges logarithmically over a curve; angles are clamped to 85° there",
+        said="the integral of 1/(n_t·N) over a curve diverges logarithmically; angles are "
+        "clamped to 85°",
     )  # fmt: skip
 
 
@@ -293,8 +296,8 @@ def light_at_the_surface() -> Case:
         where="light at or inside the surface", axis="height of the light's centre [m]",
         unit="irradiance [W/m²] of 1 W/sr", x=heights, published=1.0 / heights**2,
         ours=ours / ours[-1] / heights[-1] ** 2, log_x=True,
-        said="1/r² of a point grows without bound, a ball gives no more than its radiance; what it "
-        "has swallowed sees none of its outside",
+        said="1/r² of a point grows without bound; a ball gives no more than its radiance; a place "
+        "inside the ball does not see the ball's outside",
     )  # fmt: skip
 
 
@@ -304,10 +307,10 @@ CASES: tuple[Callable[[], Case], ...] = (
 )  # fmt: skip
 
 ELSEWHERE = {
-    "degenerate, mirrored, overlapping or missing UV": "refused or named in a note; "
+    "degenerate, mirrored, overlapping or missing UV": "refused, or reported in a note; "
     "tests/bake/layout/test_garment.py, tests/scene/usd/test_stage.py",
     "a 1×1 and a 4096×4096 grid": "tests/appearance/test_failures.py",
-    "grazing camera on a thin fold": "rays leave from beside the shading point, "
+    "grazing camera on a thin fold": "rays start beside the shading point; "
     "tests/reference/test_terminator.py",
 }
 """Rows of section 10 that are no formula of one variable, and what is done about them."""
@@ -338,10 +341,9 @@ def write_stability(page: Path, images: Path) -> list[Path]:
 def _text(cases: list[Case], image: Path, page: Path) -> str:
     lines = [
         "# Where formulas fail\n",
-        f"Made by `fabricusd chart -o {image.parent.as_posix()} --stability {page.as_posix()}`. "
-        "Every row of section 10 of [model.md](model.md): the formula as it is published along a "
-        "sweep, and what is computed "
-        "here.\n",
+        f"`fabricusd chart -o {image.parent.as_posix()} --stability {page.as_posix()}` makes this "
+        "page. For each row of section 10 of [model.md](model.md), it evaluates the published "
+        "formula along a sweep, and what fabricusd computes instead.\n",
         f"![Published and ours along each sweep]({image.relative_to(page.parent).as_posix()})\n",
         "| where | along | published, at worst | ours, at worst | what happens |",
         "|---|---|---|---|---|",
@@ -349,7 +351,7 @@ def _text(cases: list[Case], image: Path, page: Path) -> str:
     for case in cases:
         worst = (_worst(case.published), _worst(case.ours))
         lines.append(f"| {case.where} | {case.axis} | {worst[0]} | {worst[1]} | {case.said} |")
-    lines.append("\nRows that are no sweep:\n")
+    lines.append("\nThese rows are not sweeps:\n")
     lines += [f"- {where}: {what}." for where, what in ELSEWHERE.items()]
     return "\n".join(lines) + "\n"
 

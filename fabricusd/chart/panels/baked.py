@@ -66,9 +66,11 @@ def by_time(quick: bool) -> list[Row]:
 
 
 _ABOUT = (
-    "The BTF of one repeat in each form, 151 directions, its rank chosen by the bound. Error: "
-    "mean delta E 2000 against level `weave` at places and directions between those of the "
-    "table, interpolation included; no rank brings it below what the table's directions allow."
+    "Each form holds the BTF of one repeat, for 151 directions, with the rank that the bound "
+    "chooses. "
+    "The error is the mean delta E 2000 against level `weave` at places and directions between "
+    "those of the table, so it includes the interpolation. The spacing of the table's directions "
+    "limits it, whatever the rank."
 )
 
 PANELS = (
@@ -85,7 +87,8 @@ PANELS = (
         title="Baked forms: time",
         cost="processor seconds",
         error="mean delta E 2000",
-        about="The same bakes by what they take, the table included.",
+        about="This panel shows the same bakes by the time they take, including the time for the "
+        "table.",
         run=by_time,
     ),
 )

@@ -117,11 +117,12 @@ PANEL = Panel(
     cost="ns an evaluation",
     error="mean delta E 2000",
     about=(
-        "Standard surfaces over a bake whose texels span whole repeats, against level `far` over "
-        "pairs of directions of the hemisphere: `preview` is UsdPreviewSurface, `openpbr` also "
-        "stands for Standard Surface, `principled` is Blender's. A surface's cost is that of its "
-        "formulas in NumPy, the law's that of its float64 kernels; a renderer's own differ. What "
-        "Cycles shows of them is in [materials.md](materials.md)."
+        "Standard surfaces over a bake whose texels span whole repeats are compared with level "
+        "`far` over pairs of directions of the hemisphere. `preview` is UsdPreviewSurface. "
+        "`principled` is Blender's Principled BSDF. The cost of a surface is the cost of its "
+        "formulas in NumPy, and the cost of the law is the cost of its float64 kernels. A "
+        "renderer's own costs differ. [materials.md](materials.md) compares pictures of the "
+        "surfaces in Cycles."
     ),
     run=run,
     draw=draw,

@@ -145,12 +145,14 @@ PANEL = Panel(
     cost="processor seconds, one worker",
     error="relative mean square error",
     about=(
-        "A cylinder of cloth under a sky and a sun of 5°, level `auto` unless named; the "
-        "number is that of samples a pixel. Against a picture of many more samples by MIS, other "
-        "seed; preparation is not counted. FLIP and delta E 2000 of every row are in the tables. "
-        "A level's row holds its bias too: the reference's is `auto`. `one light`: no path "
-        "tracing, level `far` of every pixel at once, as NumPy has it and compiled; error against "
-        "NumPy with 256 nodes a piece."
+        "The scene is a cylinder of cloth under a sky and a sun of 5°, at level `auto` unless the "
+        "method names a level. The number in a method's name is the samples per pixel. The "
+        "reference is a picture of many more samples by MIS, with another seed, at level `auto`, "
+        "so the error of a method at another level includes the bias of that level. Preparation "
+        "is not counted. `charts.csv` and `charts.json` also hold FLIP and delta E 2000 of the "
+        "path-traced pictures. The group `one light` traces no paths: it evaluates level `far` "
+        "for all pixels at once, in NumPy and compiled, and its reference is NumPy with 256 "
+        "nodes per piece of a curve."
     ),
     run=run,
 )

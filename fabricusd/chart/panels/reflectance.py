@@ -233,9 +233,9 @@ PANEL = Panel(
     cost="ns an evaluation, one worker",
     error="mean error over mean value",
     about=(
-        f"Error on {CHECKED} pairs of directions spread over the hemisphere, against the law as it "
-        f"is written (plain float64 NumPy, {REFERENCE_NODES} nodes on each piece of a curve); "
-        "`conserving` without multiple scattering."
+        f"The error is taken on {CHECKED} pairs of directions spread over the hemisphere. The "
+        f"reference is the law as it is written, in plain float64 NumPy with {REFERENCE_NODES} "
+        "nodes on each piece of a curve. `conserving` is without multiple scattering."
     ),
     run=run,
 )

@@ -132,10 +132,11 @@ PANEL = Panel(
     cost="ns a shadow, one worker, light at 20°",
     error="rms difference of g from traced",
     about=(
-        "Share `g` of the light that reaches places spread evenly over the threads of one repeat, "
-        f"level `weave`, at {', '.join(map(str, ELEVATIONS))} degrees of elevation and {AZIMUTHS} "
-        "azimuths, single precision; against the height field marched in float64. The usual "
-        "`horizon` table has 16 azimuths of 8×4 texels a cell."
+        "Each method computes the share `g` of the light that reaches places spread evenly over "
+        "the threads of one repeat, at level `weave`, for lights at "
+        f"{', '.join(map(str, ELEVATIONS))} degrees of elevation and {AZIMUTHS} azimuths. "
+        "Methods run in single precision. The reference is the height field marched in float64. "
+        "The default `horizon` table has 16 azimuths and 8×4 texels per cell."
     ),
     run=run,
 )

@@ -151,11 +151,13 @@ PANEL = Panel(
     cost="ns a pixel, one worker",
     error="rms difference over mean",
     about=(
-        "A flat cloth, a pixel so many threads wide, the camera rolled, level `weave` "
-        "with shadows by `horizon`; `auto` goes from `far` to `weave` and no further. The "
-        "reference is the cloth's spectrum below the picture's Nyquist frequency. Alias is what "
-        "the picture holds beside it, moiré above all; blur what it lacks of it, shift how far its "
-        "mean is off. Their squares add up to that of the error."
+        "The scene is a flat cloth seen by a rolled camera; the group says how many threads a "
+        "pixel spans. "
+        "The level is `weave` with shadows by `horizon`, unless the method names another; `auto` "
+        "here uses only `far` and `weave`. The reference is the cloth's spectrum below the "
+        "picture's Nyquist frequency. Alias is what the picture contains beyond the reference, "
+        "mostly moiré. Blur is what it lacks. Shift is the error of its mean. The square of the "
+        "error is the sum of their squares."
     ),
     run=run,
     draw=draw,
