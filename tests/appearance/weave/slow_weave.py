@@ -19,6 +19,8 @@ class Found(NamedTuple):
     position: float
     across: float
     angle: float
+    length: float
+    """Length of the visible run in cells."""
     edge: float
     """How near the point is to where another thread, or another piece of curve, begins."""
 
@@ -32,7 +34,7 @@ def slow_lookup(fabric: Fabric, u: float, v: float) -> Found:
     edges = [abs(abs(x - 0.5) - width[WARP] / 2), abs(abs(y - 0.5) - width[WEFT] / 2)]
     edges += [x, 1 - x, y, 1 - y]
     if not (in_warp or in_weft):
-        return Found(GAP, 0, 0.0, 0.0, 0.0, min(edges))
+        return Found(GAP, 0, 0.0, 0.0, 0.0, 0.0, min(edges))
 
     def warp_on_top(i: int, j: int) -> bool:
         return bool(cells[i % cells.shape[0], j % cells.shape[1]])
@@ -41,7 +43,7 @@ def slow_lookup(fabric: Fabric, u: float, v: float) -> Found:
     hit = WARP if warp else WEFT
     along, offset = (v, x) if warp else (u, y)
     w = (offset - 0.5) / (width[hit] / 2)
-    s = _place_on_thread(
+    s, length = _place_on_thread(
         [warp_on_top(end, k) if warp else not warp_on_top(k, pick) for k in _repeat(fabric, warp)],
         float(width[1 - hit]), along,
     )  # fmt: skip
@@ -52,39 +54,39 @@ def slow_lookup(fabric: Fabric, u: float, v: float) -> Found:
         curve.positions[-1] - curve.positions[0]
     )
     edges.append(float(np.abs(jumps - s).min()))
-    return Found(hit, kind, s, -w if warp else w, float(angle_at(curve, s)), min(edges))
+    return Found(hit, kind, s, -w if warp else w, float(angle_at(curve, s)), length, min(edges))
 
 
 def _repeat(fabric: Fabric, warp: bool) -> range:
     return range(fabric.weave.cells.shape[1 if warp else 0])
 
 
-def _place_on_thread(on_top: list[bool], crossing: float, along: float) -> float:
-    """s on the visible run at `along`; the crossing thread k covers k + 1/2 +- crossing/2.
+def _place_on_thread(on_top: list[bool], crossing: float, along: float) -> tuple[float, float]:
+    """(s, length in cells) of the visible run at `along`; the crossing thread k covers k + 1/2 +- crossing/2.
 
     What is seen of a thread is cut up by the threads that lie over it; the pieces that hold a cell
     where it is on top are runs. All other pieces of a hidden run are put together to one.
     """
     n = len(on_top)
     if all(on_top):
-        return along % n / n
+        return along % n / n, float(n)
     hiding = [k for k in range(-2 * n, 4 * n) if not on_top[k % n]]
     along = along % n + n
     before = max(k for k in hiding if k + 0.5 + crossing / 2 <= along + 1e-12)
     after = min(k for k in hiding if k + 0.5 - crossing / 2 >= along - 1e-12)
     if after > before + 1:
         low, high = before + 0.5 + crossing / 2, after + 0.5 - crossing / 2
-        return (along - low) / (high - low)
+        return (along - low) / (high - low), high - low
     strip = 1 - crossing
     inside = along - (before + 0.5 + crossing / 2)
     if not any(on_top):
         # The repeat starts in the middle of a strip: its first half lies before thread 0.
-        return ((along % n) - sum(min(max(along % n - (k + 0.5 - crossing / 2), 0), crossing)
-                                  for k in range(n))) / (n * strip)  # fmt: skip
+        covered = sum(min(max(along % n - (k + 0.5 - crossing / 2), 0), crossing) for k in range(n))
+        return (along % n - covered) / (n * strip), n * strip
     first = before
     while not on_top[(first - 1) % n]:
         first -= 1
     last = before
     while not on_top[(last + 1) % n]:
         last += 1
-    return ((before - first) * strip + inside) / ((last - first) * strip)
+    return ((before - first) * strip + inside) / ((last - first) * strip), (last - first) * strip

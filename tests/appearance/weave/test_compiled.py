@@ -38,19 +38,24 @@ def test_runs_are_where_cells_are_equal_along_the_thread(fabric: Fabric) -> None
     m, n = cells.shape
     for slot in range(cloth.runs.shape[2]):
         place, length = cloth.runs[:, :, slot, 0].astype(int), cloth.runs[:, :, slot, 1].astype(int)
-        assert (place < length).all()
         for i in range(m):
             for j in range(n):
                 step = (0, 1) if cells[i, j] == (slot == 0) else (1, 0)
                 period = n if step == (0, 1) else m
+                if length[i, j] == 0:
+                    line = cells[i, :] if step == (0, 1) else cells[:, j]
+                    assert (line == cells[i, j]).all()
+                    assert place[i, j] == (j if step == (0, 1) else i)
+                    continue
+                assert place[i, j] < length[i, j]
                 inside = [
                     cells[(i + step[0] * k) % m, (j + step[1] * k) % n]
                     for k in range(-place[i, j], length[i, j] - place[i, j])
                 ]
                 assert all(x == cells[i, j] for x in inside)
-                if length[i, j] < period:
-                    for k in (-place[i, j] - 1, length[i, j] - place[i, j]):
-                        assert cells[(i + step[0] * k) % m, (j + step[1] * k) % n] != cells[i, j]
+                assert length[i, j] < period
+                for k in (-place[i, j] - 1, length[i, j] - place[i, j]):
+                    assert cells[(i + step[0] * k) % m, (j + step[1] * k) % n] != cells[i, j]
 
 
 def test_the_true_repeat_is_that_of_grid_and_sequences() -> None:

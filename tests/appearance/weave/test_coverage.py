@@ -26,7 +26,7 @@ RULES = {
     # weave, warp, weft -> (weft, warp) width, gap
     "linen: both less than their cells": (PLAIN, 0.33, 0.33, (0.416905, 0.416905), 0.34),
     "satin: the warp takes what the weft leaves": (SATIN_5, 0.9, 0.1, (0.5, 1), 0.0),
-    "the rest is gap": (SATIN_5, 0.85, 0.1, (0.378302, 0.919575), 0.05),
+    "the rest is gap": (SATIN_5, 0.85, 0.1, (0.378301, 0.919575), 0.05),
     "exactly the cells": (SATIN_5, 0.8, 0.2, (1, 1), 0.0),
     "nowhere on top, and yet seen": (ALL_WARP, 0.7, 0.2, (2 / 3, 0.7), 0.1),
     "nowhere on top, filling the rest": (ALL_WARP, 0.75, 0.25, (1.0, 0.75), 0.0),
