@@ -29,7 +29,7 @@ from fabricusd.bake.btf.write import between
 from fabricusd.bake.layout.garment import garments
 from fabricusd.bake.texels.blocks import bake_block
 from fabricusd.bake.texels.maps import REGISTRY
-from fabricusd.bake.texels.planes import AZIMUTHS
+from fabricusd.bake.texels.moment_indices import AZIMUTHS
 from fabricusd.bake.texels.recipe import recipe
 from fabricusd.bake.texels.sheet import sheets_of, texel_start, texel_step
 from fabricusd.fabric import Fabric

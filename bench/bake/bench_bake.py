@@ -21,7 +21,7 @@ from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.bake.bake import bake
 from fabricusd.bake.job import Settings
 from fabricusd.bake.layout.garment import garments
-from fabricusd.bake.texels import planes
+from fabricusd.bake.texels import moment_indices as m
 from fabricusd.bake.texels.angle_rows import steepness
 from fabricusd.bake.texels.blocks import composed, layers_of
 from fabricusd.bake.texels.maps import Texels, chosen_maps
@@ -48,14 +48,14 @@ def square(fabric: Fabric, threads: float) -> Scene:
     return Scene(meshes=[mesh], materials=[surface])
 
 
-def plain_planes(made: Recipe, fabric: Fabric, step: np.ndarray, size: int) -> np.ndarray:
-    """The same planes with NumPy's own functions: the weave by masks, tables by fancy indices."""
+def plain_moments(made: Recipe, fabric: Fabric, step: np.ndarray, size: int) -> np.ndarray:
+    """The same moments with NumPy's own functions: the weave by masks, tables by fancy indices."""
     cells = fabric.weave.cells
     ends, picks = cells.shape
     psi0 = _angles(fabric)
-    total = np.zeros((planes.HORIZON, size, size))
+    total = np.zeros((m.HORIZON, size, size))
     split, thread = steepness(fabric), fabric.thread_list[0]
-    horizon = np.zeros((planes.AZIMUTHS, size, size))
+    horizon = np.zeros((m.AZIMUTHS, size, size))
     reflected = reflectance_table(fabric)
     table = made.table.astype(np.float32) ** 2 / 255.0**2
     y, x = np.mgrid[0:size, 0:size].astype(np.float64)
@@ -75,30 +75,30 @@ def plain_planes(made: Recipe, fabric: Fabric, step: np.ndarray, size: int) -> n
             slope = -np.tan(angle) * seen
             su, sv = np.where(top, 0.0, slope), np.where(top, slope, 0.0)
             narrow = min(thread.gamma_surface**2, 1.0)
-            part = planes.PARTS * top + 2 * (angle < 0) + (np.abs(angle) > split[top.astype(int)])
-            total[planes.COVER] += seen
-            for k in range(2 * planes.PARTS):
+            part = m.PARTS * top + 2 * (angle < 0) + (np.abs(angle) > split[top.astype(int)])
+            total[m.COVER] += seen
+            for k in range(2 * m.PARTS):
                 mine = (part == k) & seen
-                total[planes.SHARE + k] += mine
-                total[planes.ANGLE + k] += np.where(mine, angle, 0.0)
-                total[planes.ANGLE_2 + k] += np.where(mine, angle * angle, 0.0)
+                total[m.SHARE + k] += mine
+                total[m.ANGLE + k] += np.where(mine, angle, 0.0)
+                total[m.ANGLE_2 + k] += np.where(mine, angle * angle, 0.0)
             for k, of_set in enumerate((~top & seen, top & seen)):
                 for channel in range(3):
-                    total[planes.TINT + 3 * k + channel] += of_set * thread.albedo[channel]
-                total[planes.LOBE_2 + k] += np.where(of_set, narrow, seen)
+                    total[m.TINT + 3 * k + channel] += of_set * thread.albedo[channel]
+                total[m.LOBE_2 + k] += np.where(of_set, narrow, seen)
             for k, value in enumerate((su, sv, su * su, sv * sv, su * sv)):
-                total[planes.SLOPE + k] += value
+                total[m.SLOPE + k] += value
             length = made.cloth.runs[i, j, 0, 1] * fabric.warp.pitch
             lift = made.cloth.half_thickness[0, 0]
-            total[planes.HEIGHT] += (np.interp(s, *_heights(fabric)) * length + lift) * seen
-            total[planes.FRESNEL] += seen * ((thread.ior - 1) / (thread.ior + 1)) ** 2
+            total[m.HEIGHT] += (np.interp(s, *_heights(fabric)) * length + lift) * seen
+            total[m.FRESNEL] += seen * ((thread.ior - 1) / (thread.ior + 1)) ** 2
             at = np.degrees(angle) + 90.0
             low = np.clip(at.astype(int), 0, 179)
             values = reflected[top.astype(int), 0, low] * seen[..., None]
-            total[planes.SURFACE] += values[..., 0]
-            total[planes.FUZZ] += values[..., 2]
+            total[m.SURFACE] += values[..., 0]
+            total[m.FUZZ] += values[..., 2]
             for channel in range(3):
-                total[planes.VOLUME + channel] += values[..., 1] * thread.albedo[channel]
+                total[m.VOLUME + channel] += values[..., 1] * thread.albedo[channel]
             rows = np.clip((along * table.shape[3]).astype(int), 0, table.shape[3] - 1)
             columns = np.clip(((over - 0.5) / width + 0.5) * table.shape[4], 0, table.shape[4] - 1)
             found = table[i, j, 0, rows, columns.astype(int)] * seen[..., None]
@@ -134,14 +134,14 @@ def against_numpy() -> None:
             for by in range(sheet.across):
                 layers = next(layers_of(sheet, bx, by))
                 for texture in maps:
-                    composed(texture, layers, sheet.block)
+                    composed(texture, layers, sheet.block_side)
 
     def plain() -> None:
         sheet = sheets_of(one, (made,), {1001: (0, 0)}, size, 0)[0]
         step = np.abs(texel_step(sheet, 0))
         for _ in range(sheet.across**2):
-            found = plain_planes(made, fabric, step, sheet.block)
-            texels = Texels.of_planes(found.reshape(planes.PLANES, -1), made, one.lays[0])
+            found = plain_moments(made, fabric, step, sheet.block_side)
+            texels = Texels.of_moments(found.reshape(m.MOMENTS, -1), made, one.lays[0])
             for texture in maps:
                 if not texture.exact:
                     texture.function(texels).astype(texture.kind)

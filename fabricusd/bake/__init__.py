@@ -1,1 +1,1 @@
-"""Textures of a fabric on a garment, with a statement of how far they are from the truth."""
+"""Bake the fabrics of a garment into textures and measure the error of the textures."""

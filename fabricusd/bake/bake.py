@@ -1,4 +1,4 @@
-"""From a scene to a folder of textures."""
+"""Bake the fabrics of a scene into a folder of textures."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from fabricusd.bake.texels.maps import TextureMap, chosen_maps
 from fabricusd.bake.texels.recipe import Recipe, recipe
 from fabricusd.bake.texels.sheet import LARGEST, SMALLEST, Sheet, sheets_of
 from fabricusd.bake.work.assemble import Files, Progress, Work, assemble, compute
-from fabricusd.bake.work.kept import kept
+from fabricusd.bake.work.checkpoint import checkpoint_of
 from fabricusd.bake.work.lock import locked
 from fabricusd.bake.work.scratch import Scratch
 from fabricusd.errors import FabricError
@@ -51,7 +51,7 @@ from fabricusd.scene.size import size_words, threads_words
 from fabricusd.schema import save_all
 
 FEWEST = 2.0
-"""Texels per thread below which threads do not resolve and texels hold means of several."""
+"""Texels per thread below which a texel holds the mean of several threads instead of one thread."""
 
 
 def bake(
@@ -66,16 +66,16 @@ def bake(
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Baked:
-    """Bake what wears a fabric in `scene` into the folder `out`; its textures and their manifest.
+    """Bake every mesh of `scene` that wears a fabric: write textures and a manifest to `out`.
 
-    fabric : laid on everything that names none, as for `render`
-    mesh : path of the one mesh to bake
-    units : of an .obj or .ply, see `read_scene`
-    resume : go on with a bake of the same job that was stopped
+    fabric : the fabric of all meshes that do not bind one, as in `render`
+    mesh : path of a single mesh to bake; None bakes all of them
+    units : length unit of an .obj or .ply file, see `read_scene`
+    resume : continue an interrupted bake of the same job
 
-    Raises FabricError for a scene, mesh or setting that cannot be baked, before anything is
-    written; where another process bakes into `out`; and for a disk that is full, with what is done
-    kept for `resume`.
+    Raises FabricError before anything is written if the scene, the mesh or a setting cannot be
+    baked or if another process bakes into `out`. Raises FabricError if the disk fills up; finished
+    blocks then remain on disk for `resume`.
     """
     began = time.perf_counter()
     settings = settings or Settings()
@@ -95,7 +95,11 @@ def bake(
 
 @dataclass(frozen=True, kw_only=True)
 class _Job:
-    """What is to be baked, all of it checked; notes : of the scene, tiles : of each garment"""
+    """A checked request: the garments, maps and resolution to bake.
+
+    notes : from the scene's reader
+    tiles : UDIM tiles of each garment, in the order of `found`
+    """
 
     settings: Settings
     notes: list[str]
@@ -130,7 +134,7 @@ def _job(
 def _bake(
     job: _Job, folder: Path, *, resume: bool, workers: int, progress: Progress | None
 ) -> Baked:
-    """The textures, meshes and fabrics in `folder`, and what is measured of them."""
+    """Write the textures, meshes and fabrics to `folder` and measure their errors."""
     settings, found = job.settings, job.found
     for one, places in zip(found, job.tiles, strict=True):
         refuse_overlaps(one, places, min(job.resolution, 2048), folder)
@@ -151,7 +155,7 @@ def _bake(
         notes=[*job.notes, *(n for g in found for n in g.notes), *_coarse(found, resolution)],
     )
     scratch = Scratch(folder, _key(found, settings, resolution, maps), resume=resume)
-    _check_space(folder, sum(kept(sheet, maps).bytes_needed for sheet in sheets))
+    _check_space(folder, sum(checkpoint_of(sheet, maps).bytes_needed for sheet in sheets))
     files = Files(folder=folder, udim=settings.udim, file_format=settings.file_format)
     work = Work(
         scratch=scratch, sheets=sheets, maps=maps, files=files, workers=workers, progress=progress
@@ -175,7 +179,10 @@ def _bake(
 
 
 def _chosen(job: _Job, recipes: dict[Fabric, Recipe]) -> tuple[int, list[TextureMap], list[Tried]]:
-    """Resolution and maps; where an error is asked for the cheapest, and what was tried."""
+    """Return the resolution, the maps and the trials of a search.
+
+    With `max_error` set, the cheapest choice that meets it; otherwise what the settings name.
+    """
     settings = job.settings
     if not settings.max_error:
         return job.resolution, job.maps, []
@@ -194,7 +201,7 @@ def _chosen(job: _Job, recipes: dict[Fabric, Recipe]) -> tuple[int, list[Texture
 
 
 def _measure(result: Baked, sheets: Sequence[Sheet], settings: Settings) -> None:
-    """The error of each garment's first sheet, and the BTFs of its fabrics."""
+    """Measure the error of each garment's first sheet and write the BTFs of its fabrics."""
     for sheet in sheets:
         name = sheet.garment.name
         if name not in result.errors:
@@ -225,7 +232,7 @@ def _sheets(
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What a bake would make, a line for each garment, and what had to be assumed or left out."""
+    """What a bake would write: one line per garment, and notes on assumptions and omissions."""
 
     lines: list[str]
     notes: list[str]
@@ -241,7 +248,7 @@ def plan(
     units: str | None = None,
     workers: int | None = None,
 ) -> Plan:
-    """What `bake` would make, with the same errors, and nothing written."""
+    """Describe what `bake` would write, without writing it; raises the same errors."""
     worker_count(workers)
     job = _job(scene, settings, fabric, mesh, units)
     if out is not None:
@@ -264,7 +271,7 @@ def plan(
 
 
 def _extent(one: Garment) -> str:
-    """A garment's size, and how many threads of each fabric run across it."""
+    """Describe a garment's size and how many threads of each fabric run across it."""
     corners = one.points[one.triangles].reshape(-1, 3)
     words = size_words(corners.min(axis=0), corners.max(axis=0))
     for k, lay in enumerate(one.lays):
@@ -282,7 +289,7 @@ def _garments(
     fabric: str | Fabric | Binding | None,
 ) -> list[Garment]:
     if settings.unwrap:
-        # The warp runs along an axis of the world, so a turned mesh gets another grain.
+        # The warp follows a world axis, so a rotated copy of a mesh has a different grain.
         make = partial(unwrapped, settings.unwrap, as_binding(fabric))
         return garments(scene, mesh, make, turned=False)
     found = garments(scene, mesh)
@@ -295,21 +302,21 @@ def _folder(out: str | os.PathLike[str]) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FabricError(str(folder), f"cannot be made: {error.strerror}") from error
+        raise FabricError(str(folder), f"cannot be created: {error.strerror}") from error
     return folder
 
 
 def _check_folder(folder: Path) -> None:
-    """Raise FabricError for a folder that cannot be made or written."""
-    # os.path answers False where pathlib raises: names too long, folders nobody may look into.
+    """Raise FabricError for a folder that cannot be created or written to."""
+    # os.path returns False where pathlib raises: for overlong names and unreadable parents.
     if os.path.exists(folder) and not os.path.isdir(folder):
-        raise FabricError(str(folder), "is a file; it must be a folder's name")
+        raise FabricError(str(folder), "is a file; the output must be a folder")
     there = next((one for one in (folder, *folder.parents) if os.path.exists(one)), Path("."))
     if not os.path.isdir(there):
-        raise FabricError(str(folder), f"cannot be made: {there} is a file, not a folder")
+        raise FabricError(str(folder), f"cannot be created: {there} is a file, not a folder")
     if not os.access(there, os.W_OK):
-        verb = "written" if there == folder else "made"
-        raise FabricError(str(folder), f"cannot be {verb}; {there} must be a folder of yours")
+        verb = "written" if there == folder else "created"
+        raise FabricError(str(folder), f"cannot be {verb}: you may not write to {there}")
 
 
 def _resolution(settings: Settings, found: Sequence[Garment]) -> int:
@@ -319,8 +326,8 @@ def _resolution(settings: Settings, found: Sequence[Garment]) -> int:
     if not SMALLEST <= asked <= LARGEST:
         raise FabricError(
             "--texels-per-thread",
-            f"is {settings.texels_per_thread:g}, which takes {asked:.6g} texels; it must lead to "
-            f"{SMALLEST} to {LARGEST}: bake fewer threads a tile",
+            f"is {settings.texels_per_thread:g}, which needs a resolution of {asked:.6g} texels; "
+            f"the resolution must be from {SMALLEST} to {LARGEST}: bake fewer threads per tile",
         )
     return asked
 
@@ -331,8 +338,8 @@ def _coarse(found: Sequence[Garment], resolution: int) -> list[str]:
         texels = resolution / threads_per_uv(one)
         if texels < FEWEST:
             notes.append(
-                f"{one.copies[0]} has {texels:.2g} texels per thread; threads resolve from "
-                f"{FEWEST:g}, so each texel holds the mean of what it spans"
+                f"{one.copies[0]} has {texels:.2g} texels per thread; threads are resolved from "
+                f"{FEWEST:g} upwards, so each texel holds the mean of the threads it spans"
             )
     return notes
 
@@ -361,5 +368,5 @@ def _check_space(folder: Path, need: int) -> None:
     if need > free:
         raise FabricError(
             str(folder),
-            f"has {free / 1e9:.3g} GB left; the bake needs {need / 1e9:.3g} GB while it runs",
+            f"has {free / 1e9:.3g} GB left; the bake needs {need / 1e9:.3g} GB of working space",
         )

@@ -1,4 +1,4 @@
-"""What a bake is asked for, and what it has made."""
+"""The settings and the result of a bake."""
 
 from __future__ import annotations
 
@@ -14,26 +14,28 @@ from fabricusd.bake.texels.encoding import Encoding
 from fabricusd.bake.texels.maps import TextureMap
 
 MARGIN = 16
-"""Texels that a shell is continued beyond its border: enough for four mip levels without a seam."""
+"""Texels by which a UV shell is extended beyond its border: enough for four seamless mip levels."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What is made of a scene.
+    """What to bake, and how.
 
-    resolution : texels along a side, a power of two from 64; 0 to take `texels_per_thread`
+    resolution : texels along a side, a power of two from 64 on
+    texels_per_thread : if not 0, the resolution is derived from it
     maps : names from the registry, None for all
     light : direction to a light in the surface frame, for the map `shadow`
-    level : "weave" or "thread", whether threads are flat or round across their width
-    udim : bake each UDIM tile that the UVs reach into
-    fit : move and scale each garment's UVs into the unit square first
-    unwrap : "x", "y" or "z": new UVs by xatlas, with the warp along that axis of the world
-    max_error : mean delta E 2000 of re-lit texels against level `weave` to reach; 0 to ask nothing
+    shadow : method of that map, "peak", "horizon" or "traced"
+    level : "weave" for threads that are flat across their width, "thread" for round ones
+    udim : bake every UDIM tile that the UVs reach
+    fit : translate and scale each garment's UVs into the unit square first
+    unwrap : "x", "y" or "z": new UVs by xatlas, with the warp along that world axis
+    max_error : bound on the mean delta E 2000 of re-lit texels against level `weave`; 0 for none
     btf : forms of the BTF to write, see `btf.write.FORMS`
-    file_format : "exr", or "png" or "tiff" for 16-bit integers and the finest level alone
-    margin : texels that a shell is continued beyond its border
+    file_format : "exr", or "png" or "tiff" for 16-bit integers and the finest level only
+    margin : texels by which a UV shell is extended beyond its border
 
-    `ranges.check_settings` says what each may be; `bake` and `plan` ask it before any work.
+    `ranges.check_settings` states the accepted values; `bake` and `plan` call it before any work.
     """
 
     resolution: int = 1024
@@ -53,15 +55,16 @@ class Settings:
 
 @dataclass(kw_only=True)
 class Baked:
-    """What a bake has made.
+    """The result of a bake.
 
     files : names of the textures, by garment, map and UDIM number
-    encodings : of each file whose numbers are not the values themselves
-    errors : of each garment, measured as `accuracy.swatch_error` does with the maps that were made
-    map_errors : of each garment and map
-    tried : where a bound was asked for, what was tried to meet it
+    encodings : by file name, for files whose numbers are not the values themselves
+    errors : by garment, as `accuracy.swatch_error` measures them, for the maps that were written
+    map_errors : by garment and map
+    tried : the trials of the search, if `max_error` was set
     btf : records of the BTFs that were written, by fabric
-    notes : what had to be assumed or left out
+    notes : assumptions and omissions
+    finished : False if the bake was interrupted
     """
 
     folder: Path
@@ -79,7 +82,7 @@ class Baked:
     finished: bool = True
 
     def reached(self, max_error: float) -> bool:
-        """Whether every garment, and every BTF, is within `max_error`."""
+        """Whether the error of every garment and every BTF is at most `max_error`."""
         records = [r["delta_e"] for rows in self.btf.values() for r in rows]
         return all(e.point <= max_error for e in self.errors.values()) and all(
             e <= max_error for e in records

@@ -1,4 +1,4 @@
-"""What was made, of what, and how: the manifest beside the textures."""
+"""Compose the manifest: what was baked, from which scene, and with which settings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any]:
-    """Everything that a loader or a reader of the textures has to know, for JSON."""
+    """Return, for JSON, everything that a program needs to read the textures."""
     return {
         "fabricusd": __version__,
         "versions": {
@@ -75,7 +75,7 @@ def manifest_of(result: Baked, settings: Settings, scene: Path) -> dict[str, Any
 
 
 def _file(result: Baked, file: str) -> dict[str, Any]:
-    """A texture's entry; with its `encoding.Encoding` where its numbers are not the values."""
+    """Return a texture's entry, with its `Encoding` if the file does not store plain values."""
     said: dict[str, Any] = {"file": file, "sha256": sha256(result.folder / file)}
     if file in result.encodings:
         said["encoding"] = asdict(result.encodings[file])

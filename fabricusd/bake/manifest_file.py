@@ -1,7 +1,7 @@
-"""Reading a manifest that somebody else may have written: every field is checked before it is used.
+"""Read a manifest from an untrusted source: every field is checked before it is used.
 
-Names must be such as the baker writes, and files lie in the manifest's own folder, so a manifest
-can neither send what is written elsewhere nor have other files read.
+Names must follow the baker's own scheme, and files must lie in the manifest's folder. A manifest
+therefore cannot redirect output to another folder or have other files read.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ MANIFEST = "manifest.json"
 RESOLUTIONS = frozenset(1 << k for k in range(SMALLEST.bit_length() - 1, LARGEST.bit_length()))
 
 SINGULAR = 1e-12
-"""Determinant of threads per UV below which a lay cannot be inverted, over the product of its rows'
-lengths."""
+"""A lay whose determinant, relative to the product of its rows' lengths, is smaller than this
+cannot be inverted."""
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """The manifest of a bake folder, all of whose fields that are read are of their type.
+    """Read the manifest of a bake folder and check the type of every field that is used.
 
-    Raises FabricError for a file that is none, with the place and the value of the first fault.
+    Raises FabricError, with the place and the value of the first fault, for an invalid manifest.
     """
     root = read_stated(file_in(folder, MANIFEST))
     udim = root.field("settings").field("udim").flag()
@@ -47,7 +47,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     for name, one in garments.items():
         if not is_file_stem(name) or not taken.isdisjoint(folded(name)):
             one.below(name, name).refuse(
-                "the name of one garment: letters, digits, _ and -, and no other's in other letters"
+                "the name of one garment: letters, digits, _ and -, and different from all others "
+                "in more than letter case"
             )
         taken |= folded(name)
         _check_garment(name, one, udim, maps)
@@ -55,9 +56,9 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def _check_map(name: str, one: Stated) -> bool:
-    """Refuse a map that the baker does not know, or with other channels."""
+    """Refuse a map that the baker does not know or whose channels differ from the baker's."""
     if name not in REGISTRY:
-        one.refuse(f"the entry of one of {', '.join(REGISTRY)}")
+        one.refuse(f"an entry for one of {', '.join(REGISTRY)}")
     channels = one.field("channels")
     known = list(REGISTRY[name].channels)
     if [channel.text() for channel in channels.entries()] != known:
@@ -82,10 +83,10 @@ def _check_garment(name: str, one: Stated, udim: bool, maps: set[str]) -> None:
     all_tiles: set[str] | None = None
     for texture, tiles in one.field("files").items():
         if texture not in maps:
-            tiles.refuse(f"of a map that 'maps' describes: {', '.join(sorted(maps)) or 'none'}")
+            tiles.refuse(f"for a map listed in 'maps': {', '.join(sorted(maps)) or 'none'}")
         all_tiles = set(tiles.fields()) if all_tiles is None else all_tiles
         if not all_tiles or set(tiles.fields()) != all_tiles:
-            tiles.refuse("the tiles of the other maps, at least one")
+            tiles.refuse("the same tiles as the other maps have, and at least one")
         for number, record in tiles.items():
             _check_file(f"{name}.{texture}", number, record, udim)
 
@@ -98,16 +99,18 @@ def _check_lay(lay: Stated) -> None:
     matrix = np.array([[entry.number() for entry in row] for row in rows])
     lengths = np.linalg.norm(matrix, axis=1)
     if not lengths.min() > 0 or abs(np.linalg.det(matrix / lengths[:, None])) < SINGULAR:
-        lay.field("threads_per_uv").refuse("two rows along two directions")
+        lay.field("threads_per_uv").refuse("an invertible matrix")
     for entry in lay.field("offset").entries(2):
         entry.number()
 
 
 def _check_file(stem: str, number: str, record: Stated, udim: bool) -> None:
-    """Refuse a texture under another name than the baker's, or in another tile."""
+    """Refuse a texture whose name or tile the baker would not write."""
     tiles = [str(k) for k in range(FIRST_TILE, LAST_TILE + 1 if udim else FIRST_TILE + 1)]
     if number not in tiles:
-        record.refuse(f"of a tile {tiles[0]} to {tiles[-1]}" if udim else f"of tile {tiles[0]}")
+        record.refuse(
+            f"for a tile from {tiles[0]} to {tiles[-1]}" if udim else f"for tile {tiles[0]}"
+        )
     known = [f"{stem}.{number}{end}" if udim else f"{stem}{end}" for end in FORMATS.values()]
     file = record.field("file")
     if file.text() not in known:
@@ -116,11 +119,14 @@ def _check_file(stem: str, number: str, record: Stated, udim: bool) -> None:
         try:
             encoding_from(record.field("encoding").value)
         except ValueError as error:
-            record.field("encoding").refuse(f"an encoding: {error}")
+            record.field("encoding").refuse(f"a valid encoding: {error}")
 
 
 def file_in(folder: Path, name: str) -> Path:
-    """The file `name` of a bake folder, there or not; FabricError where a link leads out of it."""
+    """Return the path of file `name` in a bake folder, whether or not the file exists.
+
+    Raises FabricError if the path is a link that leads out of the folder.
+    """
     path = folder / name
     try:
         inside = path.resolve().parent.is_relative_to(folder.resolve())

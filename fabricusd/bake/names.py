@@ -1,7 +1,7 @@
-"""Names of garments and fabrics in a bake folder: of files on any system, and of prims.
+"""Give garments and fabrics names that are valid as file names on any system and as prim names.
 
-The files of two garments must never meet, whatever the file system makes of their names: some fold
-case, some fold accents, Windows keeps some names for its devices.
+The files of two garments must never collide, whatever the file system does to their names: some
+file systems ignore case, some ignore accents, and Windows reserves some names for devices.
 """
 
 from __future__ import annotations
@@ -13,18 +13,19 @@ from collections.abc import Sequence
 from fabricusd.schema.names import prim_name
 
 LONGEST = 120
-"""Bytes of a name in UTF-8: file names may have 255, and a map, a tile and a suffix follow."""
+"""Bytes of a name in UTF-8. File names may have 255; a map, a tile and a suffix are appended."""
 
 _DEVICES = ("con", "prn", "aux", "nul", "conin$", "conout$")
 _PORTS = [f"{port}{k}" for port in ("com", "lpt") for k in range(10)]
 RESERVED = frozenset((*_DEVICES, *_PORTS, "fabrics", "manifest", "report", "look"))
-"""Names that Windows keeps for devices, whatever their suffix, and stems of a bake's own files."""
+"""Names that Windows reserves for devices, whatever their suffix, and stems of a bake's own files.
+"""
 
 
 def file_stem(text: str, instead: str = "mesh") -> str:
-    """The nearest name of a file on any system: letters, digits, _ and -, no - first.
+    """Turn `text` into a portable file name: letters, digits, _ and -, not starting with -.
 
-    instead : where nothing is left of `text`
+    instead : the name if nothing of `text` remains
     """
     name = re.sub(r"[^\w-]", "_", unicodedata.normalize("NFC", text.strip()))
     name = re.sub(r"^-", "_", name)
@@ -33,12 +34,13 @@ def file_stem(text: str, instead: str = "mesh") -> str:
 
 
 def is_file_stem(text: str) -> bool:
-    """Whether `different_names` could have made the name."""
+    """Whether `different_names` could have returned this name."""
     return bool(text) and file_stem(text) == text and text.casefold() not in RESERVED
 
 
 def folded(name: str) -> frozenset[str]:
-    """What must differ between two names: as file systems and as prims and materials fold them."""
+    """Return the forms in which two names must differ: as file systems, prims and materials see
+    them."""
     return frozenset(
         (
             unicodedata.normalize("NFKD", name).casefold(),
@@ -49,9 +51,9 @@ def folded(name: str) -> frozenset[str]:
 
 
 def different_names(wanted: Sequence[str]) -> list[str]:
-    """A name for each that is `wanted`, no two alike however they are folded.
+    """Return a name for each of `wanted`, such that no two names collide in any form of `folded`.
 
-    Each name stays with the first that wants it; only the others get a number after it.
+    The first to want a name keeps it; later ones get a number appended.
     """
     taken: set[str] = set(RESERVED)
     names: dict[int, str] = {}
@@ -67,7 +69,7 @@ def different_names(wanted: Sequence[str]) -> list[str]:
 
 
 def _numbered(name: str, taken: set[str]) -> str:
-    """`name` with the least number after it that makes it differ from those `taken`."""
+    """Append the smallest number to `name` that makes it differ from all `taken` names."""
     count = 2
     while True:
         tail = f"_{count}"

@@ -1,4 +1,4 @@
-"""Whether a bake's settings can be, checked before any work: names known, numbers within range."""
+"""Check a bake's settings before any work: that names are known and numbers are within range."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from fabricusd.bake.job import Settings
 
 WIDEST = 1024
-"""Texels of a margin: more than any mip level that is looked at needs."""
+"""Largest margin [texels]: more than any mip level in use needs."""
 
 
 def check_settings(settings: Settings) -> None:
-    """Raise FabricError for the first setting that is out of its range, as the command names it."""
+    """Raise FabricError, naming the command-line option, for the first setting out of range."""
     _check_numbers(settings)
     _one_of("--format", settings.file_format, tuple(FORMATS))
     _one_of("--level", settings.level, ("weave", "thread"))
@@ -40,7 +40,7 @@ def check_settings(settings: Settings) -> None:
 
 
 def _check_numbers(settings: Settings) -> None:
-    """Resolution, texels per thread, margin and error."""
+    """Check the resolution, texels per thread, margin and error."""
     if settings.texels_per_thread:
         positive("--texels-per-thread", settings.texels_per_thread)
     else:
@@ -53,7 +53,7 @@ def _check_numbers(settings: Settings) -> None:
 
 
 def check_resolution(texels: int) -> None:
-    """Raise FabricError unless `texels` is the side of a texture."""
+    """Raise FabricError unless `texels` is a valid texture resolution."""
     if not _is_whole(texels) or not SMALLEST <= texels <= LARGEST or texels & (texels - 1):
         raise FabricError(
             "--resolution",
@@ -62,7 +62,7 @@ def check_resolution(texels: int) -> None:
 
 
 def positive(option: str, number: float) -> float:
-    """`number` if it is above 0 and finite; FabricError otherwise."""
+    """Return `number` if it is finite and above 0; raise FabricError otherwise."""
     if not is_number(number) or not 0.0 < number < math.inf:
         raise FabricError(option, f"is {number!r}; it must be a number above 0")
     return number

@@ -1,4 +1,4 @@
-"""What was asked, what was reached and what it cost: JSON, and a page with pictures."""
+"""Write the report of a bake, as JSON and as a page with pictures: request, errors and cost."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from fabricusd.bake.job import Baked, Settings
 
 PICTURE = 256
-"""Texels of a map that the page shows, the middle of its finest level."""
+"""Side [texels] of the picture of a map on the page: the centre of its finest level."""
 
 _STYLE = """body{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:70em;color:#222}
 table{border-collapse:collapse}td,th{padding:.2em .8em;text-align:left;border-bottom:1px solid #ddd}
@@ -25,7 +25,7 @@ img{width:160px;image-rendering:pixelated;background:#444}"""
 
 
 def report_of(result: Baked, settings: Settings) -> dict[str, Any]:
-    """Asked, reached and cost, for JSON."""
+    """Return the request, the errors reached and the cost, for JSON."""
     sizes = {
         name: sum((result.folder / f).stat().st_size for f in files.values())
         for maps in result.files.values()
@@ -52,7 +52,7 @@ def report_of(result: Baked, settings: Settings) -> dict[str, Any]:
 
 
 def write_report(result: Baked, settings: Settings) -> None:
-    """`report.json`, `report.html`, and the pictures that it shows in `report/`."""
+    """Write `report.json` and `report.html`, with the page's pictures in `report/`."""
     said = report_of(result, settings)
     write_json(result.folder / "report.json", said)
     pictures = result.folder / "report"
@@ -101,10 +101,10 @@ def _page(said: dict[str, Any], figures: list[str]) -> str:
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Bake</title>'
         f"<style>{_STYLE}</style><h1>Bake</h1>"
-        f"<p>Asked: {'no bound' if asked is None else f'delta E {asked:g}'}. "
-        f"Made: {cost['resolution']} texels a side, {cost['bytes'] / 1e6:.1f} MB "
-        f"in {cost['seconds']:.1f} s.</p>"
-        "<table><tr><th>garment<th>delta E 2000 at points<th>of texels<th>stated bound</tr>"
+        f"<p>Requested bound: {'none' if asked is None else f'delta E {asked:g}'}. "
+        f"Result: {cost['resolution']} texels along a side, {cost['bytes'] / 1e6:.1f} MB, "
+        f"baked in {cost['seconds']:.1f} s.</p>"
+        "<table><tr><th>garment<th>delta E 2000 at points<th>over texels<th>stated bound</tr>"
         f"{rows}</table>"
         + (
             "<h2>BTF</h2><table><tr><th>fabric<th>form<th>MB<th>rank<th>delta E<th>between"
@@ -113,22 +113,22 @@ def _page(said: dict[str, Any], figures: list[str]) -> str:
             else ""
         )
         + (
-            "<h2>Tried</h2><table><tr><th>texels a side<th>maps to re-light<th>MB<th>delta E 2000"
-            f" at points</tr>{tried}</table>"
+            "<h2>Trials</h2><table><tr><th>texels along a side<th>maps used to re-light<th>MB"
+            f"<th>delta E 2000 at points</tr>{tried}</table>"
             if tried
             else ""
         )
         + (f"<h2>Notes</h2><ul>{notes}</ul>" if notes else "")
-        + "<h2>Error of each map</h2><p>Root mean squares against level weave.</p>"
-        + "<table><tr><th>garment<th>map<th>unit<th>number type<th>of texels<th>at points"
-        + f"<th>the map's own spread</tr>{errors}</table>"
+        + "<h2>Error of each map</h2><p>Root mean square errors against level weave.</p>"
+        + "<table><tr><th>garment<th>map<th>unit<th>from the number type<th>over texels"
+        + f"<th>at points<th>standard deviation of the map</tr>{errors}</table>"
         + f"<h2>Maps</h2>{''.join(figures)}</html>\n"
     )
 
 
 def as_picture(pixels: NDArray[Any], name: str) -> NDArray[np.uint8]:
-    """(h, w, 3) uint8 of a map: directions as colours, the rest from its least value to its
-    greatest."""
+    """Return a map as an (h, w, 3) uint8 picture: directions as colours, other maps scaled from
+    their smallest to their largest value."""
     part = np.asarray(pixels[..., :3], np.float64)
     if name in ("normal", "tangent"):
         part = 0.5 * part + 0.5

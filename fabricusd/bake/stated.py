@@ -1,7 +1,7 @@
-"""A value of a JSON file that somebody else may have written, and where in the file it stands.
+"""Read values from an untrusted JSON file and remember where in the file each value stands.
 
-Each question either gives a value of the type that it names or raises FabricError, which says the
-file, the place, the value, and what would be accepted.
+Each accessor returns a value of the type that it names, or raises FabricError with the file, the
+place, the value and what would be accepted.
 """
 
 from __future__ import annotations
@@ -17,47 +17,51 @@ from fabricusd.errors import FabricError
 from fabricusd.files import readable_file
 
 LONGEST = 6 << 20
-"""Bytes of a file that is read: a hostile one could take 25 times as many of memory, and a manifest
-of a hundred tiles has half a million."""
+"""Bytes of the largest file that is read. A hostile file could need 25 times as much memory; a
+manifest of a hundred tiles has half a million bytes."""
 
 MANY = 8
-"""Entries of a list that an error shows."""
+"""Entries of the longest list that an error shows."""
 
 DEEP = 10_000
-"""Characters of a text at most."""
+"""Characters of the longest string that is accepted."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stated:
-    """file : where it was read, place : keys from the file's root, joined by /"""
+    """A value of a JSON file.
+
+    file : the file it was read from
+    place : keys from the file's root, joined by /
+    """
 
     file: str
     place: str
     value: Any
 
     def refuse(self, wanted: str) -> NoReturn:
-        """Raise what is said about a value that is not `wanted`."""
+        """Raise FabricError: the value is not `wanted`."""
         where = self.place or "its root"
         raise FabricError(self.file, f"says {where} is {_shown(self.value)}; it must be {wanted}")
 
     def below(self, key: str, value: Any) -> Stated:
-        """A value inside this one."""
+        """Return a value inside this one."""
         place = f"{self.place}/{key}" if self.place else key
         return Stated(file=self.file, place=place if len(place) < 200 else "...", value=value)
 
     def fields(self) -> dict[str, Any]:
-        """An object's keys and values."""
+        """Return the dictionary of a JSON object."""
         if not isinstance(self.value, dict):
             self.refuse("an object with keys")
         return self.value
 
     def items(self) -> Iterator[tuple[str, Stated]]:
-        """An object's keys, and its values."""
+        """Iterate over the keys and values of a JSON object."""
         for key, value in self.fields().items():
             yield key, self.below(key, value)
 
     def field(self, key: str) -> Stated:
-        """The value of a key that must be there."""
+        """Return the value of a required key."""
         held = self.fields()
         if key not in held:
             where = self.place or "its root"
@@ -65,7 +69,7 @@ class Stated:
         return self.below(key, held[key])
 
     def entries(self, count: int | None = None) -> list[Stated]:
-        """A list's entries, `count` of them or at least one."""
+        """Return the entries of a list: exactly `count` of them, or at least one if None."""
         wanted = "a list of at least one entry" if count is None else f"a list of {count} entries"
         if (
             not isinstance(self.value, list)
@@ -76,29 +80,29 @@ class Stated:
         return [self.below(str(k), value) for k, value in enumerate(self.value)]
 
     def text(self) -> str:
-        """A text of printable characters."""
+        """Return a string of printable characters."""
         if not isinstance(self.value, str) or len(self.value) > DEEP:
-            self.refuse("a text")
+            self.refuse(f"a string of at most {DEEP} characters")
         if not self.value.isprintable():
-            self.refuse("a text of printable characters")
+            self.refuse("a string of printable characters")
         return self.value
 
     def flag(self) -> bool:
-        """True or false."""
+        """Return a truth value."""
         if not isinstance(self.value, bool):
             self.refuse("true or false")
         return self.value
 
     def number(self, most: float = 1e30) -> float:
-        """A finite number, at most `most` in size."""
+        """Return a finite number whose magnitude is at most `most`."""
         value = self.value
         if type(value) not in (int, float) or not abs(value) <= most or not math.isfinite(value):
-            self.refuse(f"a number of at most {most:g}")
+            self.refuse(f"a number from {-most:g} to {most:g}")
         return float(value)
 
 
 def _shown(value: Any) -> str:
-    """A value in JSON's words, at most 60 characters; a great list or object by its size alone."""
+    """Return a value as JSON of at most 60 characters; for a long list or object, its length."""
     if isinstance(value, list | dict) and len(value) > MANY:
         return f"{'a list' if isinstance(value, list) else 'an object'} of {len(value)} entries"
     if isinstance(value, str):
@@ -108,7 +112,7 @@ def _shown(value: Any) -> str:
 
 
 def read_stated(path: Path) -> Stated:
-    """The root of a JSON file; FabricError for one that is none."""
+    """Read the root of a JSON file; raise FabricError if the file is not JSON."""
     source = readable_file(path)
     size = source.stat().st_size
     if size > LONGEST:
@@ -118,5 +122,5 @@ def read_stated(path: Path) -> Stated:
     except RecursionError:
         raise FabricError(str(path), "is nested too deeply; bake again") from None
     except ValueError as error:
-        raise FabricError(str(path), f"is no JSON ({error}); bake again") from error
+        raise FabricError(str(path), f"is not valid JSON ({error}); bake again") from error
     return Stated(file=str(path), place="", value=value)

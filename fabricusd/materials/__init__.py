@@ -1,1 +1,1 @@
-"""Baked fabrics for other tools: USD looks, MaterialX documents, U3M, OSL, Blender."""
+"""Convert baked fabrics to materials for other tools: USD, MaterialX, U3M, OSL and Blender."""

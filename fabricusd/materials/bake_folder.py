@@ -1,4 +1,4 @@
-"""A bake folder as its manifest describes it: which textures, of which garment, in which place."""
+"""Read a bake folder by its manifest: the textures of each garment and how its fabrics lie."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from fabricusd.fabric import Fabric
 from fabricusd.images.files import shape_of
 
 FABRICS = "fabrics.usda"
-"""Layer in the folder that holds the fabrics that were baked, one prim each."""
+"""Layer in the folder that holds the baked fabrics, one prim each."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BakedLay:
-    """A fabric on a garment: threads = matrix @ uv + offset.
+    """How a fabric lies on a garment: threads = matrix @ uv + offset.
 
-    fabric : the fabric, None where the folder does not hold it and no preset has its name
+    fabric : None if the folder does not hold the fabric and no preset has its name
     """
 
     name: str
@@ -37,10 +37,11 @@ class BakedLay:
 class MapSet:
     """The textures of one garment.
 
-    textures : map -> UDIM number -> file; only maps all of whose files exist
-    missing : map and file of what the manifest names and the folder lacks; "mesh" for the mesh
+    textures : files by map and UDIM number; only maps of which all files exist
+    missing : (map, file) pairs that the manifest lists but the folder lacks; ("mesh", file) if the
+        mesh is missing
     prims : paths in the scene that was baked
-    own_uv : False where the textures are not in the scene's own UVs
+    own_uv : False if the textures do not use the scene's own UVs
     udim : whether the textures are UDIM tiles
     """
 
@@ -57,7 +58,7 @@ class MapSet:
     fingerprint: str
 
     def pattern(self, texture: str) -> Path | None:
-        """The file of a map, `<UDIM>` standing for the tile; None where it is not there."""
+        """Return a map's file, with `<UDIM>` for the tile's number; None if the map is missing."""
         files = self.textures.get(texture)
         if not files:
             return None
@@ -69,7 +70,7 @@ class MapSet:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BakeFolder:
-    """All garments of a bake, and the settings it was made with."""
+    """All garments of a bake, and its settings."""
 
     path: Path
     garments: tuple[MapSet, ...]
@@ -78,20 +79,24 @@ class BakeFolder:
 
     @property
     def missing(self) -> tuple[tuple[str, str], ...]:
-        """Map and file of all that the manifest names and the folder lacks."""
+        """The (map, file) pairs that the manifest lists but the folder lacks."""
         return tuple(pair for one in self.garments for pair in one.missing)
 
 
 @reads("a bake")
 def read_bake_folder(path: str | os.PathLike[str]) -> BakeFolder:
-    """The bake in a folder, wherever the folder is now. `FabricError` where there is none."""
+    """Read the bake in a folder, which may have been moved; raise FabricError if there is none."""
     folder = Path(path)
     if folder.name == MANIFEST:
         folder = folder.parent
     if not folder.is_dir():
-        raise FabricError(str(folder), "is no folder; it must be one that 'fabricusd bake' made")
+        raise FabricError(
+            str(folder), "is not a folder; it must be the output folder of 'fabricusd bake'"
+        )
     if not (folder / MANIFEST).exists():
-        raise FabricError(str(folder), "has no manifest.json; 'fabricusd bake' must finish first")
+        raise FabricError(
+            str(folder), "has no manifest.json; it must hold a finished bake by 'fabricusd bake'"
+        )
     said = read_manifest(folder)
     udim: bool = said["settings"]["udim"]
     known: dict[str, Fabric | None] = {}
@@ -142,7 +147,7 @@ def _garment(
 
 
 def _check_sizes(one: MapSet, resolution: int) -> None:
-    """Raise FabricError for a texture whose size or channels are not those of the bake."""
+    """Raise FabricError if a texture's size or channels differ from those in the manifest."""
     for name, files in one.textures.items():
         channels = len(REGISTRY[name].channels)
         for path in files.values():
@@ -156,7 +161,7 @@ def _check_sizes(one: MapSet, resolution: int) -> None:
 
 
 def _fabric(folder: Path, name: str) -> Fabric | None:
-    """The fabric of that name as it was baked, or else the preset; None where there is neither."""
+    """Return the fabric of that name as it was baked, or the preset; None if there is neither."""
     from fabricusd.schema import load, preset_names
 
     source = file_in(folder, FABRICS)
@@ -167,18 +172,19 @@ def _fabric(folder: Path, name: str) -> Fabric | None:
 
 
 def refuse_references(source: Path) -> None:
-    """Raise FabricError for a layer of the baker's that names other files: it writes none so."""
+    """Raise FabricError if a layer refers to other files: those that the baker writes do not."""
     from pxr import Sdf, Tf, UsdUtils
 
     try:
         found = Sdf.Layer.FindOrOpen(str(source))
         named = [] if found is None else UsdUtils.ExtractExternalReferences(str(source))
     except Tf.ErrorException as error:
-        raise FabricError(str(source), f"is no layer of USD: {error}") from error
+        raise FabricError(str(source), f"is not a USD layer: {error}") from error
     if found is None:
-        raise FabricError(str(source), "is no layer of USD; bake again")
+        raise FabricError(str(source), "is not a USD layer; bake again")
     first = next((file for files in named for file in files), None)
     if first is not None:
         raise FabricError(
-            str(source), f"refers to '{first}'; a layer that 'fabricusd bake' wrote refers to none"
+            str(source),
+            f"refers to '{first}'; a layer of 'fabricusd bake' must not refer to other files",
         )

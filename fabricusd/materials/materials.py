@@ -1,4 +1,4 @@
-"""From a bake folder to the materials that other tools read."""
+"""Write the materials of a bake folder for other tools."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.files import remove_partial_files, write_json
 from fabricusd.materials.bake_folder import BakeFolder, read_bake_folder
+from fabricusd.materials.bound_prims import BoundScene, find_bound_prims
 from fabricusd.materials.networks.surfaces import GRAPHS, MAPS
 from fabricusd.materials.recipes import Progress, Settings, Written, recipes
 from fabricusd.materials.targets import Job, chosen
 from fabricusd.materials.targets.layer import write_baked_look, write_scene_look
 from fabricusd.materials.targets.mtlx import write_mtlx
 from fabricusd.materials.targets.paths import asset_path
-from fabricusd.materials.wearers import Dressed, find_wearers
 
 
 def write_materials(
@@ -35,15 +35,17 @@ def write_materials(
     dry_run: bool = False,
     progress: Progress | None = None,
 ) -> Written:
-    """Write a look for a bake: a USD layer, the MaterialX document beside it, and a report.
+    """Write a look for a bake: a USD layer, a MaterialX document beside it, and a report.
 
-    bake : the folder that `fabricusd bake` made; it is only read
-    out : the layer, by default `look.usda` in that folder
-    scene : USD scene that was baked, to write the look over its prims; without it the look goes
-        over the baked meshes
+    bake : output folder of `fabricusd bake`; it is only read
+    out : the layer to write, by default `look.usda` in that folder
+    scene : the USD scene that was baked, to bind the look to its prims; None binds it to the baked
+        meshes
+    clobber : whether existing files may be overwritten
+    dry_run : return what would be written, but write nothing
 
-    Raises FabricError for a folder without a bake, a layer that fabricusd did not write and would
-    overwrite, a scene that was not baked.
+    Raises FabricError if the folder holds no bake, if the layer exists and fabricusd did not write
+    it, or if the scene is not the one that was baked.
     """
     settings = settings or Settings()
     refuse_locked(Path(bake))
@@ -57,8 +59,8 @@ def write_materials(
     made = Written()
     for name, file in folder.missing:
         made.notes.append(f"{folder.path / file} is missing; {_without(name)}")
-    dressed = find_wearers(Path(scene), folder.garments) if scene is not None else None
-    made.notes += dressed.notes if dressed else ()
+    bound = find_bound_prims(Path(scene), folder.garments) if scene is not None else None
+    made.notes += bound.notes if bound else ()
     if dry_run:
         made.files = [path, path.with_suffix(".mtlx"), path.with_suffix(".json")]
         return made
@@ -66,7 +68,7 @@ def write_materials(
         for place in _written_folders(path, settings):
             locks.enter_context(locked(place))
         remove_partial_files(path.with_name(f"{path.stem}_maps"))
-        _write(folder, path, settings, made, dressed, scene, clobber, progress)
+        _write(folder, path, settings, made, bound, scene, clobber, progress)
     return made
 
 
@@ -75,21 +77,21 @@ def _write(
     path: Path,
     settings: Settings,
     made: Written,
-    dressed: Dressed | None,
+    bound: BoundScene | None,
     scene: str | os.PathLike[str] | None,
     clobber: bool,
     progress: Progress | None,
 ) -> None:
-    """All files of a look, whose folders nobody else writes."""
+    """Write all files of a look; their folders must be locked."""
     made_of, documents = recipes(folder, path, settings, made, progress)
     custom = {
         "version": __version__,
         "bake": asset_path(folder.path / "manifest.json", path.parent),
     }
-    if dressed is not None:
+    if bound is not None:
         assert scene is not None
-        write_scene_look(path, Path(scene), dressed, made_of, custom)
-        made.files += [path.with_suffix(".uv.usdc")] if dressed.uv else []
+        write_scene_look(path, Path(scene), bound, made_of, custom)
+        made.files += [path.with_suffix(".uv.usdc")] if bound.uv else []
     else:
         write_baked_look(path, folder.garments, made_of, custom, _up_axis(folder))
     write_mtlx(path.with_suffix(".mtlx"), documents)
@@ -101,15 +103,17 @@ def _write(
 
 
 def _written_folders(path: Path, settings: Settings) -> list[Path]:
-    """Folders that get files of a look, each once, in an order that all runs keep."""
+    """Return the folders that a look writes to, without duplicates, in a fixed locking order."""
     places = [path.parent]
     places += [target.functions.folder(path, where) for target, where in chosen(settings.targets)]
     return sorted({place.resolve() for place in places if place.is_dir()})
 
 
 def _refuse_links(folder: Path, path: Path) -> None:
-    """Raise FabricError where a look in its bake's folder would be written through a link out of
-    it: whoever gave the folder away may have laid the link."""
+    """Raise FabricError if writing a look to its bake's folder would follow a link out of it.
+
+    The folder may come from an untrusted source.
+    """
     if path.parent.resolve() != folder.resolve():
         return
     maps = f"{path.stem}_maps"
@@ -123,48 +127,55 @@ def _refuse_links(folder: Path, path: Path) -> None:
 
 
 def _without(name: str) -> str:
-    """What a look does where the bake has lost a map."""
+    """Describe what a look does without a map that the bake has lost."""
     if name in MAPS:
-        return "a constant stands in for it"
+        return "a constant replaces it"
     if name == "thread_id":
-        return "threads are not fitted one by one"
-    return "the scene's own is used" if name == "mesh" else "no material reads it"
+        return "threads are not fitted individually"
+    return "the scene's own mesh is used" if name == "mesh" else "no material reads it"
 
 
 def _check_surfaces(folder: BakeFolder, settings: Settings) -> None:
     known = (*GRAPHS, "hair")
     for name in settings.surfaces:
         if name not in known:
-            raise FabricError(f"surface '{name}'", f"is unknown; it must be of {', '.join(known)}")
+            raise FabricError(
+                f"surface '{name}'", f"is unknown; it must be one of {', '.join(known)}"
+            )
     nameless = [lay.name for one in folder.garments for lay in one.lays if lay.fabric is None]
     if "hair" in settings.surfaces and nameless:
         raise FabricError(
-            f"fabric '{nameless[0]}'", "is not in the folder; surface 'hair' needs it, bake again"
+            f"fabric '{nameless[0]}'",
+            "is not in the bake folder; surface 'hair' needs it: bake again",
         )
 
 
 def _fabrics(folder: BakeFolder) -> dict[str, Fabric]:
-    """The fabrics of a bake by their names."""
+    """Return the fabrics of a bake by name."""
     return {lay.name: lay.fabric for one in folder.garments for lay in one.lays if lay.fabric}
 
 
 def _check_target(path: Path, clobber: bool) -> None:
-    """Refuse to overwrite what fabricusd did not write."""
+    """Raise FabricError if a look cannot be written to `path` or would replace another's file."""
     if path.suffix not in (".usda", ".usd", ".usdc"):
-        raise FabricError(str(path), "is no USD layer's name; it must end in .usda, .usdc or .usd")
+        raise FabricError(
+            str(path), "is not the name of a USD layer; it must end in .usda, .usdc or .usd"
+        )
     if not path.parent.is_dir():
-        raise FabricError(str(path), f"is in '{path.parent}', which is no directory; make it first")
+        raise FabricError(
+            str(path), f"is in '{path.parent}', which is not a folder; create it first"
+        )
     if not path.exists():
         return
     if not clobber:
-        raise FabricError(str(path), "exists; it must be a new name with --no-clobber")
+        raise FabricError(str(path), "exists; with --no-clobber, give the name of a new file")
     try:
         layer = Sdf.Layer.FindOrOpen(str(path))
     except Tf.ErrorException:
         layer = None
     if layer is None or "fabricusd" not in (layer.customLayerData or {}):
         raise FabricError(
-            str(path), "is a file that fabricusd did not write; it must be another name"
+            str(path), "exists and fabricusd did not write it; give the name of another file"
         )
 
 
@@ -172,7 +183,9 @@ def _up_axis(folder: BakeFolder) -> str:
     for one in folder.garments:
         if one.mesh.is_file():
             return str(UsdGeom.GetStageUpAxis(Usd.Stage.Open(str(one.mesh))))
-    raise FabricError(str(folder.path), "has none of its meshes; name the scene with --scene")
+    raise FabricError(
+        str(folder.path), "has lost all of its meshes; give the scene that was baked with --scene"
+    )
 
 
 def _report(made: Written) -> dict[str, Any]:

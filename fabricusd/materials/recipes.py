@@ -1,4 +1,4 @@
-"""What a bake's materials are made of: textures or constants, networks, fitted parameters."""
+"""Compose a bake's materials from textures or constants, networks and fitted parameters."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ from fabricusd.schema.names import prim_name
 Progress = Callable[[str], None]
 
 BLENDER = "principled:"
-"""Prefix of the material's inputs for Blender's own surface: the hook reads them."""
+"""Prefix of the material's inputs for Blender's Principled BSDF, which the import hook reads."""
 
 OPAQUE = 0.9995
-"""Mean cover from which a material has no opacity: blending costs renderers dear."""
+"""Mean cover from which a material is opaque, since blending is expensive for renderers."""
 
 NEUTRAL = {
     "base_color": Value("color3", (0.5, 0.5, 0.5)),
@@ -47,17 +47,17 @@ NEUTRAL = {
     "tangent": Value("vector3", (1.0, 0.0, 0.0)),
     "specular_tint": NO_TINT,
 }
-"""What stands in for a map that is not there."""
+"""Constants that replace missing maps."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What is written.
+    """What to write.
 
-    surfaces : MaterialX surfaces, names of `surfaces.GRAPHS` or "hair"; USD takes the first, the
-        document all
-    fitted : whether the parameters are sought; otherwise the textures stand as they are
-    targets : what is written besides, names of `targets.TARGETS`, and where
+    surfaces : MaterialX surfaces, names of `surfaces.GRAPHS` or "hair"; the USD layer uses the
+        first, the document all of them
+    fitted : whether parameters are fitted to the fabric; otherwise the textures are used unchanged
+    targets : additional targets, by name in `targets.TARGETS`, and where to write them
     """
 
     surfaces: tuple[str, ...] = ("openpbr",)
@@ -67,7 +67,7 @@ class Settings:
 
 @dataclass(kw_only=True)
 class Written:
-    """The files that were made, what had to be left out, the fits of surfaces and of threads."""
+    """The files that were written, notes on omissions, and the fits of surfaces and threads."""
 
     files: list[Path] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -79,7 +79,7 @@ def recipes(
     folder: BakeFolder, path: Path, settings: Settings, made: Written,
     progress: Progress | None,
 ) -> tuple[Recipes, list[Any]]:  # fmt: skip
-    """The materials of every garment and fabric, and those of the document."""
+    """Return the materials of every garment and fabric, and those of the MaterialX document."""
     found: dict[tuple[str, int, str], MaterialRecipe] = {}
     documents = []
     for maps in folder.garments:
@@ -120,7 +120,7 @@ def recipes(
 
 
 def texture_inputs(maps: MapSet, path: Path, made: Written) -> Inputs:
-    """The textures of a garment, and constants for those that are missing."""
+    """Return the textures of a garment, with constants for those that are missing."""
     found: dict[str, Texture | Value] = {}
     for name, kind in MAPS.items():
         pattern = maps.pattern(name)
@@ -131,26 +131,26 @@ def texture_inputs(maps: MapSet, path: Path, made: Written) -> Inputs:
 
 
 def maps_folder(path: Path) -> Path:
-    """The folder beside a look for textures of its own, made where it is not there."""
+    """Return the folder beside a look for its own textures, and create it if necessary."""
     folder = path.with_name(f"{path.stem}_maps")
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise FabricError(
-            str(folder), f"cannot be made: {error.strerror}; name another place"
+            str(folder), f"cannot be created: {error.strerror}; write the look elsewhere"
         ) from error
     return folder
 
 
 def _coded_normals(maps: MapSet, path: Path, made: Written) -> Path:
-    """Normals as 16-bit PNG files beside the layer: readers of normal maps ask for codes."""
+    """Write normals as 16-bit PNG files, mapped to [0, 1] as readers of normal maps expect."""
     folder = maps_folder(path)
     for number, source in maps.textures["normal"].items():
         target = folder / f"{maps.name}.normal.{number}.png"
         if target in made.files:
             continue
         codes = np.clip(0.5 * read_mip_level(source) + 0.5, 0.0, 1.0)
-        # Texels outside the layout hold no direction; they point straight up.
+        # Texels outside the UV layout have no normal; use the unperturbed one.
         codes[np.all(codes == 0.5, axis=-1)] = (0.5, 0.5, 1.0)
         write_png(target, np.rint(codes * 65535).astype(np.uint16), color_space="raw")
         made.files.append(target)
@@ -158,7 +158,7 @@ def _coded_normals(maps: MapSet, path: Path, made: Written) -> Path:
 
 
 def mean_inputs(maps: MapSet, number: int) -> dict[str, Value]:
-    """One constant for each map: the mean texel of a lay."""
+    """Return a constant for each map: the mean texel of a lay."""
     texel = mean_texel(maps, number)
     if "normal" in texel:
         texel["normal"] = tuple(0.5 * x + 0.5 for x in texel["normal"])
@@ -173,8 +173,10 @@ def mean_inputs(maps: MapSet, number: int) -> dict[str, Value]:
 def _garment_looks(
     maps: MapSet, path: Path, settings: Settings, made: Written, progress: Progress | None
 ) -> tuple[list[dict[str, Look]], MapSet]:
-    """The looks of each lay, and the maps that all surfaces but UsdPreviewSurface take: those of
-    the bake, or where texels resolve threads, with each thread's own fit in them."""
+    """Return the looks of each lay, and the maps for all surfaces except UsdPreviewSurface.
+
+    The maps are those of the bake; if texels resolve threads, they include each thread's own fit.
+    """
     looks, factors = [], {}
     for number in range(len(maps.lays)):
         of_lay, of_threads = _looks(maps, number, settings, made, progress)
@@ -192,7 +194,7 @@ def _looks(
     maps: MapSet, number: int, settings: Settings, made: Written,
     progress: Progress | None,
 ) -> tuple[dict[str, Look], Factors]:  # fmt: skip
-    """The look for each surface that is written, and the factors of each thread, if any."""
+    """Return the look of each surface that is written, and the factors of each thread, if any."""
     lay = maps.lays[number]
     kinds = ("preview", "principled", *(s for s in settings.surfaces if s in GRAPHS))
     plain = dict.fromkeys(("preview", "principled", *settings.surfaces), Look())
@@ -200,12 +202,12 @@ def _looks(
         return plain, {}
     if lay.fabric is None:
         made.notes.append(
-            f"fabric '{lay.name}' is not in the folder; its parameters are not fitted"
+            f"fabric '{lay.name}' is not in the bake folder; its parameters are not fitted"
         )
         return plain, {}
     texels = draw_texels(maps, number, lay)
     if texels is None:
-        note = f"{maps.name} lacks maps that a fit needs; its parameters are not fitted"
+        note = f"{maps.name} lacks maps that the fit needs; its parameters are not fitted"
         if note not in made.notes:
             made.notes.append(note)
         return plain, {}

@@ -20,7 +20,7 @@ from fabricusd.bake.bake import bake, plan
 from fabricusd.bake.error.relight import RELIT, BakedSet, best_choice
 from fabricusd.bake.job import Settings
 from fabricusd.bake.texels import cell_table
-from fabricusd.bake.work import assemble, kept
+from fabricusd.bake.work import assemble, checkpoint
 from fabricusd.bake.work.scratch import Scratch
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
@@ -93,13 +93,13 @@ def test_a_set_is_relit_from_its_folder(square, linen, tmp_path):
     assert picture.shape == (32, 32, 3)
     assert picture.min() >= 0
     assert picture.mean() > 0.01
-    with pytest.raises(FabricError, match="holds no map"):
+    with pytest.raises(FabricError, match="has no map"):
         baked.read(name, "nothing")
 
 
 def test_a_stopped_bake_goes_on_and_ends_bit_identical(whole, square, linen, tmp_path, monkeypatch):
     written = []
-    original = kept.write_block
+    original = checkpoint.write_block
 
     def failing(path, *rest):
         if len(written) == 2:
@@ -107,13 +107,13 @@ def test_a_stopped_bake_goes_on_and_ends_bit_identical(whole, square, linen, tmp
         written.append(path)
         original(path, *rest)
 
-    monkeypatch.setattr(kept, "write_block", failing)
+    monkeypatch.setattr(checkpoint, "write_block", failing)
     with pytest.raises(FabricError, match="No space left"):
         bake(square, tmp_path, SMALL, fabric=linen, workers=1)
     assert not list(tmp_path.glob("*.exr"))
     again = []
     monkeypatch.setattr(
-        kept, "write_block", lambda path, *rest: (again.append(path), original(path, *rest))
+        checkpoint, "write_block", lambda path, *rest: (again.append(path), original(path, *rest))
     )
     bake(square, tmp_path, SMALL, fabric=linen, resume=True)
     assert len(again) == 2
@@ -229,7 +229,7 @@ def test_a_folder_that_is_a_file_or_not_ours_is_refused(square, linen, tmp_path)
     file.write_text("")
     with pytest.raises(FabricError, match="is a file"):
         bake(square, file, SMALL, fabric=linen)
-    with pytest.raises(FabricError, match="cannot be made"):
+    with pytest.raises(FabricError, match="cannot be created"):
         bake(square, file / "below", SMALL, fabric=linen)
 
 

@@ -17,11 +17,11 @@ from fabricusd.errors import FabricError
 from tests.bake.meshes import write_quad
 
 COMMANDS = [
-    (["--light", "nan,nan,1"], "--light nan,nan,1.0 is no direction"),
+    (["--light", "nan,nan,1"], "--light nan,nan,1.0 is not a direction"),
     (["--light", "0,0,inf"], "three finite numbers"),
-    (["--light", "0,0,0"], "does not stand over the cloth"),
-    (["--light", "1e308,0,1"], "does not stand over the cloth"),
-    (["--light=0,0,-1"], "does not stand over the cloth"),
+    (["--light", "0,0,0"], "is not above the cloth"),
+    (["--light", "1e308,0,1"], "is not above the cloth"),
+    (["--light=0,0,-1"], "is not above the cloth"),
     (["--resolution", "0"], "--resolution is 0; it must be a power of two from 64"),
     (["--resolution", "-64"], "--resolution is -64"),
     (["--resolution", "65536"], "--resolution is 65536"),
@@ -58,7 +58,7 @@ def test_a_dry_run_refuses_overlaps_and_folders_that_cannot_be(tmp_path):
         plan(twice, settings, fabric="linen_plain", out=tmp_path / "out")
     assert not list(tmp_path.glob("*.png"))
     square = write_quad(tmp_path / "square.obj")
-    for out, words in ((square, "is a file"), (square / "below", "cannot be made")):
+    for out, words in ((square, "is a file"), (square / "below", "cannot be created")):
         with pytest.raises(FabricError, match=words):
             plan(square, settings, fabric="linen_plain", out=out)
 

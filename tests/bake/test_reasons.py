@@ -15,7 +15,7 @@ CASES = CHECKOUT / "tests" / "cases" / "bake_hides_the_reason"
 
 REASONS = {
     "short_st": ("has no UVs for its fabric", "/Root/Panel has a UV set 'st' that does not fit"),
-    "broken_payload": ("holds no mesh that could be baked", "Could not open asset @nosuch.usda@"),
+    "broken_payload": ("has no mesh that could be baked", "Could not open asset @nosuch.usda@"),
 }
 
 

@@ -52,7 +52,7 @@ def test_dry_runs_print_size_threads_and_texels(tmp_path, capsys):
     assert main(["bake", *common]) == 0
     shown = capsys.readouterr()
     assert "1024 x 1024, 0.853 texels per thread; " + threads in shown.out
-    assert "0.85 texels per thread; threads resolve from 2" in shown.err
+    assert "0.85 texels per thread; threads are resolved from 2" in shown.err
     assert list(tmp_path.iterdir()) == []
 
 
@@ -111,8 +111,8 @@ def test_two_primitives_keep_their_names(tmp_path, capsys):
         given = ["bake", path, "--fabric", "linen_plain", "--mesh", "nosuch", "-o", str(tmp_path)]
         assert main(given) == 2
         assert capsys.readouterr().err == (
-            "fabricusd: nosuch is no mesh of the scene; it must be one of two_prims.glb:Shirt_a, "
-            "two_prims.glb:Shirt_b\n"
+            "fabricusd: nosuch is not a mesh of the scene; it must be one of "
+            "two_prims.glb:Shirt_a, two_prims.glb:Shirt_b\n"
         )
 
 

@@ -62,7 +62,7 @@ def test_a_package_with_another_suffix_or_a_missing_texture_is_refused(packed, t
     broken = tmp_path / "look.usda"
     stage = Usd.Stage.Open(str(look))
     stage.GetRootLayer().Export(str(broken))
-    with pytest.raises(FabricError, match="not there"):
+    with pytest.raises(FabricError, match="does not exist"):
         write_usdz(broken, tmp_path / "shirt.usdz")
     assert not list(tmp_path.glob("*.usdz"))
 

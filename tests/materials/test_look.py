@@ -188,13 +188,13 @@ def test_a_scene_that_changed_is_told(shirt, tmp_path):
 
 
 BAD = {
-    "no folder": (["nowhere"], "is no folder"),
+    "no folder": (["nowhere"], "is not a folder"),
     "no manifest": (["{empty}"], "has no manifest.json"),
     "broken manifest": (["{broken}"], "has no 'settings' in its root; bake again"),
     "unknown surface": (["{baked}", "--surface", "phong"], "is unknown"),
-    "no layer": (["{baked}", "-o", "{empty}/look.txt"], "is no USD layer's name"),
-    "no such folder for the layer": (["{baked}", "-o", "{empty}/no/look.usda"], "no directory"),
-    "a scene that is no USD": (["{baked}", "--scene", "x.obj"], "is no USD layer"),
+    "no layer": (["{baked}", "-o", "{empty}/look.txt"], "is not the name of a USD layer"),
+    "no such folder for the layer": (["{baked}", "-o", "{empty}/no/look.usda"], "not a folder"),
+    "a scene that is no USD": (["{baked}", "--scene", "x.obj"], "is not a USD layer"),
 }
 
 

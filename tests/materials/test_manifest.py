@@ -95,44 +95,44 @@ FAULTS = [
     ("garments|body", {}, "the name of one garment"),
     ("garments|nul", {}, "the name of one garment"),
     ("garments|a\\b", {}, "the name of one garment"),
-    (f"{ONE}|prims", [0] * 10**5, "garments/Body/prims/0 is 0; it must be a text"),
+    (f"{ONE}|prims", [0] * 10**5, "garments/Body/prims/0 is 0; it must be a string"),
     (f"{ONE}|mesh", [0] * 10**5, "a list of 100000 entries"),
     (ONE, 3, "says garments/Body is 3; it must be an object"),
     (f"{ONE}|mesh", "../secret.usdc", "it must be Body.usdc"),
     (f"{ONE}|mesh", None, "has no 'mesh' in garments/Body"),
     (f"{ONE}|uv_of_the_scene", "yes", "it must be true or false"),
     (f"{ONE}|prims", "/Shirt", "it must be a list"),
-    (f"{ONE}|prims", [1], "it must be a text"),
+    (f"{ONE}|prims", [1], "it must be a string"),
     (f"{ONE}|prims", [], "at least one entry"),
-    (f"{ONE}|fingerprint", 1, "it must be a text"),
+    (f"{ONE}|fingerprint", 1, "it must be a string"),
     (f"{ONE}|error", [], "it must be an object"),
     (f"{ONE}|error|point", "x", "it must be a number"),
     (f"{ONE}|lays", {}, "it must be a list"),
     (f"{ONE}|lays|0|fabric", "../x", "the name of a fabric"),
     (f"{ONE}|lays|0|fabric", "linen_plain:/x", "the name of a fabric"),
-    (f"{ONE}|lays|0|threads_per_uv", [[1, 2], [2, 4]], "two directions"),
-    (f"{ONE}|lays|0|threads_per_uv", [[0, 0], [2, 4]], "two directions"),
+    (f"{ONE}|lays|0|threads_per_uv", [[1, 2], [2, 4]], "an invertible matrix"),
+    (f"{ONE}|lays|0|threads_per_uv", [[0, 0], [2, 4]], "an invertible matrix"),
     (f"{ONE}|lays|0|threads_per_uv", [[1, 2, 3], [2, 4]], "a list of 2 entries"),
-    (f"{ONE}|lays|0|threads_per_uv|0|0", float("nan"), "a number of at most"),
-    (f"{ONE}|lays|0|offset|1", 10**400, "a number of at most"),
+    (f"{ONE}|lays|0|threads_per_uv|0|0", float("nan"), "a number from -1e+30 to 1e+30"),
+    (f"{ONE}|lays|0|offset|1", 10**400, "a number from -1e+30 to 1e+30"),
     (f"{ONE}|lays|0|offset", None, "has no 'offset' in garments/Body/lays/0"),
     (FILE, "../secret.exr", "it must be an object"),
     (f"{FILE}|file", "../secret.exr", "it must be one of Body.base_color.exr"),
     (f"{FILE}|file", "/etc/passwd", "it must be one of Body.base_color.exr"),
     (f"{FILE}|file", "Body.normal.exr", "it must be one of Body.base_color.exr"),
-    (f"{FILE}|file", ["x"], "it must be a text"),
-    (f"{FILE}|encoding", {"transfer": "x"}, "an encoding"),
-    (f"{ONE}|files|base_color", {}, "the tiles of the other maps"),
-    (f"{ONE}|files|base_color|../../1001", {}, "it must be of tile 1001"),
-    (f"{ONE}|files|unknown", {}, "of a map that 'maps' describes"),
+    (f"{FILE}|file", ["x"], "it must be a string"),
+    (f"{FILE}|encoding", {"transfer": "x"}, "a valid encoding"),
+    (f"{ONE}|files|base_color", {}, "the same tiles as the other maps have"),
+    (f"{ONE}|files|base_color|../../1001", {}, "it must be for tile 1001"),
+    (f"{ONE}|files|unknown", {}, "for a map listed in 'maps'"),
     ("maps|base_color|channels", "RGB", "it must be a list"),
     ("maps|base_color|channels", ["Y"], "the list R, G, B"),
-    ("maps|../x", {}, "the entry of one of"),
+    ("maps|../x", {}, "an entry for one of"),
     ("settings|udim", 1, "settings/udim is 1; it must be true or false"),
     ("settings", None, "has no 'settings' in its root"),
     ("resolution", [64], "a power of two"),
     ("resolution", 64.0, "a power of two"),
-    ("scene|file", {}, "it must be a text"),
+    ("scene|file", {}, "it must be a string"),
 ]  # fmt: skip
 
 
@@ -255,7 +255,7 @@ def test_a_map_that_has_lost_a_tile_is_no_map(tiled, tmp_path):
     (tmp_path / "bake" / "Body.base_color.1002.exr").unlink()
     made = write_materials(tmp_path / "bake", None, PLAIN)
     assert len(made.notes) == 1
-    assert "Body.base_color.1002.exr is missing; a constant stands in for it" in made.notes[0]
+    assert "Body.base_color.1002.exr is missing; a constant replaces it" in made.notes[0]
 
 
 def places_of(value: object, place: tuple = ()) -> list[tuple]:

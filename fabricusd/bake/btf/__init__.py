@@ -1,1 +1,1 @@
-"""Bidirectional texture functions of a fabric's repeat, in three compressed forms."""
+"""Compute the bidirectional texture function of a fabric's repeat, in three compressed forms."""

@@ -1,6 +1,6 @@
-"""Arrays of an `.npz` archive, whose sizes are judged before their data is read.
+"""Read arrays from an untrusted `.npz` archive; their sizes are checked before any data is read.
 
-`numpy.load` believes what the archive says of itself: a kilobyte may ask for gigabytes.
+`numpy.load` trusts the sizes that an archive states: a kilobyte may demand gigabytes of memory.
 """
 
 from __future__ import annotations
@@ -20,20 +20,23 @@ from fabricusd.errors import FabricError
 from fabricusd.files import readable_file
 
 MOST_GROWTH = 50
-"""Most times that an archive's data may be larger than the archive; half floats shrink to a third,
-a bomb to a thousandth."""
+"""Largest ratio of an archive's data to its size. Half floats compress to a third, a zip bomb to a
+thousandth."""
 
 SPARE = 16 * 1024 * 1024
-"""Bytes that data may have however small the archive is: black cloth shrinks like a bomb."""
+"""Bytes of data that are always allowed: black cloth compresses as well as a zip bomb."""
 
 
 def read_arrays(
     path: str | os.PathLike[str], wanted: Mapping[str, int], kind: str
 ) -> dict[str, NDArray[Any]]:
-    """The arrays `wanted` of the `.npz` file `path`; each has as many axes as `wanted` says.
+    """Read the arrays `wanted` of the `.npz` file `path`.
 
-    Raises FabricError, naming the file, for what is no archive of these arrays of numbers, for
-    Python objects in it, and for data out of proportion to the file, before it is read.
+    wanted : number of axes by array name
+    kind : what the file should be, with an article, for errors
+
+    Raises FabricError, naming the file, if it is not an archive of these arrays of numbers or holds
+    Python objects, and, before reading the data, if it unpacks to too many bytes for its size.
     """
     source = readable_file(path)
     where = str(source)
@@ -50,7 +53,7 @@ def read_arrays(
         most = SPARE + MOST_GROWTH * source.stat().st_size
         if total > most:
             raise FabricError(
-                where, f"unpacks to {total} bytes; {kind} of its size must have at most {most}"
+                where, f"unpacks to {total} bytes; {kind} of its size may have at most {most}"
             )
         arrays = {}
         for name, info in infos.items():
@@ -60,10 +63,10 @@ def read_arrays(
 
 
 def _array(where: str, stream: IO[bytes], size: int, axes: int) -> NDArray[Any]:
-    """The array of an `.npy` stream of `size` bytes."""
+    """Read the array of an `.npy` stream of `size` bytes."""
     version = npy.read_magic(stream)
     if version not in ((1, 0), (2, 0)):
-        raise FabricError(where, f"is of version {version}; it must be 1.0 or 2.0")
+        raise FabricError(where, f"has the .npy version {version}; it must be 1.0 or 2.0")
     read_header = npy.read_array_header_1_0 if version[0] == 1 else npy.read_array_header_2_0
     shape, by_column, dtype = read_header(stream)
     if dtype.hasobject or dtype.kind not in "fiu" or dtype.itemsize > 8:

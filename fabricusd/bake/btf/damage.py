@@ -1,4 +1,4 @@
-"""What a BTF that was read must be, whichever form it came in: else it is damaged, or no BTF."""
+"""Check a BTF that was read from a file in any form: its parts must be valid and consistent."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from fabricusd.bake.btf.factors import Factors
 from fabricusd.errors import FabricError, one_line
 
 FEWEST_DIRECTIONS = 3
-"""Fewer have no triangle to interpolate in."""
+"""Directions of a BTF at least: interpolation needs a triangle."""
 
 
 @contextmanager
 def damage_in(where: str, kind: str) -> Iterator[None]:
-    """Turn what libraries raise over damaged bytes into one FabricError that names `where`.
+    """Convert any exception that a library raises for damaged bytes to a FabricError about `where`.
 
-    MemoryError gets through: sizes are to be judged before anything is read.
+    MemoryError passes through: sizes must be checked before anything is read.
     """
     try:
         yield
     except (FabricError, MemoryError):
         raise
     except Exception as error:
-        problem = f"is no {kind}, or is damaged: {type(error).__name__}: {error}"
+        problem = f"is not {kind} or is damaged: {type(error).__name__}: {error}"
         raise FabricError(where, one_line(problem, 300)) from error
 
 
 def require_finite(where: str, name: str, values: NDArray[Any]) -> None:
-    """Raise where `values` holds NaN or infinity, with how many of them there are."""
+    """Raise FabricError, with their number, if any of `values` are NaN or infinite."""
     bad = int(np.count_nonzero(~np.isfinite(values)))
     if bad:
         raise FabricError(
@@ -43,9 +43,9 @@ def require_finite(where: str, name: str, values: NDArray[Any]) -> None:
 def require_whole(
     where: str, directions: NDArray[np.float64], made: Factors, size: tuple[int, int]
 ) -> None:
-    """Raise where the parts of a BTF do not go together, or hold what is no number.
+    """Raise FabricError if a BTF's parts have inconsistent shapes or values that are not finite.
 
-    directions (d, 3), size (h, w), rows (d*d, channels, r), columns (h*w, r)
+    The shapes must be directions (d, 3), size (h, w), rows (d*d, channels, r), columns (h*w, r).
     """
     if directions.ndim != 2 or directions.shape[1] != 3 or len(directions) < FEWEST_DIRECTIONS:
         raise FabricError(

@@ -1,6 +1,6 @@
-"""The factored form: a table of one repeat, which every texel reaches by its weave coordinate.
+"""Read and write the factored form: a table of one repeat that is indexed by weave coordinates.
 
-The atlas of components holds the same as pictures, for tools that only know textures.
+The atlas holds the same factors as pictures, for tools that can only read textures.
 """
 
 from __future__ import annotations
@@ -27,9 +27,11 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FactoredBtf:
-    """Factors of one repeat, joint but where `.btf` files have one set a channel.
+    """Factors of one repeat; joint, except those read from `.btf` files with a set per channel.
 
-    directions (d, 3), size (h, w), texels per thread
+    directions : (d, 3) unit vectors, of light and of view alike
+    size : (h, w) texels
+    per_thread : texels along a thread's pitch
     """
 
     directions: Floats
@@ -46,14 +48,14 @@ class FactoredBtf:
 
 
 def factored(btf: Btf, made: Factors) -> FactoredBtf:
-    """The form of a table's joint factors."""
+    """Combine a table and its joint factors."""
     return FactoredBtf(
         directions=btf.directions, factors=made, size=btf.size, per_thread=btf.per_thread
     )
 
 
 def write_factored(path: str | os.PathLike[str], one: FactoredBtf) -> None:
-    """A compressed `.npz` of half floats, whole or not at all."""
+    """Write a compressed `.npz` file of half floats atomically."""
     rows, columns = one.factors.rows[0], one.factors.columns[0]
     scale = np.maximum(np.abs(rows).max(axis=(0, 1)), 1e-20)
     with whole_file(path) as temporary, temporary.open("wb") as stream:
@@ -69,21 +71,21 @@ def write_factored(path: str | os.PathLike[str], one: FactoredBtf) -> None:
 
 
 ARRAYS = {"directions": 2, "rows": 3, "columns": 2, "size": 1, "per_thread": 0, "delta_e": 0}
-"""Arrays of the file, and how many axes each has."""
+"""Number of axes of each array in the file."""
 
-KIND = "factored BTF"
+KIND = "a factored BTF"
 
 
 @reads("a factored BTF")
 def read_factored(path: str | os.PathLike[str]) -> FactoredBtf:
-    """Read what `write_factored` wrote; FabricError for anything else."""
+    """Read a file that `write_factored` wrote; raise FabricError for any other."""
     data = read_arrays(path, ARRAYS, KIND)
     where = str(path)
     if data["size"].shape != (2,) or data["size"].dtype.kind == "f":
-        raise FabricError(where, f"has the size {data['size'].tolist()}; it must be two whole "
-                          "numbers of texels")  # fmt: skip
+        raise FabricError(where, f"has the size {data['size'].tolist()}; it must be two integers, "
+                          "the height and width in texels")  # fmt: skip
     h, w = (int(n) for n in data["size"])
-    with np.errstate(over="ignore"):  # what overflows is reported with what is infinite already
+    with np.errstate(over="ignore"):  # overflows become infinite, which is reported below
         rows, columns = data["rows"].astype(np.float32), data["columns"].astype(np.float32)
     return _whole(
         where,
@@ -97,14 +99,14 @@ def read_factored(path: str | os.PathLike[str]) -> FactoredBtf:
 def _whole(
     where: str, *, directions: Floats, factors: Factors, size: tuple[int, int], per_thread: float
 ) -> FactoredBtf:
-    """A form that was read from `where`, once its parts are found to go together."""
+    """Check that the parts read from `where` are consistent, and combine them."""
     require_whole(where, directions, factors, size)
     if not (math.isfinite(factors.delta_e) and factors.delta_e >= 0):
         raise FabricError(where, f"has the error {factors.delta_e}; it must be at least 0")
     if not (1 <= per_thread <= LARGEST and per_thread == int(per_thread)):
         raise FabricError(
             where,
-            f"has {per_thread:g} texels a thread; it must have a whole number from 1 to {LARGEST}",
+            f"has {per_thread:g} texels per thread; it must be an integer from 1 to {LARGEST}",
         )
     return FactoredBtf(
         directions=directions, factors=factors, size=size, per_thread=int(per_thread)
@@ -112,11 +114,11 @@ def _whole(
 
 
 def write_atlas(stem: str | os.PathLike[str], one: FactoredBtf) -> tuple[Path, Path]:
-    """`<stem>.components.exr` and `<stem>.weights.exr`: reflectance is the sum over k of component
-    k at the place, times weight k at the pair of directions.
+    """Write `<stem>.components.exr` and `<stem>.weights.exr`.
 
-    A component is a channel over one repeat, its top row at the greatest v; a weight is an RGB
-    layer with the light's number along x and the view's along y.
+    Reflectance is the sum over k of component k at a position times weight k at a pair of
+    directions. A component is a channel over one repeat, its top row at the largest v. A weight is
+    an RGB layer with the index of the light along x and the index of the view along y.
     """
     d, (h, w) = len(one.directions), one.size
     columns = one.factors.columns[0].reshape(h, w, -1)[::-1]
@@ -142,7 +144,7 @@ def write_atlas(stem: str | os.PathLike[str], one: FactoredBtf) -> tuple[Path, P
 
 @reads("an atlas of a BTF")
 def read_atlas(stem: str | os.PathLike[str]) -> FactoredBtf:
-    """Read what `write_atlas` wrote; FabricError for anything else."""
+    """Read files that `write_atlas` wrote; raise FabricError for any others."""
     places, said = read_exr_layers(Path(f"{stem}.components.exr"))
     angles, also = read_exr_layers(Path(f"{stem}.weights.exr"))
     where = f"{stem}.weights.exr"
@@ -153,7 +155,7 @@ def read_atlas(stem: str | os.PathLike[str]) -> FactoredBtf:
             "for each",
         )
     names = sorted(places)
-    with damage_in(where, "atlas of a BTF"):
+    with damage_in(where, "an atlas of a BTF"):
         columns = np.concatenate([places[n][::-1] for n in names], axis=-1)
         rows = np.stack([angles[n] for n in names], axis=-1)
         written = str(also["fabricusd:directions"]).split(";")

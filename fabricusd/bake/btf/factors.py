@@ -1,4 +1,4 @@
-"""Low-rank factors of a table, and the rank that a bound on the error asks for."""
+"""Factorise a table at the lowest rank that meets an error bound."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ Decomposed = list[tuple[Floats, Floats, Floats]]
 """Left vectors (d*d, channels, r), singular values (r,), right vectors (r, texels), by group."""
 
 SAMPLES = 4096
-"""Entries of the table that an error is measured on."""
+"""Number of entries of the table that an error is measured on."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Factors:
-    """Table = rows @ columns.T, per channel or joint.
+    """Factors of a table = rows @ columns.T, jointly for all channels or for each of them.
 
-    rows : tuple of (d*d, 3, r) for joint factors, or three of (d*d, 1, r)
-    columns : tuple of one (h*w, r), or three - singular values are in these
-    delta_e : mean CIE 2000 difference of the factors from the table, on its own directions
+    rows : one array (d*d, 3, r) for joint factors, three (d*d, 1, r) otherwise
+    columns : one array (h*w, r) or three; they include the singular values
+    delta_e : mean CIE 2000 difference of the factors from the table, for the table's directions
     """
 
     rows: tuple[NDArray[np.float32], ...]
@@ -36,7 +36,7 @@ class Factors:
 
     @property
     def rank(self) -> int:
-        """Components of the channel with the most."""
+        """Largest number of components of any channel."""
         return max(int(c.shape[1]) for c in self.columns)
 
 
@@ -48,10 +48,12 @@ def factors(
     rank: int = 0,
     full: Decomposed | None = None,
 ) -> Factors:
-    """Factors of `rank`, or of the least rank whose mean delta E 2000 is at most `max_error`.
+    """Return factors of `rank`, or if it is 0 of the lowest rank with delta E <= `max_error`.
 
     joint : one set of components for all channels; otherwise each channel has its own
-    full : what `decomposed` gave, where several ranks are asked for
+    full : the result of `decomposed`, to reuse for several ranks
+
+    The mean delta E 2000 is compared. Raises FabricError if the full rank does not meet the bound.
     """
     full = full or decomposed(btf, joint)
     most = max(len(s) for _, s, _ in full)
@@ -78,7 +80,9 @@ def factors(
     best = of_rank(most)
     if best.delta_e > max_error:
         raise FabricError(
-            "--max-error", f"is {max_error:g}; all {most} components reach {best.delta_e:.2g}"
+            "--max-error",
+            f"is {max_error:g}; it must be at least {best.delta_e:.2g}, the error with all {most} "
+            "components",
         )
     while low < high:
         middle = (low + high) // 2
@@ -91,7 +95,7 @@ def factors(
 
 
 def entries(made: Factors, rows: NDArray[np.int64], texels: NDArray[np.int64]) -> Floats:
-    """(n, 3) entries of the factors' product."""
+    """(n, 3) entries of the product of the factors."""
     if len(made.rows) == 1:
         joint = made.rows[0][rows].astype(np.float64)
         return np.asarray(np.einsum("ncr,nr->nc", joint, made.columns[0][texels]))
@@ -105,7 +109,7 @@ def entries(made: Factors, rows: NDArray[np.int64], texels: NDArray[np.int64]) -
 
 
 def decomposed(btf: Btf, joint: bool) -> Decomposed:
-    """Singular value decompositions, by those of two small triangles instead of the table."""
+    """Compute the singular value decompositions from two small triangular matrices."""
     d2, channels, k = btf.nodes.shape
     if k == 0:
         empty = np.zeros((d2, channels if joint else 1, 1))
@@ -133,5 +137,5 @@ def _sampled(btf: Btf) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def _display(btf: Btf, rows: NDArray[np.int64], values: Floats) -> Floats:
-    """What a display shows of apparent BRDFs: a perfect white is 1."""
+    """Convert apparent BRDFs to display colours: a perfect white is 1."""
     return np.clip(values * math.pi, 0.0, 1.0)

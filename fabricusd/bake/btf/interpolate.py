@@ -1,4 +1,4 @@
-"""A table between its directions and its texels."""
+"""Interpolate a BTF between its directions and between its texels."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ Floats = NDArray[np.float64]
 
 
 def direction_weights(directions: Floats, w: ArrayLike) -> tuple[NDArray[np.int64], Floats]:
-    """(3,) nearest directions around unit vector `w` (3,), and (3,) weights that sum to 1.
+    """(3,) indices of the directions around unit vector `w` (3,), and (3,) weights that sum to 1.
 
-    Barycentric in the plane x/(1+z), y/(1+z); beyond the lowest ring the nearest point of it.
+    Weights are barycentric in the plane x/(1+z), y/(1+z). A direction below the lowest ring is
+    moved towards the pole until it lies inside the ring.
     """
     flat = directions[:, :2] / (1.0 + directions[:, 2:])
     target = np.asarray(w, np.float64)
@@ -29,11 +30,11 @@ def direction_weights(directions: Floats, w: ArrayLike) -> tuple[NDArray[np.int6
     for _ in range(64):
         if found >= 0:
             break
-        # Outside the lowest ring: towards the pole until inside.
+        # Outside the lowest ring: move towards the pole until inside.
         place = place * 0.99
         found = int(mesh.find_simplex(place))
     if found < 0:
-        raise FabricError("directions", "do not surround the pole; those of a BTF must")
+        raise FabricError("directions", "do not surround the pole; the directions of a BTF must")
     corner = mesh.transform[found]
     two = corner[:2] @ (place - corner[2])
     weights = np.clip(np.array([two[0], two[1], 1.0 - two.sum()]), 0.0, 1.0)
@@ -45,13 +46,18 @@ def _mesh(data: bytes, count: int) -> Delaunay:
     try:
         return Delaunay(np.frombuffer(data).reshape(count, 2))
     except QhullError:
-        raise FabricError("directions", "lie on one line; those of a BTF must not") from None
+        raise FabricError(
+            "directions", "lie on one line; the directions of a BTF must surround the pole"
+        ) from None
 
 
 def texel_weights(
     weave: Floats, size: tuple[int, int], per_thread: int
 ) -> tuple[NDArray[np.int64], Floats]:
-    """(n, 4) texels around weave coordinates (n, 2), and their weights; the repeat goes round."""
+    """(n, 4) indices of the texels around weave coordinates (n, 2), and their bilinear weights.
+
+    Coordinates wrap around at the ends of the repeat.
+    """
     h, w = size
     place = np.mod(np.asarray(weave, np.float64), np.array([w, h]) / per_thread) * per_thread - 0.5
     low = np.floor(place).astype(np.int64)

@@ -1,9 +1,10 @@
-"""The table that all three forms compress: places of the repeat by pairs of directions.
+"""Compute the table that all three forms compress: positions in the repeat by pairs of directions.
 
-The value is the apparent BRDF of appearance level `weave`, radiance over irradiance [1/sr], without
-the light's cosine. At that level a place matters only by its thread and tangent angle, so the table
-is a product: values at nodes of (set, thread, angle), times how much of each node a texel shows.
-Everything below is computed on the nodes, which are a few hundred, however large the repeat is.
+An entry is the apparent BRDF of appearance level `weave`: radiance over irradiance [1/sr], without
+the cosine of the light. At that level the radiance depends on a position only through its thread
+and tangent angle. The table is therefore a product: values at nodes of (set, thread, angle), times
+the share of each node in a texel. All computations use the nodes, of which there are a few hundred
+however large the repeat is.
 """
 
 from __future__ import annotations
@@ -36,18 +37,19 @@ RINGS = (
     (68.0, 30),
     (78.0, 30),
 )
-"""Inclination [degrees] and number of directions: 151, as measured BTFs have, none at the rim."""
+"""Inclination [degrees] and number of directions of each ring. There are 151 directions, as in
+measured BTFs, and none at the horizon."""
 
 INSIDE = 4
 """Samples along a texel's side."""
 
 LARGEST = 2**22
-"""Most texels of a repeat."""
+"""Largest number of texels of a repeat."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Btf:
-    """A table as a product of two.
+    """A table, stored as a product of two matrices.
 
     directions : (d, 3) unit vectors, of light and of view alike
     nodes : (d*d, 3, k) float32 - values by view * d + light, channel, node
@@ -65,7 +67,7 @@ class Btf:
 
 
 def ring_directions(rings: tuple[tuple[float, int], ...] = RINGS) -> Floats:
-    """(d, 3) unit vectors on rings of even azimuths."""
+    """(d, 3) unit vectors on rings, at uniform azimuths."""
     found = []
     for inclination, count in rings:
         theta = math.radians(inclination)
@@ -78,16 +80,17 @@ def ring_directions(rings: tuple[tuple[float, int], ...] = RINGS) -> Floats:
 
 
 def btf_of(fabric: Fabric, *, per_thread: int = 16, directions: Floats | None = None) -> Btf:
-    """The table of one repeat of `fabric` with `per_thread` texels a thread each way.
+    """Compute the table of one repeat of `fabric` with `per_thread` texels along a thread's pitch.
 
-    Raises FabricError for a repeat of too many texels.
+    Raises FabricError if the repeat has too many texels or the fabric's model cannot be baked.
     """
     refuse_conserving(fabric)
     ends, picks = true_repeat(fabric)
     size = (picks * per_thread, ends * per_thread)
     if size[0] * size[1] > LARGEST:
         raise FabricError(
-            fabric.name, f"has a repeat of {size[1]} x {size[0]} texels; the most is {LARGEST}"
+            fabric.name,
+            f"has a repeat of {size[1]} x {size[0]} texels; it must have at most {LARGEST} texels",
         )
     chosen = ring_directions() if directions is None else directions
     keys, texels = _texels(fabric, size, per_thread)
@@ -102,7 +105,7 @@ def btf_of(fabric: Fabric, *, per_thread: int = 16, directions: Floats | None = 
 
 
 def _spacing(fabric: Fabric) -> float:
-    """Between nodes [rad]: a third of the narrowest lobe, at least half a degree."""
+    """Spacing of the nodes [rad]: a third of the narrowest lobe's width, at least half a degree."""
     narrowest = min(t.gamma_surface for t in fabric.thread_list)
     return max(narrowest / 3.0, math.radians(0.5))
 
@@ -110,7 +113,7 @@ def _spacing(fabric: Fabric) -> float:
 def _texels(
     fabric: Fabric, size: tuple[int, int], per_thread: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """(k, 3) set, thread and angle number of each node in use; (texels, k) shares."""
+    """(k, 3) set, thread and angle index of each node in use; (texels, k) shares of the nodes."""
     step, types = _spacing(fabric), len(fabric.threads)
     count = 2 * math.ceil(0.5 * math.pi / step) + 1
     place = (np.arange(INSIDE) + 0.5) / INSIDE
@@ -160,7 +163,7 @@ def _nodes(fabric: Fabric, keys: NDArray[np.int64], directions: Floats) -> NDArr
 
 
 def table(btf: Btf, rows: NDArray[Any], texels: NDArray[Any]) -> Floats:
-    """(n, 3) entries of the table: rows (n,) of direction pairs, texels (n,)."""
+    """(n, 3) entries of the table at the direction pairs `rows` (n,) and `texels` (n,)."""
     return np.asarray(
         np.einsum("nck,nk->nc", btf.nodes[rows].astype(np.float64), btf.texels[texels])
     )

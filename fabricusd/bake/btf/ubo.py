@@ -1,9 +1,10 @@
-"""`.btf` files as the University of Bonn's 2014 database has them.
+"""Read and write `.btf` files in the format of the University of Bonn's 2014 database.
 
-Per channel (`DFMF`) or joint (`FMF`) full-matrix factorisations in half floats. Laid out from the
-behaviour of independent readers: a header, the directions by view, the size, then for each matrix
-its rank, singular values, left vectors and right vectors times singular values. Rows of the picture
-run from the top in the readers, from the bottom in the file.
+A file holds full-matrix factorisations in half floats, one per channel (`DFMF`) or a joint one
+(`FMF`). The layout follows the behaviour of independent readers: a header, the directions by view,
+the size, and then for each matrix its rank, singular values, left vectors, and right vectors times
+singular values. Rows of the picture run from the top in the readers and from the bottom in the
+file.
 """
 
 from __future__ import annotations
@@ -31,12 +32,12 @@ _VERSION = 1
 _ONE, _TWO, _KIND = struct.Struct("<I"), struct.Struct("<II"), struct.Struct("<BI")
 
 _HALF = 2
-"""The file's number for half floats."""
+"""Code of half floats in the file."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class UboFile:
-    """What a file holds: directions (d, 3), size (h, w) and factors."""
+    """The contents of a file: directions (d, 3), size (h, w) and factors."""
 
     directions: NDArray[np.float64]
     size: tuple[int, int]
@@ -44,7 +45,7 @@ class UboFile:
 
 
 def write_ubo(path: str | os.PathLike[str], btf: Btf, made: Factors) -> None:
-    """Write a table's factors, whole or not at all."""
+    """Write a table's factors atomically."""
     joint = len(made.rows) == 1
     angles = _angles(btf.directions)
     h, w = btf.size
@@ -85,13 +86,13 @@ def _write_joint(stream: BinaryIO, made: Factors) -> None:
 def _halves(
     rows: NDArray[np.float32], columns: NDArray[np.float32]
 ) -> tuple[NDArray[np.float16], NDArray[np.float16], NDArray[np.float16]]:
-    """Factors and singular values as halves, scaled so that neither side leaves their range."""
+    """Convert factors and singular values to half floats, scaled so that neither side overflows."""
     size = np.maximum(np.abs(rows).max(axis=(0, 1)), 1e-20)
     norms = np.linalg.norm(columns, axis=0)
     u, c = (rows / size).astype("<f2"), (columns * size).astype("<f2")
     if not (np.isfinite(u).all() and np.isfinite(c).all()):
         raise FabricError("btf", f"has values up to {float(np.abs(columns * size).max()):.3g}; "
-                          "half floats reach 65504")  # fmt: skip
+                          "they must be at most 65504, the largest half float")  # fmt: skip
     return u, c, norms.astype("<f2")
 
 
@@ -103,19 +104,20 @@ def _angles(directions: NDArray[np.float64]) -> NDArray[np.float32]:
 
 @reads("a .btf file")
 def read_ubo(path: str | os.PathLike[str]) -> UboFile:
-    """Read what `write_ubo` wrote; FabricError for anything else.
+    """Read a file that `write_ubo` wrote; raise FabricError for any other.
 
-    Every count in the file is compared with its length before anything of that size is made.
+    Every count in the file is checked against the file's length before memory of that size is
+    allocated.
     """
     source = readable_file(path)
-    # Not read as a whole: factors are copied as floats anyway.
+    # Map the file instead of reading it: the factors are copied as floats anyway.
     data = np.memmap(source, np.uint8, "r")
     head = data[: len(PER_CHANNEL)].tobytes()
     joint = head.startswith(JOINT)
     if not joint and not head.startswith(PER_CHANNEL):
-        raise FabricError(str(path), "is no .btf file of FMF or DFMF factors")
+        raise FabricError(str(path), "is not a .btf file; it must hold FMF or DFMF factors")
     reader = _Reader(str(path), data, len(JOINT if joint else PER_CHANNEL))
-    # A signalling NaN warns wherever it is copied; what is not finite is counted and refused.
+    # Copying a signalling NaN warns; values that are not finite are counted and refused below.
     with np.errstate(invalid="ignore"):
         one = _parse(reader, joint)
     require_whole(str(path), one.directions, one.factors, one.size)
@@ -123,7 +125,7 @@ def read_ubo(path: str | os.PathLike[str]) -> UboFile:
 
 
 class _Reader:
-    """Takes numbers from a file one after the other, and no more than it has."""
+    """Reads numbers from a file in sequence, and never beyond its end."""
 
     def __init__(self, where: str, data: NDArray[np.uint8], at: int) -> None:
         self.where = where
@@ -131,14 +133,14 @@ class _Reader:
         self.at = at
 
     def take(self, form: struct.Struct, what: str) -> tuple[Any, ...]:
-        """The fields of `form`."""
+        """Read the fields of `form`."""
         self.require(form.size, what)
         values = form.unpack_from(self.data.data, self.at)
         self.at += form.size
         return values
 
     def array(self, kind: str, shape: tuple[int, ...], what: str) -> NDArray[np.float32]:
-        """Numbers of the type `kind` as floats."""
+        """Read numbers of the type `kind` and convert them to floats."""
         count = math.prod(shape)
         self.require(count * np.dtype(kind).itemsize, what)
         values = np.frombuffer(self.data, kind, count, self.at).reshape(shape)
@@ -146,16 +148,17 @@ class _Reader:
         return values.astype(np.float32)
 
     def require(self, size: int, what: str) -> None:
-        """Raise where the file has fewer than `size` bytes more."""
+        """Raise FabricError if fewer than `size` bytes remain."""
         left = len(self.data) - self.at
         if size > left:
             raise FabricError(
                 self.where,
-                f"is damaged: at byte {self.at} it has {left} bytes; it must have {size} of {what}",
+                f"is damaged: after byte {self.at} it has {left} more bytes; it must have {size} "
+                f"for {what}",
             )
 
     def equal(self, found: object, wanted: object, what: str) -> None:
-        """Raise where a number of the file is not what the others make it."""
+        """Raise FabricError if a number in the file is inconsistent with the others."""
         if found != wanted:
             raise FabricError(self.where, f"is damaged: {what} is {found}; it must be {wanted}")
 

@@ -1,4 +1,4 @@
-"""Every form that was asked for of a fabric, into a folder, with what each reached and costs."""
+"""Write the requested forms of a fabric's BTF to a folder, with the error and size of each."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PER_THREAD = 16
 """Texels along a thread's pitch."""
 
 MAX_ERROR = 1.0
-"""Mean delta E 2000 that the rank is chosen for where nothing is asked: just noticeable."""
+"""Default bound on the mean delta E 2000, for which the rank is chosen: just noticeable."""
 
 
 def write_btf(
@@ -46,17 +46,20 @@ def write_btf(
     per_thread: int = PER_THREAD,
     directions: Floats | None = None,
 ) -> list[dict[str, Any]]:
-    """Write `forms` of the BTF of one repeat; a record of each, for JSON.
+    """Write `forms` of the BTF of one repeat; return a record of each, for JSON.
 
-    directions : (d, 3) of light and of view, 151 where None
+    directions : (d, 3) of light and of view; None for the default 151
 
-    delta_e is that of the factors on the table's own directions; between them, where a reader has
-    to interpolate, it is `delta_e_between`, which no rank makes smaller, measured on the files as
-    they are read back; `bound` is 1.5 times that of the worst pair of directions.
+    In a record, `delta_e` is the error of the factors for the table's own directions.
+    `delta_e_between` is the error between these directions, where a reader has to interpolate; it
+    does not fall with the rank, and is measured on the files as they are read back. `bound` is 1.5
+    times the error of the worst pair of directions.
     """
     unknown = [f for f in forms if f not in FORMS]
     if unknown:
-        raise FabricError(f"--btf '{unknown[0]}'", f"is unknown; it must be {', '.join(FORMS)}")
+        raise FabricError(
+            f"--btf '{unknown[0]}'", f"is unknown; it must be one of {', '.join(FORMS)}"
+        )
     btf = btf_of(fabric, per_thread=per_thread, directions=directions)
     stem = folder / fabric.name
     records: list[dict[str, Any]] = []
@@ -81,7 +84,7 @@ def write_btf(
 
 
 def _written(form: str, stem: Path, btf: Btf, made: Factors) -> list[Path]:
-    """The files of one form, written."""
+    """Write one form and return its files."""
     if form == "atlas":
         return list(write_atlas(stem, factored(btf, made)))
     path = _path(form, stem)
@@ -98,9 +101,10 @@ def _path(form: str, stem: Path) -> Path:
 
 
 def read_form(form: str, stem: Path, per_thread: int = PER_THREAD) -> FactoredBtf:
-    """What `write_btf` wrote as `form` of the fabric whose name ends `stem`.
+    """Read `form` of a fabric's BTF, as `write_btf` wrote it.
 
-    per_thread : texels a thread, which `.btf` files do not hold
+    stem : the path of the files without their suffixes; its name is the fabric's
+    per_thread : texels along a thread's pitch, which `.btf` files do not hold
     """
     if form == "atlas":
         return read_atlas(stem)
@@ -116,9 +120,9 @@ def read_form(form: str, stem: Path, per_thread: int = PER_THREAD) -> FactoredBt
 def between(
     fabric: Fabric, forms: Sequence[FactoredBtf], pairs: tuple[Floats, Floats] | None = None
 ) -> Floats:
-    """(forms, pairs) mean delta E 2000 against level `weave` at places and directions of no table.
+    """(forms, pairs) mean delta E 2000 against level `weave`, between the tables' directions.
 
-    pairs : (n, 3) wi and wo, `accuracy.PAIRS` of them where None
+    pairs : (n, 3) wi and wo; None for `accuracy.PAIRS` default pairs
     """
     weave = np.random.default_rng(1).random((512, 2)) * 64.0
     found = []

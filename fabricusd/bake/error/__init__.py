@@ -1,1 +1,1 @@
-"""How far a bake is from the truth, and which one meets a bound."""
+"""Measure the error of a bake, and find the cheapest bake that meets a bound."""

@@ -1,9 +1,10 @@
-"""How far a baked set is from the truth, in delta E 2000 of re-lit swatches.
+"""Measure the error of a bake as the delta E 2000 of re-lit swatches.
 
-A swatch is a block of texels; it is re-lit by the loader under pairs of directions, and compared
-with appearance level `weave` twice: at points, which asks whether the texels are fine enough, and
-with its mean over each texel, which asks whether they hold the right thing. Colours are those of a
-display that shows a perfect white as 1: radiance times pi over the light's cosine.
+A swatch is a block of texels. The loader re-lights it under pairs of directions, and the result is
+compared with appearance level `weave` twice: at points, which tells whether the texels are fine
+enough, and with the mean of level `weave` over each texel, which tells whether the stored values
+are right. Colours are those of a display that shows a perfect white as 1: radiance times pi over
+the cosine of the light.
 """
 
 from __future__ import annotations
@@ -30,23 +31,26 @@ from fabricusd.quality.colors import delta_e_2000
 Floats = NDArray[np.float64]
 
 PAIRS = 32
-"""Pairs of directions that an error is measured under."""
+"""Number of pairs of directions that an error is measured under."""
 
 TEXELS, MEANS = 256, 128
-"""Texels of a swatch that are compared at points, and with their means."""
+"""Number of texels of a swatch that are compared at points, and over their area."""
 
 INSIDE = 12
-"""Samples along a texel's side that its true mean is taken from."""
+"""Samples along a texel's side from which its reference mean is computed."""
 
 MARGIN = 1.5
-"""How far above the measured mean the stated bound lies: other pairs see other lobes."""
+"""Ratio of the stated bound to the largest measured mean: other pairs see other lobes."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SwatchError:
-    """Mean delta E 2000 over texels and pairs, the worst pair's, and the bound that is stated.
+    """The delta E 2000 of a swatch.
 
-    point : against level `weave` at points; texel : against its mean over each texel
+    point : mean over texels and pairs, against level `weave` at points
+    texel : mean over texels and pairs, against the mean of level `weave` over each texel
+    worst_pair : `texel` for the pair of directions with the largest error
+    bound : the stated bound, see `bound_of`
     """
 
     point: float
@@ -56,7 +60,7 @@ class SwatchError:
 
 
 def pairs_between(count: int, skip: int = 0) -> tuple[Floats, Floats]:
-    """(count, 3) lights and viewers, 10 degrees or more above the cloth; leaves out `skip`."""
+    """(count, 3) lights and viewers, 10 degrees or more above the cloth, after the first `skip`."""
     wi, wo = spread_pairs(8 * (count + skip) + 64)
     low = math.sin(math.radians(10.0))
     high = np.flatnonzero((wi[2] > low) & (wo[2] > low))[skip : skip + count]
@@ -64,12 +68,12 @@ def pairs_between(count: int, skip: int = 0) -> tuple[Floats, Floats]:
 
 
 def display(radiance: Floats, wi: Floats) -> Floats:
-    """Colours of (n, 3) values, cosine included, under light wi (3,)."""
+    """Display colours of (n, 3) radiance values, cosine included, under light wi (3,)."""
     return np.asarray(np.clip(radiance * (math.pi / wi[2]), 0.0, 1.0))
 
 
 def fullest_block(sheet: Sheet) -> tuple[int, int, int]:
-    """(bx, by, lay) of the block near the middle that one lay covers most of."""
+    """Return (bx, by, lay): the block near the middle of the sheet that one lay covers best."""
     middle = sheet.across // 2
     best, found = -1, (middle, middle, 0)
     order = sorted(
@@ -81,17 +85,18 @@ def fullest_block(sheet: Sheet) -> tuple[int, int, int]:
         counts = np.bincount(owner[owner != NOBODY], minlength=len(sheet.garment.lays))
         if counts.max() > best:
             best, found = int(counts.max()), (x, y, int(counts.argmax()))
-        if best == sheet.block**2:
+        if best == sheet.block_side**2:
             break
     return found
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Swatch:
-    """The fullest block of a sheet at one mip level, and texels of it that are its lay's.
+    """A sheet's fullest block at one mip level.
 
     block : (bx, by)
-    maps : names to (h, w, channels)
+    lay : the lay that covers most of the block; only its texels are compared
+    maps : (h, w, channels) by name
     """
 
     sheet: Sheet
@@ -102,11 +107,11 @@ class Swatch:
 
     @property
     def mine(self) -> NDArray[np.bool_]:
-        """(h, w) where the texels are the lay's."""
+        """(h, w) mask of the texels that belong to the lay."""
         return np.asarray(self.maps["lay"][..., 0] == self.lay)
 
     def texels(self, rng: np.random.Generator) -> NDArray[np.int64]:
-        """(TEXELS, 2) rows and columns."""
+        """(TEXELS, 2) rows and columns of random texels of the lay."""
         mine = np.argwhere(self.mine)
         if not len(mine):
             raise FabricError(
@@ -116,7 +121,7 @@ class Swatch:
 
 
 def swatch_of(sheet: Sheet, names: Collection[str], level: int = 0) -> Swatch:
-    """A sheet's swatch with the maps `names`, computed as they would be written."""
+    """Return a sheet's swatch with the maps `names`, computed as for a file."""
     bx, by, lay = fullest_block(sheet)
     maps = [REGISTRY[name] for name in {*names, "lay"}]
     found, _, _ = bake_block(sheet, maps, bx, by)
@@ -132,12 +137,12 @@ def swatch_of(sheet: Sheet, names: Collection[str], level: int = 0) -> Swatch:
 def swatch_error(
     sheet: Sheet, *, level: int = 0, pairs: tuple[Floats, Floats] | None = None, seed: int = 0
 ) -> SwatchError:
-    """Error of a sheet at mip `level` with the maps that lose least."""
+    """Return the error of a sheet at mip `level` with the most accurate choice of maps."""
     return swatch_errors(sheet, (NEEDED,), level=level, pairs=pairs, seed=seed)[0]
 
 
 def bound_of(worst: float) -> float:
-    """The stated bound where `worst` is the largest mean delta E 2000 of the pairs measured."""
+    """Return the stated bound, given the largest mean delta E 2000 of any measured pair."""
     return MARGIN * worst
 
 
@@ -150,15 +155,15 @@ def swatch_errors(
     seed: int = 0,
     means: bool = True,
 ) -> list[SwatchError]:
-    """Error of a sheet at mip `level` with each of several choices of maps, see `relight.RELIT`.
+    """Return the error of a sheet at mip `level` for each choice of maps, see `relight.RELIT`.
 
-    means : False measures at points alone, which is quick, and leaves the rest 0
+    means : False measures at points only, which is fast, and leaves the other figures 0
     """
     swatch = swatch_of(sheet, {name for names in choices for name in names}, level)
     rng = np.random.default_rng(seed)
     chosen = swatch.texels(rng)
     step = texel_step(sheet, swatch.lay, 1 << level)
-    start = texel_start(sheet, swatch.lay, *(k * sheet.block for k in swatch.block))
+    start = texel_start(sheet, swatch.lay, *(k * sheet.block_side for k in swatch.block))
     corner = chosen[:, None, ::-1]
     points = start + (corner + rng.random((TEXELS, 1, 2))) @ step.T
     strata = np.stack(np.meshgrid(np.arange(INSIDE), np.arange(INSIDE)), axis=-1).reshape(-1, 2)
@@ -186,7 +191,11 @@ def compared(
     weave: Floats,
     pairs: tuple[Floats, Floats],
 ) -> Floats:
-    """(choices, pairs) mean delta E of maps (n, ...) against places (m, samples, 2), m <= n."""
+    """(choices, pairs) mean delta E of re-lit texels against level `weave`.
+
+    choices : maps (n, ...) by name
+    weave : (m, samples, 2) weave coordinates in the first m <= n texels
+    """
     errors = np.zeros((len(choices), len(pairs[0])))
     n, samples = weave.shape[:2]
     for k, (wi, wo) in enumerate(zip(*pairs, strict=True)):

@@ -1,4 +1,4 @@
-"""The cheapest bake that meets a bound: fewest bytes over resolutions and choices of maps."""
+"""Find the cheapest bake that meets an error bound: the resolution and maps of the fewest bytes."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from fabricusd.bake.texels.maps import REGISTRY, TextureMap, chosen_maps
 from fabricusd.bake.texels.sheet import Sheet
 
 COARSEST = 64
-"""Texels a side that a search begins with."""
+"""Resolution [texels] at which a search starts."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tried:
-    """A resolution and a choice of maps to re-light, what they cost and what they reach.
+    """A trial: a resolution and a choice of maps to re-light from, their cost and their error.
 
-    megabytes : of the finest levels before compression, of all sheets
-    point : mean delta E 2000 against level `weave` at points, of the worst garment
+    megabytes : size of the finest levels of all sheets before compression
+    point : mean delta E 2000 against level `weave` at points, for the worst garment
     """
 
     resolution: int
@@ -35,13 +35,15 @@ def cheapest(
     count: int,
     choices: Sequence[tuple[str, ...]] = RELIT,
 ) -> tuple[Tried, list[Tried]]:
-    """What meets `max_error` at the least cost up to `largest` texels a side, and what was tried.
+    """Return the cheapest trial that meets `max_error`, and all trials.
 
-    sheets_at : for a resolution, one sheet of each garment
-    count : sheets in all
+    sheets_at : returns one sheet of each garment at a given resolution
+    largest : largest resolution to try
+    count : total number of sheets
 
-    All maps at one resolution cost less than the fewest at twice of it, so the first resolution at
-    which any choice is good enough has the cheapest. Where none is, what loses least at `largest`.
+    All maps at one resolution cost less than the cheapest choice at twice that resolution, so the
+    search ends at the first resolution at which any choice is accurate enough. If none is, the
+    result is the most accurate choice at `largest`.
     """
     tried: list[Tried] = []
     resolution = min(COARSEST, largest)
@@ -66,11 +68,11 @@ def cheapest(
 
 
 def bytes_per_texel(names: Sequence[str]) -> int:
-    """Of maps, before compression, at the finest level."""
+    """Return the bytes of a texel of these maps at the finest level, before compression."""
     return sum(REGISTRY[name].bytes_per_texel for name in names)
 
 
 def maps_with(names: Sequence[str], *, light: bool) -> list[TextureMap]:
-    """All maps, but of those that are re-lit only `names`."""
+    """Return all maps that are not used to re-light, and those of `names`."""
     every = [one.name for one in chosen_maps(None, light=light) if one.name not in NEEDED]
     return chosen_maps([*every, *names], light=light)

@@ -1,8 +1,9 @@
-"""What each map loses: to its number type, to the texel's size, between texels.
+"""Measure the error of each map: from its number type, over texels, and between texels.
 
-Compared with the same map of level `weave`, worked out from a thousand samples at a texel, and from
-one at a point. Errors are root mean squares in the map's own unit - degrees for directions, the
-share that is wrong for ids - weighted as the map says, so that a colour in a gap does not count.
+The reference is the same map of level `weave`, computed from a thousand samples over a texel and
+from one sample at a point. Errors are root mean squares in the map's own unit: degrees for
+directions, the share of wrong values for ids. They are weighted as the map specifies, so that for
+example a colour in a gap does not count.
 """
 
 from __future__ import annotations
@@ -18,24 +19,24 @@ from scipy.ndimage import binary_erosion
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.bake.error.accuracy import TEXELS, swatch_of
 from fabricusd.bake.texels.maps import Texels, TextureMap
+from fabricusd.bake.texels.moment_indices import COVER, MOMENTS
 from fabricusd.bake.texels.moments import texels, threads_under
-from fabricusd.bake.texels.planes import COVER, PLANES
 from fabricusd.bake.texels.sheet import Sheet, texel_start, texel_step
 
 Floats = NDArray[np.float64]
 
 SAMPLES = 32
-"""Along a texel's side, for the mean that a stored one is compared with."""
+"""Samples along a texel's side for the reference mean."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MapError:
-    """Root mean squares, in `unit`.
+    """Root mean square errors of a map, in `unit`.
 
-    rounding : what the number type of the file does to exact means over texels
-    texel : what is stored, against the exact mean over the texel
-    point : what is stored, read linearly between texels, against the map at a point
-    spread : the map at points, about its mean; what an error is to be judged by
+    rounding : error that the file's number type adds to exact means over texels
+    texel : stored values against the exact means over texels
+    point : stored values, interpolated linearly, against the map at points
+    spread : standard deviation of the map at points, the scale to judge an error by
     """
 
     unit: str
@@ -48,21 +49,24 @@ class MapError:
 def exact(
     sheet: Sheet, lay: int, x: Floats, y: Floats, size: float, samples: int = SAMPLES
 ) -> Texels:
-    """Texels of side `size` about places (n,) of a sheet, in texels; points where it is 0."""
+    """Compute texels of side `size` centred at (x, y) on a sheet, both (n,) [texels].
+
+    With `size` 0 they are points.
+    """
     one, made = sheet.garment.lays[lay], sheet.recipes[lay]
-    planes = np.zeros((PLANES, len(x)), np.float32)
-    sums, owner = np.empty(PLANES, np.float32), np.zeros((1, 1), np.int32)
+    moments = np.zeros((MOMENTS, len(x)), np.float32)
+    sums, owner = np.empty(MOMENTS, np.float32), np.zeros((1, 1), np.int32)
     step, weave = texel_step(sheet, lay) * size, np.empty((len(x), 2))
-    out = np.empty((PLANES, 1, 1), np.float32)
+    out = np.empty((MOMENTS, 1, 1), np.float32)
     for k in range(len(x)):
         weave[k] = texel_start(sheet, lay, x[k], y[k])
         start = weave[k] - step @ np.full(2, 0.5)
         texels(made, step, step, start, (k, 0), owner, 0, samples if size else 1, sums, out)
-        planes[:, k] = out[:, 0, 0]
+        moments[:, k] = out[:, 0, 0]
     sets, threads = np.empty(len(x), np.uint8), np.empty(len(x), np.int32)
     threads_under(made.cloth, weave, sets, threads)
     return Texels(
-        planes=planes,
+        moments=moments,
         usual=made.mean,
         along=one.along,
         weave=weave,
@@ -77,9 +81,9 @@ def map_errors(
     maps: Sequence[TextureMap],
     stored: Callable[[TextureMap, NDArray[Any]], NDArray[Any]],
 ) -> dict[str, MapError]:
-    """Error of each map on a sheet's swatch, none where it has no texel away from its border.
+    """Return the error of each map on a sheet's swatch; empty if every texel is at the border.
 
-    stored : what a file makes of values
+    stored : rounds a map's values as the file format does
     """
     swatch = swatch_of(sheet, [one.name for one in maps])
     inside = np.argwhere(binary_erosion(swatch.mine, np.ones((3, 3))))
@@ -87,7 +91,7 @@ def map_errors(
         return {}
     rng = np.random.default_rng(0)
     places, lay = inside[rng.integers(0, len(inside), TEXELS)], swatch.lay
-    corner = np.array(swatch.block[::-1]) * sheet.block
+    corner = np.array(swatch.block[::-1]) * sheet.block_side
     y, x = places.T + 0.5 + corner[:, None]
     moved = rng.uniform(-0.5, 0.5, (2, len(places)))
     texel = exact(sheet, lay, x, y, 1.0)
@@ -96,9 +100,9 @@ def map_errors(
     found = {}
     for one in maps:
         true, there = (np.asarray(one.function(t), np.float64) for t in (texel, point))
-        kept = stored(one, swatch.maps[one.name])
-        read = kept[places[:, 0], places[:, 1]].astype(np.float64)
-        between = read if one.exact else linear(kept, places, moved)
+        written = stored(one, swatch.maps[one.name])
+        read = written[places[:, 0], places[:, 1]].astype(np.float64)
+        between = read if one.exact else linear(written, places, moved)
         weight = _weights(one, point)
         middle = np.sum(weight * there, axis=0) / np.maximum(weight.sum(axis=0), 1e-12)
         middle = np.broadcast_to(middle, there.shape)
@@ -115,7 +119,10 @@ def map_errors(
 
 
 def linear(values: NDArray[Any], places: NDArray[np.int64], moved: Floats) -> Floats:
-    """(n, c) values (h, w, c) read linearly `moved` (2, n) right and down of texels' centres."""
+    """(n, c) linear interpolation of `values` (h, w, c) near the centres of texels `places` (n, 2).
+
+    moved : (2, n) offsets from the centres, to the right and down [texels]
+    """
     found = np.zeros((len(places), values.shape[2]))
     aside = np.where(moved < 0, -1, 1)
     for down in (0, 1):
@@ -130,13 +137,13 @@ def linear(values: NDArray[Any], places: NDArray[np.int64], moved: Floats) -> Fl
 
 
 def _weights(one: TextureMap, t: Texels) -> Floats:
-    """(n, 1) or (n, channels) how much each value counts."""
-    weight = t.planes[COVER] if one.weight is None else one.weight(t)
+    """(n, 1) or (n, channels) weight of each value."""
+    weight = t.moments[COVER] if one.weight is None else one.weight(t)
     return np.asarray(weight, np.float64).reshape(len(t.weave), -1)
 
 
 def _rms(one: TextureMap, a: Floats, true: Floats, t: Texels, repeat: Floats) -> float:
-    """Weighted root mean square difference of (n, c) values."""
+    """Return the weighted root mean square difference of (n, c) values."""
     if one.kind_of in ("direction", "axis"):
         cosine = np.sum(a * true, axis=1) / np.maximum(
             np.linalg.norm(a, axis=1) * np.linalg.norm(true, axis=1), 1e-12

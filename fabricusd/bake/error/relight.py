@@ -1,8 +1,9 @@
-"""A baked set under any light and view: the loader of our own maps.
+"""Load a bake and re-light its textures under any pair of light and view directions.
 
-Each thread set of a texel is re-lit from the share that it covers, its `A`, and the mean and
-standard deviation of its tangent angle, about which the angles lie as in the fabric. So a fine
-level gives the appearance level `weave`, the coarsest `far`.
+Each thread set of a texel is re-lit from the share of the texel that it covers, its `A`, and the
+mean and standard deviation of its tangent angle. The angles are distributed about the mean as they
+are in the fabric. A fine mip level therefore reproduces appearance level `weave`, and the coarsest
+one level `far`.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -27,7 +28,7 @@ from fabricusd.appearance.weave.lookup import NO_THREAD
 from fabricusd.bake.manifest_file import file_in, read_manifest
 from fabricusd.bake.texels.angle_shape import COUNTS, angle_shapes
 from fabricusd.bake.texels.encoding import Encoding
-from fabricusd.bake.texels.planes import PARTS
+from fabricusd.bake.texels.moment_indices import PARTS
 from fabricusd.errors import FabricError, reads
 from fabricusd.fabric import Fabric
 from fabricusd.images.files import read_mip_level
@@ -36,22 +37,22 @@ from fabricusd.kernels.real import KERNEL
 Floats = NDArray[np.float64]
 
 PER_SET = (("thread", "lean"), ("thread", "share", "angle"), ("thread", "share", "angle", "spread"))
-"""Maps of each thread set that suffice to re-light, cheapest first. Without shares of parts a set
-has one mean angle and one spread; without spreads a part has one angle."""
+"""Maps of each thread set that suffice to re-light it, cheapest choice first. Without the shares of
+its parts a set has one mean angle and one spread; without spreads a part has one angle."""
 
 RELIT = tuple(
     ("thread_id", *(f"{noun}_{what}" for noun in ("weft", "warp") for what in per_set))
     for per_set in PER_SET
 )
-"""Maps that are re-lit, cheapest choice first."""
+"""Maps to re-light from, cheapest choice first."""
 
 NEEDED = RELIT[-1]
-"""Those that lose least."""
+"""The most accurate choice."""
 
 
 @dataclass(frozen=True, eq=False)
 class BakedSet:
-    """A folder of textures, by its manifest."""
+    """A folder of baked textures, read by its manifest."""
 
     folder: Path
     manifest: dict[str, Any]
@@ -59,16 +60,16 @@ class BakedSet:
     @classmethod
     @reads("a bake")
     def load(cls, folder: str | Path) -> BakedSet:
-        """Read the manifest of `folder`; FabricError where there is none, or a faulty one."""
+        """Read the manifest of `folder`; raise FabricError if it is missing or invalid."""
         return cls(Path(folder), read_manifest(Path(folder)))
 
     def read(self, garment: str, name: str, level: int = 0, tile: int = 1001) -> NDArray[Any]:
-        """(h, w, c) float32 of one map's level."""
+        """(h, w, c) float32 pixels of one level of a map."""
         files = self.manifest["garments"].get(garment, {}).get("files", {})
         if str(tile) not in files.get(name, {}):
             raise FabricError(
                 str(self.folder),
-                f"holds no map '{name}' of '{garment}' in tile {tile}; it must be one of "
+                f"has no map '{name}' of '{garment}' in tile {tile}; it must be one of "
                 f"{', '.join(files) or 'none'}",
             )
         said = files[name][str(tile)]
@@ -86,15 +87,16 @@ class BakedSet:
         level: int = 0,
         tile: int = 1001,
     ) -> Floats:
-        """(h, w, 3) radiance per unit `L_i dwi` towards wo, black outside the layout.
+        """(h, w, 3) radiance per unit `L_i dwi` towards wo, black outside the UV layout.
 
-        fabrics : of each lay, as the manifest counts them
+        fabrics : of each lay, in the order of the manifest
         wi, wo : (3,) unit vectors in UV axes: x along u, y along v, z out of the cloth
         """
         known = self.manifest["garments"]
         if garment not in known:
             raise FabricError(
-                str(self.folder), f"has no garment '{garment}'; it must be of {', '.join(known)}"
+                str(self.folder),
+                f"has no garment '{garment}'; it must be one of {', '.join(known)}",
             )
         maps = {
             name: self.read(garment, name, level, tile)
@@ -119,8 +121,9 @@ class BakedSet:
 def relight(
     maps: Mapping[str, NDArray[Any]], fabric: Fabric, wi: ArrayLike, wo: ArrayLike
 ) -> Floats:
-    """(n, 3) radiance per unit `L_i dwi` of texels whose maps, one of RELIT, are (n, channels).
+    """(n, 3) radiance per unit `L_i dwi` of texels.
 
+    maps : (n, channels) by name, one of the choices in RELIT
     wi, wo : (3,) unit vectors in the weave's frame, x along U, y along V
     """
     types = len(fabric.threads)
@@ -130,9 +133,9 @@ def relight(
     sets = np.stack([_set_of(maps, noun) for noun in ("weft", "warp")], axis=1)
     shapes = angle_shapes(fabric)
     if "weft_share" not in maps:
-        # The one part is the whole set.
+        # The single part is the whole set.
         shapes = np.repeat(shapes[:, PARTS:], PARTS + 1, axis=1)
-    # Bakes of earlier versions have 255 for none.
+    # Earlier versions stored 255 for texels without a thread.
     kinds = np.where((ids >= 0) & (ids < 2 * types), ids, NO_THREAD).astype(np.int64)
     out = np.zeros((len(ids), 3))
     i, o = (np.asarray(w, np.float64) for w in (wi, wo))
@@ -141,17 +144,17 @@ def relight(
 
 
 def best_choice(names: Collection[str]) -> tuple[str, ...]:
-    """The one of RELIT that loses least among maps of these names, NEEDED where there is none."""
+    """Return the most accurate choice in RELIT that these maps allow, or NEEDED if none does."""
     return next((c for c in reversed(RELIT) if set(c) <= set(names)), NEEDED)
 
 
 def _set_of(maps: Mapping[str, NDArray[Any]], noun: str) -> Floats:
-    """(n, 16): `A` and share; shares, mean angles and deviations of the parts of a thread set."""
+    """(n, 16) values of a thread set: `A` and share; shares, mean angles and deviations by part."""
     thread = maps[f"{noun}_thread"]
     found = np.zeros((len(thread), 4 + 3 * PARTS))
     found[:, :4] = thread
     if f"{noun}_share" not in maps:
-        # One part is the whole set.
+        # The first part stands for the whole set.
         found[:, 4] = thread[:, 3]
         found[:, 4 + PARTS], found[:, 4 + 2 * PARTS] = maps[f"{noun}_lean"].T
         return found
@@ -161,13 +164,45 @@ def _set_of(maps: Mapping[str, NDArray[Any]], noun: str) -> Floats:
     return found
 
 
+class _Directions(NamedTuple):
+    """Light and view relative to the axis of a thread set, see `along_set`.
+
+    a, b, z : components along the axis, across it, and along the surface normal
+    scale : 1/sqrt(a^2 + z^2)
+    overlap : `u` of the two azimuths
+    """
+
+    a_i: Any
+    b_i: Any
+    z_i: Any
+    scale_i: Any
+    a_o: Any
+    b_o: Any
+    z_o: Any
+    scale_o: Any
+    overlap: Any
+
+
+class _Angles(NamedTuple):
+    """The distribution of tangent angles in one part of a thread set.
+
+    mean, deviation : [rad]
+    shape : angles of mean 0 and deviation 1 by count, see `angle_shapes`
+    """
+
+    mean: Any
+    deviation: Any
+    shape: Any
+
+
 @njit(parallel=True, **KERNEL)
 def _relight(  # type: ignore[no-untyped-def]
     tables, share, shapes, types, sets, kinds, wi, wo, out
 ):
-    """sets (n, 2, 16): `A` and share; shares, angles and deviations of the parts.
+    """Add the radiance of each texel to out (n, 3).
 
-    kinds (n,) : thread ids, -1 for none
+    sets : (n, 2, 16) `A` and share; shares, mean angles and deviations by part
+    kinds : (n,) thread ids, -1 for none
     """
     R = np.float64
     precision = tables.overlap_precision
@@ -181,8 +216,9 @@ def _relight(  # type: ignore[no-untyped-def]
             a_i, b_i, s_i, a_o, b_o, s_o, u = along_set(
                 R, j, precision, wi[0], wi[1], wi[2], wo[0], wo[1], wo[2]
             )
+            directions = _Directions(a_i, b_i, wi[2], s_i, a_o, b_o, wo[2], s_o, u)
             for kind in range(types):
-                # The thread under the centre speaks for its set where there is one.
+                # If a thread lies under the texel's centre, it stands for its whole set.
                 weight = share[j, kind]
                 if kinds[k] >= 0 and kinds[k] // types == j:
                     weight = 1.0 if kinds[k] % types == kind else 0.0
@@ -191,36 +227,37 @@ def _relight(  # type: ignore[no-untyped-def]
                     covered = weight * sets[k, j, 4 + part]
                     if covered <= 0.0:
                         continue
-                    middle, spread = sets[k, j, 8 + part], sets[k, j, 12 + part]
-                    surface, volume = _stretch(
-                        R, tables, row, middle, spread, shapes[j, part],
-                        a_i, b_i, wi[2], s_i, a_o, b_o, wo[2], s_o, u,
-                    )  # fmt: skip
+                    angles = _Angles(sets[k, j, 8 + part], sets[k, j, 12 + part], shapes[j, part])
+                    surface, volume = _part_terms(R, precision, row, angles, directions)
                     for channel in range(3):
                         value = surface + volume * sets[k, j, channel]
                         out[k, channel] += covered / q * value
 
 
 @njit(**KERNEL)
-def _stretch(  # type: ignore[no-untyped-def]
-    R, tables, row, middle, spread, shape, a_i, b_i, iz, s_i, a_o, b_o, oz, s_o, u
-):
-    """Surface and volume term of a thread whose angles have this mean, deviation and shape."""
-    fewest = 3.0 * math.sqrt(3.0) * spread / row[GAMMA_SURFACE]
+def _part_terms(R, precision, row, angles, w):  # type: ignore[no-untyped-def]
+    """Return the surface and volume terms of a thread, averaged over its tangent angles.
+
+    angles : `_Angles`; w : `_Directions`
+    precision : see `overlap`
+    """
+    fewest = 3.0 * math.sqrt(3.0) * angles.deviation / row[GAMMA_SURFACE]
     kind = 0
     while kind < len(COUNTS) - 1 and COUNTS[kind] < fewest:
         kind += 1
     nodes = COUNTS[kind]
     first, second = 0.0, 0.0
     for node in range(nodes):
-        angle = middle + spread * shape[kind, node]
+        angle = angles.mean + angles.deviation * angles.shape[kind, node]
         angle = min(max(angle, -0.5 * math.pi), 0.5 * math.pi)
         c, s = math.cos(angle), math.sin(angle)
         surface, volume = segment(
-            R, int(row[MODEL]), row, tables.overlap_precision,
-            c, s, a_i, b_i, iz, a_o, b_o, oz,
+            R, int(row[MODEL]), row, precision,
+            c, s, w.a_i, w.b_i, w.z_i, w.a_o, w.b_o, w.z_o,
         )  # fmt: skip
-        p = seen_along(R, c, s, a_i, iz, s_i, a_o, oz, s_o, u) / nodes
+        p = seen_along(
+            R, c, s, w.a_i, w.z_i, w.scale_i, w.a_o, w.z_o, w.scale_o, w.overlap
+        ) / nodes  # fmt: skip
         first += p * surface
         second += p * volume
     return first, second

@@ -1,1 +1,1 @@
-"""Where texels lie: garments, UVs, tiles, tangents."""
+"""Lay out what is baked: garments, UVs, UDIM tiles and tangents."""

@@ -1,7 +1,7 @@
-"""Which meshes are copies of one another: the same triangles, UVs and points, moved or turned.
+"""Find meshes that are copies: with the same triangles, UVs and points, translated or rotated.
 
-A mirrored copy is another mesh: its normals and tangents are of the other hand. So is a scaled one:
-its cloth has another number of threads.
+A mirrored mesh is not a copy, because the handedness of its normals and tangents differs. Neither
+is a scaled one, because its cloth has a different number of threads.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from fabricusd.bake.layout.garment import Garment
 
 SAME = 1e-6
-"""Distance, over a mesh's extent, within which two points are one: single precision moves a point
-by a tenth of it."""
+"""Distance, relative to a mesh's extent, within which two points are the same. The rounding of
+single precision is a tenth of it."""
 
 SAME_NORMAL = 1e-4
-"""Difference of unit normals that are one."""
+"""Largest difference of unit normals that count as the same."""
 
 
 def topology(mesh: Mesh) -> str:
-    """A digest that copies have in common; meshes that differ in shape alone have it as well."""
+    """Return a digest that is equal for copies, and for meshes that differ only in their points."""
     digest = hashlib.sha256()
     for array in (mesh.triangles, mesh.uv, mesh.material):
         if array is not None:
@@ -38,9 +38,9 @@ def topology(mesh: Mesh) -> str:
 
 
 def are_copies(a: Mesh, b: Mesh, *, turned: bool = True) -> bool:
-    """Whether `b`, which has the `topology` of `a`, is `a` moved and turned, point by point.
+    """Whether `b`, which must have the `topology` of `a`, is a translated and rotated copy of `a`.
 
-    turned : whether a turned mesh is a copy as well, or one that was moved alone
+    turned : whether a rotated mesh counts as a copy, or only a translated one
     """
     turn = _turn(a, b, turned=turned)
     if turn is None or a.normals is None or b.normals is None:
@@ -49,7 +49,7 @@ def are_copies(a: Mesh, b: Mesh, *, turned: bool = True) -> bool:
 
 
 class Shape(Protocol):
-    """Triangles in space, as meshes and garments have them."""
+    """The triangles of a mesh or a garment."""
 
     @property
     def points(self) -> NDArray[np.float64]:
@@ -61,15 +61,15 @@ class Shape(Protocol):
 
 
 def are_alike(a: Garment, b: Garment) -> bool:
-    """Whether two garments are one that was moved and turned, in the same UVs."""
+    """Whether two garments with the same UVs are translated and rotated copies of each other."""
     same_uv = a.uv.shape == b.uv.shape and np.array_equal(a.uv, b.uv)
     same = same_uv and np.array_equal(a.triangles, b.triangles) and np.array_equal(a.lay, b.lay)
     return bool(same) and _turn(a, b, turned=True) is not None
 
 
 def _turn(a: Shape, b: Shape, *, turned: bool) -> NDArray[np.float64] | None:
-    """(3, 3) rotation that brings the points of `a` to those of `b`; None where none does."""
-    # Points that no triangle has do not show.
+    """(3, 3) rotation that maps the points of `a` to those of `b`; None if there is none."""
+    # Ignore points that no triangle uses.
     used = np.unique(a.triangles)
     if used.max(initial=-1) >= len(b.points):
         return None
@@ -83,9 +83,9 @@ def _turn(a: Shape, b: Shape, *, turned: bool) -> NDArray[np.float64] | None:
 
 
 def _rotation(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3, 3) proper rotation R that brings p @ R nearest to q, both (n, 3) about their means.
+    """(3, 3) proper rotation R that brings p @ R closest to q, both (n, 3) relative to their means.
 
-    [Kabsch1976], with the sign of [Kabsch1978] so that nothing is mirrored.
+    [Kabsch1976], with the sign of [Kabsch1978] to exclude reflections.
     """
     u, _, vt = np.linalg.svd(p.T @ q)
     hand = np.sign(np.linalg.det(u @ vt))

@@ -1,4 +1,4 @@
-"""Rows of arrays that are equal bit by bit, numbered: corners that share their values."""
+"""Number the distinct rows of arrays, to find corners that share all their values."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ from numpy.typing import NDArray
 
 
 def numbered_rows(columns: Iterable[NDArray[Any]]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """(k,) the first row of each kind, and (n,) which kind each row is, counted as they come.
+    """(k,) index of the first of each set of equal rows, and (n,) the number of each row's set.
 
-    columns : (n,) each, of 32-bit numbers; they are asked for one by one, so that a million corners
-        do not need all of them at once
+    Sets are numbered in order of appearance. Rows are equal if they are equal bit by bit.
+
+    columns : (n,) each, of 32-bit numbers; they are requested one by one, so that a million corners
+        do not need all columns in memory at once
     """
     number: NDArray[np.int32] | None = None
     first = np.zeros(0, np.int64)
     for column in columns:
         key = np.ascontiguousarray(column)
-        # 0 and -0 are one number.
+        # Adding 0 turns -0 into 0.
         key = np.add(key, key.dtype.type(0)).view(np.uint32).astype(np.uint64)
         if number is not None:
             key |= number.astype(np.uint64) << np.uint64(32)
@@ -32,7 +34,7 @@ def numbered_rows(columns: Iterable[NDArray[Any]]) -> tuple[NDArray[np.int64], N
 
 
 def _kinds(key: NDArray[np.uint64]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """What `numpy.unique` gives as index and inverse, with a third of its memory."""
+    """Return the index and inverse of `numpy.unique`, in a third of its memory."""
     order = np.argsort(key)
     new = np.ones(len(key), bool)
     new[1:] = key[order[1:]] != key[order[:-1]]

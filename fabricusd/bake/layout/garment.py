@@ -1,7 +1,7 @@
-"""What is baked: one UV layout a mesh, and how each fabric lies on it.
+"""Collect what is baked: the UV layout of each mesh, and how each fabric lies on it.
 
-A mesh that is drawn many times is baked once: its copies share a garment, see `copies`. Whatever
-cannot be baked is refused here, before any texel is computed.
+A mesh that occurs several times is baked once: its copies share a garment, see `copies`. Meshes
+that cannot be baked are refused here, before any texel is computed.
 """
 
 from __future__ import annotations
@@ -24,32 +24,33 @@ from fabricusd.scene.surface.normals import smooth_normals
 from fabricusd.schema.names import prim_name
 
 FIRST_TILE, LAST_TILE = 1001, 1109
-"""UDIM numbers that are baked: ten columns, eleven rows but for the last row's last column."""
+"""UDIM numbers that are baked: ten columns and eleven rows, without the last row's last column."""
 
 PART = 1 << 16
-"""Triangles that are worked on together."""
+"""Triangles that are processed together."""
 
 NOT_BAKED = ("weave", "back", "documentation")
-"""Fields of a fabric that are digested apart, or do not show in a texture."""
+"""Fields of a fabric that are digested separately or do not affect a texture."""
 
 GREATEST = 1e9
-"""Points [m] and UVs beyond are none: a thread there is finer than what float64 tells apart."""
+"""Largest point [m] or UV that is accepted: beyond it, float64 cannot resolve a thread."""
 
 FARTHEST = (-8.0, 32.0)
-"""UVs beyond are as good as there, a tile or more outside of those that are baked on every side."""
+"""UVs are clamped to this range, which exceeds the tiles that are baked by a tile or more on each
+side."""
 
 OFFSET = 16
-"""Added to a tile's column and row, so that both are from 0 to 63."""
+"""Added to a tile's column and row so that both lie from 0 to 63."""
 
 FLATTEST = 1e-14
-"""Twice the area in UV [units^2] below which a triangle has none: a square of 1e-7."""
+"""Twice the area in UV [units^2] below which a triangle counts as degenerate: 1e-7 squared."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lay:
     """How a fabric lies in UV: threads = matrix @ uv + offset, both float64.
 
-    along : (2, 2) float - unit directions in UV of growing U and V of the weave, as columns
+    matrix : (2, 2), offset : (2,)
     """
 
     fabric: Fabric
@@ -58,22 +59,22 @@ class Lay:
 
     @property
     def along(self) -> NDArray[np.float64]:
-        """(2, 2) unit directions in UV along which U and V of the weave grow, as columns."""
+        """(2, 2) unit directions in UV along which U and V of the weave increase, as columns."""
         columns = np.linalg.inv(self.matrix)
         return np.asarray(columns / np.linalg.norm(columns, axis=0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Garment:
-    """One mesh's triangles in UV, and what covers them.
+    """The triangles of a mesh that wear fabrics, in UV, and how the fabrics lie on them.
 
     points : (n, 3) float64 [m], triangles : (m, 3) int
-    normals : (m, 3, 3) float32 - unit, at the corners
+    normals : (m, 3, 3) float32 - unit normals at the corners
     uv : (m, 3, 2) float64
-    lays : the ways that fabrics lie on it; lay : (m,) int - which of them a triangle has
-    mirrored : (m,) bool - the UVs run clockwise there
-    copies : paths of all prims that share it
-    own_uv : False where the UVs are not those of the scene any more
+    lays : how each fabric lies on the mesh; lay : (m,) int - index of each triangle's lay
+    mirrored : (m,) bool - True if the triangle's UVs run clockwise
+    copies : paths of all prims that share the garment
+    own_uv : False if the UVs are not those of the scene
     """
 
     name: str
@@ -90,12 +91,12 @@ class Garment:
 
     @property
     def fingerprint(self) -> str:
-        """Changes whenever anything that is baked does."""
+        """A digest that changes if anything that is baked changes."""
         digest = hashlib.sha256()
         for array in (self.uv, self.lay, self.points, self.triangles):
             digest.update(np.ascontiguousarray(array).data)
         for lay in self.lays:
-            # Not repr(lay.fabric): how numpy prints the weave depends on what else is imported.
+            # Not repr(lay.fabric): numpy prints the weave differently depending on other imports.
             cloth = lay.fabric
             parts = [getattr(cloth, f.name) for f in fields(cloth) if f.name not in NOT_BAKED]
             words = (parts, cloth.weave.cells.shape, lay.matrix.tolist(), lay.offset.tolist())
@@ -105,13 +106,13 @@ class Garment:
 
 
 def twice_areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3) normals of triangles with (n, 3, 3) corners, each twice as long as the area."""
+    """(n, 3) normals of triangles with corners (n, 3, 3); their length is twice the area."""
     edges = corners[:, 1:] - corners[:, :1]
     return np.asarray(np.cross(edges[:, 0], edges[:, 1]), np.float64)
 
 
 def parts_of(count: int) -> list[slice]:
-    """Slices of at most PART triangles, so that what is computed on the way stays small."""
+    """Return slices of at most PART triangles, which keep temporary arrays small."""
     return [slice(k, min(k + PART, count)) for k in range(0, count, PART)]
 
 
@@ -121,7 +122,10 @@ def metres_per_uv(
     uv: NDArray[np.float64],
     mine: NDArray[np.bool_],
 ) -> float:
-    """Metres of cloth per UV unit, by area, of the triangles in `mine` (m,); 0 without area."""
+    """Return the metres of cloth per UV unit, by area, of the triangles in the mask `mine` (m,).
+
+    0 if the triangles have no area.
+    """
     flat = solid = 0.0
     for part in parts_of(len(tri)):
         chosen = mine[part]
@@ -132,7 +136,7 @@ def metres_per_uv(
 
 
 def lay_of(binding: Binding, metres_per_uv: float) -> Lay:
-    """The affine map that `Binding.weave_coordinates` is."""
+    """Return the affine map that `Binding.weave_coordinates` evaluates."""
     base, u, v = binding.weave_coordinates(
         np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), metres_per_uv
     )
@@ -146,17 +150,17 @@ def garments(
     *,
     turned: bool = True,
 ) -> list[Garment]:
-    """One garment for each different mesh of `scene` that wears a fabric, or for `mesh` alone.
+    """Return a garment for each distinct mesh of `scene` that wears a fabric, or for `mesh` alone.
 
-    make : what turns a mesh into a garment, None where it wears no fabric; `garment_of` by default
-    turned : whether a mesh that is turned in the world makes the same garment
+    make : converts a mesh to a garment, or to None if it wears no fabric; `garment_of` by default
+    turned : whether a rotated mesh shares the garment of the original
 
-    Raises FabricError where a mesh has points or UVs that are not finite, UVs without area, no UVs,
-    or where nothing wears a fabric.
+    Raises FabricError if a mesh has no UVs, UVs without area, or points or UVs that are not finite,
+    or if no mesh wears a fabric.
     """
     known = [m.path for m in scene.meshes]
     if mesh is not None and mesh not in known:
-        raise FabricError(mesh, f"is no mesh of the scene; it must be one of {', '.join(known)}")
+        raise FabricError(mesh, f"is not a mesh of the scene; it must be one of {', '.join(known)}")
     found: list[Garment] = []
     alike: dict[str, list[tuple[Mesh, int]]] = {}
     for one in scene.meshes:
@@ -174,20 +178,20 @@ def garments(
             found.append(made)
     if not found:
         raise FabricError(
-            mesh or "the scene", "wears no fabric; bind one, or name one with --fabric"
+            mesh or "the scene", "wears no fabric; bind one, or give one with --fabric"
         )
     return _with_fabric_names(_with_names(found))
 
 
 def _with_names(found: list[Garment]) -> list[Garment]:
-    """Short names for files and prims, different from one another."""
+    """Give the garments short, distinct names for files and prims."""
     tails = [one.copies[0].replace(":", "/").rstrip("/").rsplit("/", 1)[-1] for one in found]
     names = different_names([file_stem(tail) for tail in tails])
     return [replace(one, name=name) for one, name in zip(found, names, strict=True)]
 
 
 def _with_fabric_names(found: list[Garment]) -> list[Garment]:
-    """Fabrics that differ under names that differ: files and looks find them by name."""
+    """Give distinct fabrics distinct names, since files and looks find them by name."""
     cloths: list[Fabric] = []
     for one in found:
         cloths += [lay.fabric for lay in one.lays if lay.fabric not in cloths]
@@ -203,7 +207,7 @@ def _with_fabric_names(found: list[Garment]) -> list[Garment]:
 
 
 def garment_of(scene: Scene, mesh: Mesh) -> Garment | None:
-    """A mesh in its own UVs, None where it wears no fabric; errors as for `garments`."""
+    """Return a mesh in its own UVs, or None if it wears no fabric; raises as `garments` does."""
     material = np.asarray(mesh.material)
     fabrics = [int(k) for k in np.unique(material) if isinstance(scene.materials[k], FabricSurface)]
     if not fabrics and any(n.startswith(f"{mesh.path} has no UVs") for n in scene.notes):
@@ -222,7 +226,7 @@ def garment_of(scene: Scene, mesh: Mesh) -> Garment | None:
     turn = signed_area(uv)
     flat = np.abs(turn) < FLATTEST
     if flat.all():
-        raise FabricError(mesh.path, "has UVs without any area; unwrap it, or use --unwrap")
+        raise FabricError(mesh.path, "has UVs of zero area; unwrap it, or use --unwrap")
     lays, lay = [], np.zeros(len(tri), np.int32)
     for number, index in enumerate(fabrics):
         surface = scene.materials[index]
@@ -235,9 +239,9 @@ def garment_of(scene: Scene, mesh: Mesh) -> Garment | None:
     normals = np.asarray(normals, np.float32)
     notes = []
     if flat.any():
-        notes.append(f"{mesh.path} has {int(flat.sum())} triangles without area in UV, left out")
-        kept = ~flat
-        tri, uv, normals, lay, turn = tri[kept], uv[kept], normals[kept], lay[kept], turn[kept]
+        notes.append(f"{mesh.path} has {int(flat.sum())} triangles of zero area in UV, left out")
+        keep = ~flat
+        tri, uv, normals, lay, turn = tri[keep], uv[keep], normals[keep], lay[keep], turn[keep]
     return Garment(
         name="",
         points=mesh.points,
@@ -253,9 +257,9 @@ def garment_of(scene: Scene, mesh: Mesh) -> Garment | None:
 
 
 def fitted(garment: Garment) -> Garment:
-    """The garment with its UVs moved and scaled, alike along both axes, into the unit square.
+    """Translate and uniformly scale a garment's UVs into the unit square.
 
-    The fabric stays where it was on the cloth. Half a percent is left free at each side.
+    The fabric keeps its place on the mesh. Half a percent of the square remains free on each side.
     """
     low, high = garment.uv.min(axis=(0, 1)), garment.uv.max(axis=(0, 1))
     span = float((high - low).max()) / 0.99
@@ -268,14 +272,14 @@ def fitted(garment: Garment) -> Garment:
 
 
 def missing_uv(path: str) -> FabricError:
-    """What is said about a mesh without UVs."""
+    """Return the error for a mesh without UVs."""
     return FabricError(
-        path, "has no UVs for its fabric; unwrap it, or use --unwrap with the axis of the grain"
+        path, "has no UVs for its fabric; unwrap it, or use --unwrap with the axis of the warp"
     )
 
 
 def signed_area(uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, 3, 2) -> (m,) twice the area in UV, negative where the UVs run clockwise."""
+    """(m,) twice the areas of triangles in UV (m, 3, 2), negative if the UVs run clockwise."""
     a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
@@ -283,7 +287,7 @@ def signed_area(uv: NDArray[np.float64]) -> NDArray[np.float64]:
 def check_shape(
     where: str, points: NDArray[np.float64], tri: NDArray[Any], uv: NDArray[np.float64]
 ) -> None:
-    """Raise FabricError for points or UVs that are not finite or out of bounds, saying how many."""
+    """Raise FabricError, with a count, for points or UVs that are not finite or out of bounds."""
     point = np.asarray(~(np.abs(points) <= GREATEST).all(axis=1))
     for noun, bad in (
         ("points", point[tri].any(axis=1)),
@@ -293,25 +297,26 @@ def check_shape(
             raise FabricError(
                 where,
                 f"has {int(bad.sum())} of {len(tri)} triangles with {noun} that are not finite or "
-                f"beyond {GREATEST:g}, the first is triangle {int(np.argmax(bad))}; they must be "
-                "numbers within",
+                f"beyond {GREATEST:g}, starting with triangle {int(np.argmax(bad))}; they must be "
+                f"finite and at most {GREATEST:g} in magnitude",
             )
 
 
 def tiles_of(garment: Garment, udim: bool) -> dict[int, tuple[int, int]]:
-    """UDIM numbers of the tiles that the UVs reach into, and their (column, row).
+    """Return the (column, row) of each tile that the UVs reach, by UDIM number.
 
     A border at exactly 1.0 belongs to the tile before it. Without `udim` all UVs must lie in the
     first tile.
     """
     found: set[tuple[int, int]] = set()
-    # Far out of all tiles the numbers say nothing but that; integers need not hold them.
+    # UVs far outside all tiles are clamped, since integers might not hold their tile numbers.
     a, b, c = (garment.uv[:, k] for k in range(3))
     low = np.asarray(np.minimum(np.minimum(a, b), c)).clip(*FARTHEST)
     high = np.asarray(np.maximum(np.maximum(a, b), c)).clip(*FARTHEST)
     first = np.floor(low + 1e-9).astype(np.int64)
     last = np.maximum(np.ceil(high - 1e-9).astype(np.int64) - 1, first)
-    # Each triangle's tiles as one number, which is found much faster than a row of four.
+    # Pack each triangle's range of tiles into one integer: unique integers are found much faster
+    # than unique rows of four.
     ends = np.concatenate((first, last), axis=1) + OFFSET
     for number in np.unique(ends @ np.array([1 << 18, 1 << 12, 1 << 6, 1])).tolist():
         ax, ay, bx, by = (((number >> shift) & 63) - OFFSET for shift in (18, 12, 6, 0))
@@ -325,13 +330,13 @@ def tiles_of(garment: Garment, udim: bool) -> dict[int, tuple[int, int]]:
         raise FabricError(
             garment.copies[0],
             f"{reach}; they must lie in tiles {FIRST_TILE} to {LAST_TILE}, which end at u = 10; "
-            "ask for the unit square with --fit",
+            "--fit moves them into the unit square",
         )
     if not udim and found != {(0, 0)}:
         raise FabricError(
             garment.copies[0],
-            f"{reach}, in {len(found)} tiles; they must lie from 0 to 1, or ask for UDIM tiles "
-            "with --udim, or for the unit square with --fit",
+            f"{reach}, in {len(found)} tiles; they must lie from 0 to 1: bake UDIM tiles with "
+            "--udim, or move them into the unit square with --fit",
         )
     return {_tile(t): t for t in sorted(found, key=_tile)}
 
@@ -341,12 +346,12 @@ def _tile(place: tuple[int, int]) -> int:
 
 
 def threads_per_uv(garment: Garment) -> float:
-    """The greatest number of threads along one UV unit, over all lays."""
+    """Return the largest number of threads along one UV unit, over all lays."""
     return max(float(np.linalg.norm(lay.matrix, axis=1).max()) for lay in garment.lays)
 
 
 def resolution_for(garments: Sequence[Garment], texels_per_thread: float) -> int:
-    """The power of two with at least so many texels for the thinnest thread of `garments`."""
+    """Return the power of two with at least that many texels for the thinnest thread."""
     if not 0.0 < texels_per_thread < math.inf:
         raise FabricError(
             "--texels-per-thread", f"is {texels_per_thread!r}; it must be a number above 0"

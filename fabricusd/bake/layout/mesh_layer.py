@@ -1,4 +1,4 @@
-"""The baked mesh as a USD layer: the UVs that the textures are in, normals and tangents."""
+"""Write the baked mesh as a USD layer, with the UVs of the textures, normals and tangents."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from fabricusd.schema.names import prim_name
 
 
 def write_mesh_layer(path: str | os.PathLike[str], garment: Garment, up_axis: str) -> None:
-    """`garment` as `/<name>` in metres: indexed faceVarying `st`, `normals`, `tangents` (float4).
+    """Write `garment` as prim `/<name>`, in metres.
 
-    Tangents are of MikkTSpace's convention, the fourth number the bitangent's sign.
+    It has the indexed faceVarying primvars `st`, `normals` and `tangents` (float4). Tangents follow
+    MikkTSpace's convention; the fourth number is the sign of the bitangent.
     """
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     stage = Usd.Stage.Open(layer)
@@ -48,7 +49,7 @@ def write_mesh_layer(path: str | os.PathLike[str], garment: Garment, up_axis: st
 
 
 def _primvar(primvars: Any, name: str, kind: Any, array: Any, corners: NDArray[Any]) -> None:
-    """An indexed faceVarying primvar of (m, 3, c) corners."""
+    """Write an indexed faceVarying primvar with values (m, 3, c) at the corners."""
     flat = np.ascontiguousarray(corners.reshape(-1, corners.shape[-1]), np.float32)
     first, number = numbered_rows(flat.T)
     one = primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.faceVarying)

@@ -1,4 +1,4 @@
-"""Refusing a layout that lies on itself: two places of the cloth would share their texels."""
+"""Refuse a UV layout that overlaps itself: two places on the cloth would share their texels."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from fabricusd.images.files import write_png
 def refuse_overlaps(
     garment: Garment, tiles: dict[int, tuple[int, int]], size: int, folder: Path | None
 ) -> None:
-    """Raise FabricError where texels of `size` a side lie in two triangles, with a picture of it.
+    """Raise FabricError if any texel of a tile of `size` texels a side lies in two triangles.
 
-    The picture is `<garment>.overlaps.<tile>.png` in `folder`, none where that is None.
+    A picture of the overlaps is written to `<garment>.overlaps.<tile>.png` in `folder`, unless
+    `folder` is None.
     """
     for number, tile in tiles.items():
         corners = texel_triangles(garment.uv, tile, size)

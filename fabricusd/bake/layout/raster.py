@@ -1,4 +1,4 @@
-"""Which texels a UV layout covers: conservative rasterisation, margins, overlaps."""
+"""Rasterise a UV layout conservatively: find covered texels, margins and overlaps."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ NOBODY = -1
 """Owner of a texel that no triangle touches."""
 
 FIRM = 1e-3
-"""Texels: a centre counts as covered twice only if it lies so far inside both triangles, so that
-neighbours with a common edge, whose corners were rounded differently, do not overlap."""
+"""Distance [texels] by which a texel's centre must lie inside two triangles to count as an overlap.
+Neighbours with a common edge whose corners were rounded differently do not overlap then."""
 
 
 def texel_triangles(
     uv: NDArray[np.float64], tile: tuple[int, int], resolution: int
 ) -> NDArray[np.float64]:
-    """(m, 3, 2) UVs as texel coordinates of a tile: x to the right, y down from its top row."""
+    """(m, 3, 2) texel coordinates of UVs in a tile: x to the right, y down from the top row."""
     place = (uv - np.array(tile, np.float64)) * resolution
     return np.stack((place[..., 0], resolution - place[..., 1]), axis=-1)
 
@@ -34,13 +34,13 @@ def owners(
     margin: int,
     resolution: int,
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    """Whose each texel of a window is, margins included, and which texels triangles touch.
+    """(h, w) owner of each texel of a window, margins included, and mask of touched texels.
 
     corners : (m, 3, 2) float64 - triangles in texels
-    values : (m,) int - what to write for a triangle
-    window : (x0, y0, x1, y1) - texels from x0 to before x1, and so on
+    values : (m,) int - owner to write for each triangle
+    window : (x0, y0, x1, y1) - texels in [x0, x1) and [y0, y1)
 
-    A texel that several triangles touch goes to the one that its centre is nearest to, then to the
+    A texel that several triangles touch belongs to the triangle closest to its centre, then to the
     first. An untouched texel within `margin` of a touched one takes that one's owner.
     """
     x0, y0, x1, y1 = window
@@ -64,7 +64,7 @@ def owners(
 def times_covered(
     corners: NDArray[np.float64], shape: tuple[int, int]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """(h, w) how many triangles hold each texel's centre; (k, 2) pairs of the first overlaps."""
+    """(h, w) number of triangles over each texel's centre; (k, 2) first pairs that overlap."""
     count = np.zeros(shape, np.int32)
     first = np.full(shape, -1, np.int32)
     pairs = np.full((16, 2), -1, np.int32)
@@ -74,7 +74,10 @@ def times_covered(
 
 @njit(**KERNEL)
 def _outward(tri, k):  # type: ignore[no-untyped-def]
-    """Edge k of a triangle (3, 2): outward unit normal (x, y) and its offset; 0 for a point."""
+    """Return the outward unit normal (x, y) and the offset of edge k of a triangle (3, 2).
+
+    All are 0 for an edge of zero length.
+    """
     x0, y0 = tri[k, 0], tri[k, 1]
     n = (k + 1) % 3
     dx, dy = tri[n, 0] - x0, tri[n, 1] - y0
@@ -90,7 +93,7 @@ def _outward(tri, k):  # type: ignore[no-untyped-def]
 
 @njit(**KERNEL)
 def _to_triangle(tri, x, y):  # type: ignore[no-untyped-def]
-    """Distance of a point to a triangle's border [texels], for points outside it."""
+    """Return the distance of a point outside a triangle to its border [texels]."""
     best = np.inf
     for k in range(3):
         n = (k + 1) % 3
@@ -104,7 +107,7 @@ def _to_triangle(tri, x, y):  # type: ignore[no-untyped-def]
 
 @njit(**KERNEL)
 def _cover(corners, values, left, top, owner, distance):  # type: ignore[no-untyped-def]
-    """Write the owner of every texel that a triangle touches, however little."""
+    """Write the owner of every texel that a triangle touches, however slightly."""
     height, width = owner.shape
     edges = np.empty((3, 3))
     for m in range(corners.shape[0]):
@@ -122,7 +125,7 @@ def _cover(corners, values, left, top, owner, distance):  # type: ignore[no-unty
                 worst, outside = -np.inf, False
                 for k in range(3):
                     away = edges[k, 0] * x + edges[k, 1] * y - edges[k, 2]
-                    # A square reaches half of |nx| + |ny| towards an edge from its centre.
+                    # A unit square extends (|nx| + |ny|)/2 from its centre towards an edge.
                     outside |= away > 0.5 * (abs(edges[k, 0]) + abs(edges[k, 1]))
                     worst = max(worst, away)
                 if outside:
@@ -135,7 +138,7 @@ def _cover(corners, values, left, top, owner, distance):  # type: ignore[no-unty
 
 @njit(**KERNEL)
 def _count(corners, count, first, pairs):  # type: ignore[no-untyped-def]
-    """How many triangles hold each centre firmly."""
+    """Count the triangles that contain each texel's centre by at least FIRM."""
     height, width = count.shape
     edges = np.empty((3, 3))
     found = 0
@@ -167,7 +170,7 @@ def _count(corners, count, first, pairs):  # type: ignore[no-untyped-def]
 
 
 def overlap_map(corners: NDArray[np.float64], size: int) -> NDArray[Any]:
-    """(size, size, 3) uint8 picture of a layout: covered texels grey, overlaps red."""
+    """(size, size, 3) uint8 picture of a UV layout: covered texels grey, overlaps red."""
     count, _ = times_covered(corners, (size, size))
     picture = np.full((size, size, 3), 32, np.uint8)
     picture[count == 1] = (128, 128, 128)

@@ -1,8 +1,9 @@
-"""Tangents in the convention of MikkTSpace, [Mikkelsen2008]: what normal maps are relative to.
+"""Compute tangents for normal maps, in the convention of MikkTSpace [Mikkelsen2008].
 
-The tangent of a corner is the mean of the directions of growing u of the triangles that share its
-point, normal, UV and handedness, each made perpendicular to the normal and weighted by the angle at
-the corner. The bitangent is never kept: it is sign * cross(normal, tangent).
+The tangent of a corner is a mean over the triangles that share its point, normal, UV and
+handedness. Each triangle contributes its direction of increasing u, made perpendicular to the
+normal and weighted by its angle at the corner. The bitangent is not stored: it is
+sign * cross(normal, tangent).
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ Floats = NDArray[np.float64]
 
 
 def corner_tangents(garment: Garment) -> NDArray[np.float32]:
-    """(m, 3, 4) unit tangents at the corners, and in the fourth place the bitangent's sign."""
+    """(m, 3, 4) unit tangents at the corners; the fourth number is the bitangent's sign."""
     m = len(garment.triangles)
     parts = parts_of(m)
     group = _groups(garment)
@@ -38,7 +39,7 @@ def corner_tangents(garment: Garment) -> NDArray[np.float32]:
     for part in parts:
         summed = total[group[part]]
         flat = _flat(garment, part, garment.normals[part].astype(np.float64))
-        # Where directions cancel out, the corner keeps its own.
+        # If the directions cancel out, the corner keeps its own.
         cancel = np.linalg.norm(summed, axis=-1, keepdims=True) <= 1e-12
         out[part, :, :3] = np.where(cancel, flat, _unit(summed))
         out[part, :, 3] = _sign(garment, part)[:, None]
@@ -46,7 +47,7 @@ def corner_tangents(garment: Garment) -> NDArray[np.float32]:
 
 
 def _flat(garment: Garment, part: slice, normals: Floats) -> Floats:
-    """(n, 3, 3) directions of growing u, perpendicular to the normal of each corner."""
+    """(n, 3, 3) directions of increasing u, perpendicular to the normal of each corner."""
     corners, uv = garment.points[garment.triangles[part]], garment.uv[part]
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     d1, d2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
@@ -55,12 +56,12 @@ def _flat(garment: Garment, part: slice, normals: Floats) -> Floats:
 
 
 def _sign(garment: Garment, part: slice) -> Floats:
-    """(n,) handedness of the UVs."""
+    """(n,) handedness of the UVs: 1, or -1 if they are mirrored."""
     return np.where(garment.mirrored[part], -1.0, 1.0)
 
 
 def _groups(garment: Garment) -> NDArray[np.int32]:
-    """(m, 3) number of each corner's group: same point, normal, UV and handedness."""
+    """(m, 3) number of each corner's group: corners with equal point, normal, UV and handedness."""
     place = numbered_rows(_bits(garment.points))[1]
 
     def columns() -> Iterator[NDArray[Any]]:
@@ -75,16 +76,16 @@ def _groups(garment: Garment) -> NDArray[np.int32]:
 
 
 def _bits(rows: Floats) -> Iterator[NDArray[np.uint32]]:
-    """The two halves of each column of (n, c) float64 numbers."""
+    """Yield the two 32-bit halves of each column of (n, c) float64 numbers."""
     for column in rows.T:
-        # 0 and -0 are one number.
+        # Adding 0 turns -0 into 0.
         halves = np.ascontiguousarray(column + 0.0, np.float64).view(np.uint32).reshape(-1, 2)
         yield halves[:, 0]
         yield halves[:, 1]
 
 
 def _angle_at(corners: Floats, normals: Floats, k: int) -> Floats:
-    """(n,) angle at corner k between its edges, seen along the corner's normal."""
+    """(n,) angle between the edges at corner k, projected along the corner's normal."""
     normal = normals[:, k]
     a = corners[:, (k + 1) % 3] - corners[:, k]
     b = corners[:, (k + 2) % 3] - corners[:, k]

@@ -1,7 +1,7 @@
-"""New UVs for a mesh that has none, or whose UVs overlap: xatlas, and the grain that it discards.
+"""Unwrap a mesh without UVs or with overlapping UVs by xatlas, and restore the fabric's grain.
 
-An unwrapper turns each shell as it likes. So the warp is told an axis of the world to run along:
-every shell gets a lay of its own, turned so that the axis, seen along the cloth, is V there.
+An unwrapper rotates each UV shell arbitrarily. The warp therefore follows a given world axis: each
+shell gets its own lay, rotated so that the axis, projected onto the cloth, is V of the weave.
 """
 
 from __future__ import annotations
@@ -29,18 +29,20 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def unwrapped(axis: str, binding: Binding | None, scene: Scene, mesh: Mesh) -> Garment | None:
-    """A garment of `mesh` with UVs by xatlas, the warp along the world's `axis`.
+    """Return a garment of `mesh` with UVs by xatlas and the warp along the world's `axis`.
 
-    The fabric takes the cloth's own measure: the new UVs have another unit, so what a binding says
-    about threads per UV unit does not hold for them.
+    The fabric keeps its physical size: the new UVs have another unit, so a binding's threads per UV
+    unit do not apply to them.
 
-    binding : worn by a mesh that came without UVs, which a scene's reader makes grey
+    binding : fabric of a mesh without UVs, to which the scene's reader gives a grey material
 
-    None where the mesh wears no fabric; FabricError for an unknown axis or a mesh that xatlas
-    cannot unwrap.
+    Returns None if the mesh wears no fabric. Raises FabricError for an unknown axis and for a mesh
+    that xatlas cannot unwrap.
     """
     if axis not in AXES:
-        raise FabricError(f"--unwrap '{axis}'", f"is no axis; it must be {', '.join(AXES)}")
+        raise FabricError(
+            f"--unwrap '{axis}'", f"is not an axis; it must be one of {', '.join(AXES)}"
+        )
     fabrics = {
         k: surface.binding.fabric
         for k, surface in enumerate(scene.materials)
@@ -78,7 +80,7 @@ def unwrapped(axis: str, binding: Binding | None, scene: Scene, mesh: Mesh) -> G
         mirrored=signed_area(uv) < 0,
         copies=(mesh.path,),
         notes=(
-            f"{mesh.path} is unwrapped into {len(np.unique(shells))} shells, warp along {axis}",
+            f"{mesh.path} is unwrapped into {len(np.unique(shells))} UV shells, warp along {axis}",
         ),
         own_uv=False,
     )
@@ -96,13 +98,13 @@ def _xatlas(mesh: Mesh, tri: NDArray[Any]) -> NDArray[np.float64]:
         raise FabricError(mesh.path, f"cannot be unwrapped: {error}") from error
     if len(faces) != len(tri):
         raise FabricError(
-            mesh.path, f"came back from unwrapping with {len(faces)} of {len(tri)} triangles"
+            mesh.path, f"cannot be unwrapped: xatlas returned {len(faces)} of {len(tri)} triangles"
         )
     return np.asarray(coordinates, np.float64)[np.asarray(faces, np.int64)]
 
 
 def _shells(uv: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(m,) number of the connected shell in UV of each triangle."""
+    """(m,) number of each triangle's connected UV shell."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -118,12 +120,12 @@ def _shells(uv: NDArray[np.float64]) -> NDArray[np.int64]:
 def _grain(
     corners: NDArray[np.float64], uv: NDArray[np.float64], axis: NDArray[np.float64]
 ) -> float:
-    """Rotation of a shell's grain [rad] that lays the warp along `axis`, a mean by area."""
+    """Return the rotation [rad] that aligns a shell's warp with `axis`, averaged by area."""
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     d1, d2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     normal = np.cross(e1, e2)
     square = np.maximum(np.einsum("ij,ij->i", normal, normal), 1e-300)[:, None]
-    # How u and v change along the axis: its direction in UV.
+    # The rates at which u and v change along the axis give its direction in UV.
     along, up = np.cross(e2, normal) / square, np.cross(normal, e1) / square
     share = np.stack((along @ axis, up @ axis), axis=1)
     flat = share[:, :1] * d1 + share[:, 1:] * d2

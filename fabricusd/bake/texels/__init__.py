@@ -1,1 +1,1 @@
-"""What a texel holds: layers, maps, encodings."""
+"""Compute the values of texels: moments of the weave, maps made from them, and their encodings."""

@@ -1,7 +1,7 @@
-"""What a sample adds to the planes, by its thread and tangent angle: all but height and light.
+"""Tabulate what a sample adds to the moments by thread and tangent angle, except height and light.
 
-Rows of numbers that lie side by side are added by the vector unit; worked out for each sample, they
-took twice as long.
+Each row of the table is contiguous, so the processor's vector unit adds it; computing the numbers
+for each sample took twice as long.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.appearance.weave.curve import height_at
 from fabricusd.appearance.weave.quadrature import CELLS, Rule, curve_nodes
-from fabricusd.bake.texels import planes as p
+from fabricusd.bake.texels import moment_indices as p
 from fabricusd.bake.texels.reflectance import ANGLES, reflectance_table
 from fabricusd.fabric import PILE_ANGLE, Fabric
 
@@ -22,17 +22,17 @@ STEPS = 721
 """Angles from -90 to 90 degrees, a quarter of a degree apart: a tenth of the narrowest lobe."""
 
 FINE = Rule(CELLS, math.radians(0.1))
-"""Tangent angles as they lie along the curves."""
+"""Quadrature rule for the distribution of tangent angles along the curves."""
 
 HEIGHTS = 1025
-"""Places that the height along a run is kept at, linear between."""
+"""Positions along a run at which the height is tabulated; it is linear between them."""
 
 
 def steepness(fabric: Fabric) -> NDArray[np.float64]:
-    """(2,) |tangent angle| [rad] that parts each set's angles into a gentle and a steep half.
+    """(2,) |tangent angle| [rad] that divides each set's angles into gentle and steep ones.
 
-    Where the angles on either side vary least about their mean: spreads are then narrow against
-    the lobes, and it matters little how the angles lie inside them.
+    The threshold minimises the variance of the angles within the two groups. The groups are then
+    narrow compared with the lobes, and the distribution inside a group matters little.
     """
     nodes = curve_nodes(fabric, FINE)
     found = np.zeros(2)
@@ -53,14 +53,14 @@ def steepness(fabric: Fabric) -> NDArray[np.float64]:
 
 
 def part_of(psi: NDArray[np.float64], split: float) -> NDArray[np.int64]:
-    """Part of each angle [rad]: falling gently or steeply, rising gently or steeply."""
+    """Return the part of each angle [rad]: falling gently or steeply, rising gently or steeply."""
     return 2 * (psi < 0) + (np.abs(psi) > split)
 
 
 def angle_rows(fabric: Fabric) -> NDArray[np.float32]:
-    """(2, k, STEPS, LIT) planes before LIT, by thread set (weft, warp), thread type and angle.
+    """(2, k, STEPS, LIT) moments before LIT, by thread set (weft, warp), thread type and angle.
 
-    An upright tangent, as pile has, counts as one of PILE_ANGLE: its own is no number.
+    The slope of an upright tangent, as in pile, is infinite; it is limited to that of PILE_ANGLE.
     """
     psi = np.linspace(-0.5 * math.pi, 0.5 * math.pi, STEPS)
     rows = np.zeros((2, len(fabric.threads), STEPS, p.LIT))
@@ -69,7 +69,7 @@ def angle_rows(fabric: Fabric) -> NDArray[np.float32]:
     known = np.linspace(-0.5 * math.pi, 0.5 * math.pi, ANGLES)
     for which in range(2):
         part = p.PARTS * which + part_of(psi, split[which])
-        # A thread is a cylinder: across it every normal is there, along it the lobe's width.
+        # A thread is a cylinder: normals across it span all angles, along it the lobe's width.
         along = 1 if which == WARP else 0
         for kind, thread in enumerate(fabric.thread_list):
             row = rows[which, kind]
@@ -93,6 +93,6 @@ def angle_rows(fabric: Fabric) -> NDArray[np.float32]:
 
 
 def height_rows(fabric: Fabric) -> NDArray[np.float32]:
-    """(k, HEIGHTS) height of each type's curve, in run lengths, at even places of the run."""
+    """(k, HEIGHTS) height of each thread type's curve at even positions, both in run lengths."""
     places = np.linspace(0.0, 1.0, HEIGHTS)
     return np.stack([height_at(t.curve, places) for t in fabric.thread_list]).astype(np.float32)

@@ -1,8 +1,9 @@
-"""How tangent angles lie about their mean: the fabric's own distribution, to re-light by.
+"""Tabulate the shape of the distribution of tangent angles about their mean, for re-lighting.
 
-A texel holds the mean and the standard deviation of each part of a set's angles. Between those and
-a radiance stands a shape. A satin's float is flat over most of its length and steep at its ends, so
-even angles would be wrong; the loader has the fabric, and takes the shape that the part has there.
+A texel stores the mean and the standard deviation of each part of a set's angles. Radiance depends
+on the shape of the distribution as well. A uniform distribution would be wrong: a satin's float is
+flat over most of its length and steep at its ends. The loader has the fabric, so it uses the shape
+that the part has in the fabric.
 """
 
 from __future__ import annotations
@@ -16,20 +17,23 @@ from numpy.typing import NDArray
 from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.appearance.weave.quadrature import curve_nodes
 from fabricusd.bake.texels.angle_rows import FINE, part_of, steepness
-from fabricusd.bake.texels.planes import PARTS
+from fabricusd.bake.texels.moment_indices import PARTS
 from fabricusd.fabric import Fabric
 
 Floats = NDArray[np.float64]
 
 COUNTS = (1, 4, 16, 64)
-"""Angles that stand for a distribution, by how wide it is against the lobe."""
+"""Numbers of angles that can represent a distribution; wider ones, relative to the lobe, need more.
+"""
 
 
 @lru_cache(maxsize=16)
 def angle_shapes(fabric: Fabric) -> Floats:
-    """(2, PARTS + 1, len(COUNTS), COUNTS[-1]) angles by set, part and count, and of the
-    whole set in the last part's place; of mean 0 and deviation 1, each standing for the same
-    share. Kept and read-only."""
+    """(2, PARTS + 1, len(COUNTS), COUNTS[-1]) angles by set, part and count.
+
+    The last part is the whole set. The angles of a part have mean 0 and standard deviation 1, and
+    each represents the same share. The array is cached and read-only.
+    """
     nodes, split = curve_nodes(fabric, FINE), steepness(fabric)
     found = np.zeros((2, PARTS + 1, len(COUNTS), COUNTS[-1]))
     for which in range(2):
@@ -46,7 +50,7 @@ def angle_shapes(fabric: Fabric) -> Floats:
 
 
 def _standing_for(angle: Floats, weight: Floats, count: int) -> Floats:
-    """(count,) means of equal shares of a distribution, brought to mean 0 and deviation 1."""
+    """(count,) means of equal shares of a distribution, normalised to mean 0 and deviation 1."""
     total = float(weight.sum())
     mean = float(weight @ angle) / total if total > 0 else 0.0
     spread = math.sqrt(max(float(weight @ (angle - mean) ** 2) / total, 0.0)) if total > 0 else 0.0

@@ -1,6 +1,7 @@
-"""One block of a texture set: its texels at every level that fits inside the block.
+"""Compute one block of a sheet: its texels at every mip level that fits inside the block.
 
-Blocks are computed in any order and do not know one another, so memory is flat in the resolution.
+Blocks are independent of one another and computed in any order, so memory does not grow with the
+resolution.
 """
 
 from __future__ import annotations
@@ -14,15 +15,15 @@ from numpy.typing import NDArray
 from fabricusd.bake.layout.raster import NOBODY, owners
 from fabricusd.bake.texels.layers import Layer, Place, layer_of
 from fabricusd.bake.texels.maps import TextureMap
-from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.sheet import Sheet
 
 Layers = Mapping[int, Layer]
-"""By number of the lay."""
+"""Layers by lay number."""
 
 
 def layers_of(sheet: Sheet, bx: int, by: int) -> Iterator[Layers]:
-    """The layers of a block, level by level from the finest."""
+    """Yield the layers of a block, level by level from the finest."""
     window = sheet.window(bx, by)
     owner, _ = owners(sheet.corners, sheet.garment.lay, window, sheet.margin, sheet.resolution)
     layers: Layers = {
@@ -41,32 +42,32 @@ def layers_of(sheet: Sheet, bx: int, by: int) -> Iterator[Layers]:
 def bake_block(
     sheet: Sheet, maps: Sequence[TextureMap], bx: int, by: int
 ) -> tuple[list[list[NDArray[Any]]], NDArray[np.float32], NDArray[np.float32]]:
-    """Levels of every map (h, w, c) in a block, and the block's `top`.
+    """Compute all levels of the maps (h, w, c) in a block, and the block's `top`.
 
-    Returns ([map][level] arrays, planes, owned share).
+    Returns ([map][level] arrays, moments, owned share).
     """
     found: list[list[NDArray[Any]]] = [[] for _ in maps]
     layers: Layers = {}
     for level, layers in enumerate(layers_of(sheet, bx, by)):
         for k, one in enumerate(maps):
-            found[k].append(composed(one, layers, sheet.block >> level))
+            found[k].append(composed(one, layers, sheet.block_side >> level))
     return found, *top(sheet, layers)
 
 
 def top(sheet: Sheet, layers: Layers) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """(lays, PLANES) planes and (lays,) owned share of the one texel that a block shrinks to.
+    """(lays, MOMENTS) moments and (lays,) owned share of a block's coarsest level, a single texel.
 
-    The levels above it are made from these.
+    The coarser levels of the sheet are computed from these.
     """
     lays = len(sheet.garment.lays)
-    planes, share = np.zeros((lays, PLANES), np.float32), np.zeros(lays, np.float32)
+    moments, share = np.zeros((lays, MOMENTS), np.float32), np.zeros(lays, np.float32)
     for k, layer in layers.items():
-        planes[k], share[k] = layer.planes_at(0, 0), layer.owned[0, 0]
-    return planes, share
+        moments[k], share[k] = layer.moments_at(0, 0), layer.owned[0, 0]
+    return moments, share
 
 
 def composed(one: TextureMap, layers: Layers, size: int) -> NDArray[Any]:
-    """(size, size, channels) of a map, each texel from the lay that owns most of it."""
+    """(size, size, channels) values of a map; each texel takes them from the lay that owns most."""
     shape = (size, size, len(one.channels))
     if len(layers) == 1:
         (only,) = layers.values()

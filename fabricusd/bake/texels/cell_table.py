@@ -1,10 +1,10 @@
-"""Texels by where they lie in the repeat: computed once, looked up everywhere.
+"""Tabulate texels by their phase in the repeat, so that each is computed once and then looked up.
 
-A lay is one affine map, so all texels of a level span the same stretch of the weave and differ by
-the place of their centre in the repeat alone, their phase. A table holds the texel at each phase of
-a raster, FINEST (or at least COARSEST) steps a texel and PER_THREAD a thread; a texel of the sheet
-takes the one whose phase is nearest. A coarser level is the mean of four texels of the level below,
-read between its phases.
+A lay is a single affine map, so all texels of a mip level span the same area of the weave and
+differ only in where their centre lies in the repeat: their phase. A table holds the texel at each
+phase of a raster with FINEST (or at least COARSEST) steps per texel and PER_THREAD steps per
+thread. A texel of the sheet takes the entry whose phase is nearest. A texel of a coarser level is
+the mean of four texels of the next finer level, interpolated between its phases.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from numpy.typing import NDArray
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.bake.layout.garment import Garment, Lay
 from fabricusd.bake.texels.maps import Texels, TextureMap
+from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.moments import samples_for, spans_repeats, texels
-from fabricusd.bake.texels.planes import PLANES
 from fabricusd.bake.texels.recipe import Recipe
 from fabricusd.kernels.real import LEAN
 
 FINEST, COARSEST = 15, 9
-"""Phases along a texel's side: its centre is found within 1/30, at worst 1/18 of a texel. Odd, so
-that the centres of a raster that divides the thread's pitch lie on phases, not between two."""
+"""Phases along a texel's side: its centre is located within 1/30, at worst 1/18 of a texel. Odd, so
+that if the raster divides the thread's pitch, its centres lie on phases and not between two."""
 
 PER_THREAD = 16
-"""Phases along a thread's pitch, where a texel spans several."""
+"""Phases along a thread's pitch if a texel spans several threads."""
 
 FEWEST_SAMPLES, MOST_SAMPLES = 8, 32
-"""Along each side of a texel: a table can afford more than a sheet, so that it hardly has noise."""
+"""Samples along a texel's side. A table can afford more of them than a sheet, for less noise."""
 
 SAMPLES = 2**22
-"""Of a table, where FEWEST_SAMPLES do not ask for more: a third of a second."""
+"""Samples of a table, unless FEWEST_SAMPLES require more: a third of a second."""
 
 MOST_PHASES = 2**19
-"""Phases of all tables of a garment: 210 MB, planes and maps."""
+"""Largest number of phases in all tables of a garment: 210 MB of moments and maps."""
 
 WORTH = 0.5
-"""Share of the sheet's own samples that a table may cost at most."""
+"""Largest cost of a table, relative to the samples of the sheet itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,17 +51,17 @@ class CellLevel:
     """Texels of one level by phase: entry `b * counts[0] + a` is centred at phase (a, b) + 1/2.
 
     counts : phases along U and V
-    planes : (PLANES, phases) float32
+    moments : (MOMENTS, phases) float32
     """
 
     counts: tuple[int, int]
-    planes: NDArray[np.float32]
+    moments: NDArray[np.float32]
     _values: dict[str, NDArray[Any]] = field(default_factory=dict)
 
     def values(self, one: TextureMap, recipe: Recipe, lay: Lay) -> NDArray[Any]:
-        """(phases, channels) of a map that depends on the planes alone, kept once made."""
+        """(phases, channels) values, cached, of a map that depends on the moments alone."""
         if one.name not in self._values:
-            texels = Texels.of_planes(self.planes, recipe, lay)
+            texels = Texels.of_moments(self.moments, recipe, lay)
             self._values[one.name] = np.ascontiguousarray(one.function(texels), one.kind)
         return self._values[one.name]
 
@@ -76,9 +76,9 @@ class CellTable:
 def tables_of(
     garment: Garment, recipes: Sequence[Recipe], resolution: int, levels: int
 ) -> tuple[CellTable | None, ...]:
-    """For each lay its table, None where computing each texel by itself is cheaper.
+    """Return each lay's table, or None if computing every texel separately is cheaper.
 
-    Lays that differ by their offset alone share one.
+    Lays that differ only in their offset share a table.
     """
     left = MOST_PHASES
     made: dict[tuple[int, bytes], CellTable | None] = {}
@@ -98,7 +98,12 @@ def tables_of(
 
 
 class Raster(NamedTuple):
-    """How a table is laid out: phases a texel, phases along U and V, samples a texel's side."""
+    """The raster of a table.
+
+    steps : phases along a texel's side
+    counts : phases along U and V
+    side : samples along a texel's side
+    """
 
     steps: int
     counts: tuple[int, int]
@@ -108,7 +113,7 @@ class Raster(NamedTuple):
 def affordable_raster(
     step: NDArray[np.float64], repeat: tuple[int, int], texels: int, most: int
 ) -> Raster | None:
-    """The finest raster; None where `texels` texels cost less than any table of `most` phases."""
+    """Return the finest raster of at most `most` phases; None if `texels` texels are cheaper."""
     worth = WORTH * texels * max(samples_for(step, repeat), 1) ** 2
     for steps in (FINEST, COARSEST):
         counts = phase_counts(step, repeat, steps)
@@ -134,7 +139,7 @@ def cell_table(
     raster: Raster,
     levels: int,
 ) -> CellTable:
-    """Texels that span `step` (2, 2) threads at each phase of the repeat, and coarser ones."""
+    """Compute a table whose finest texels span `step` (2, 2) threads, and its coarser levels."""
     found = [CellLevel(raster.counts, _finest(recipe, step, repeat, raster))]
     for _ in range(1, levels):
         counts = phase_counts(2.0 * step, repeat, raster.steps)
@@ -146,17 +151,17 @@ def cell_table(
 def _finest(
     recipe: Recipe, step: NDArray[np.float64], repeat: tuple[int, int], raster: Raster
 ) -> NDArray[np.float32]:
-    """(PLANES, phases) from samples of the weave."""
+    """(MOMENTS, phases) moments of the finest level, from samples of the weave."""
     counts = raster.counts
-    planes = np.empty((PLANES, counts[1], counts[0]), np.float32)
+    moments = np.empty((MOMENTS, counts[1], counts[0]), np.float32)
     apart = np.diag(np.array(repeat) / np.array(counts))
     start = apart @ np.full(2, 0.5) - step @ np.full(2, 0.5)
     side = 0 if spans_repeats(step, repeat) else raster.side
     texels(
         recipe, apart, step, start, (0, 0), np.zeros(counts[::-1], np.int32), 0, side,
-        np.empty(PLANES, np.float32), planes,
+        np.empty(MOMENTS, np.float32), moments,
     )  # fmt: skip
-    return planes.reshape(PLANES, -1)
+    return moments.reshape(MOMENTS, -1)
 
 
 def _coarser(
@@ -166,26 +171,26 @@ def _coarser(
     counts: tuple[int, int],
     recipe: Recipe,
 ) -> NDArray[np.float32]:
-    """(PLANES, phases) as means of four texels of the `finer` level, which span `step`."""
-    planes = np.empty((PLANES, counts[0] * counts[1]), np.float32)
+    """(MOMENTS, phases) moments as means of four texels of the `finer` level, which span `step`."""
+    moments = np.empty((MOMENTS, counts[0] * counts[1]), np.float32)
     if counts == (1, 1):
-        planes[:, 0] = recipe.mean
-        return planes
-    # Places on the finer raster: of this level's first phase, and of four texels around it.
+        moments[:, 0] = recipe.mean
+        return moments
+    # Positions on the finer raster of the four texels that make up this level's first phase.
     scale = np.array(finer.counts) / np.array(repeat)
     apart = np.array(finer.counts) / np.array(counts)
     corners = np.array([[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]])
     starts = (corners @ step.T) * scale + (0.5 * apart - 0.5)
     taps = [_taps(starts[:, k], apart[k], counts[k], finer.counts[k]) for k in range(2)]
-    below = finer.planes.reshape(PLANES, finer.counts[1], finer.counts[0])
-    _means_of_four(below, *taps[0], *taps[1], planes.reshape(PLANES, counts[1], counts[0]))
-    return planes
+    below = finer.moments.reshape(MOMENTS, finer.counts[1], finer.counts[0])
+    _means_of_four(below, *taps[0], *taps[1], moments.reshape(MOMENTS, counts[1], counts[0]))
+    return moments
 
 
 def _taps(
     starts: NDArray[np.float64], apart: float, count: int, finer: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32]]:
-    """(4, count) entries before and behind each place of an axis, and the share of the latter."""
+    """(4, count) entries before and after each position on an axis, and weights of the latter."""
     place = starts[:, None] + apart * np.arange(count)
     low = np.floor(place)
     first = np.mod(low, finer).astype(np.int32)

@@ -1,8 +1,8 @@
-"""Maps as whole numbers of 16 bits, for PNG and TIFF.
+"""Encode maps as 16-bit integers, for PNG and TIFF.
 
-Colours take the sRGB curve, directions and angles lie about the middle, ids are the numbers plus
-one, since -1 is none, and what has no bounds of its own is scaled from its least value to its
-greatest. The manifest says which, so that `decoded` gives the values back.
+Colours take the sRGB curve. Zero of a direction or an angle is encoded as the middle of the range.
+Ids are stored plus one, since -1 means none. Unbounded maps are scaled from their smallest to their
+largest value. The manifest records the encoding, so that `decoded` can recover the values.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ from fabricusd.bake.texels.maps import TextureMap
 from fabricusd.srgb import srgb_decode, srgb_encode
 
 FORMATS = {"exr": ".exr", "png": ".png", "tiff": ".tif"}
-"""File formats, and how their names end. EXR keeps half floats and mip levels."""
+"""File formats and their suffixes. EXR files hold half floats and mip levels."""
 
 GREATEST = 65535
-"""The largest number of 16 bits."""
-
+"""The largest 16-bit integer."""
 
 GREATEST_SCALE = 1e30
 """Beyond any value of a map, and within single precision."""
@@ -38,22 +37,22 @@ class Encoding:
     offset: float
 
     def encoded(self, values: NDArray[Any]) -> NDArray[np.uint16]:
-        """Numbers of values; those out of range are clamped."""
+        """Encode values as integers; values out of range are clamped."""
         part = (np.asarray(values, np.float64) - self.offset) / self.scale
         if self.transfer == "srgb":
             part = srgb_encode(part)
         return np.rint(np.clip(part, 0.0, 1.0) * GREATEST).astype(np.uint16)
 
     def decoded(self, parts: NDArray[Any]) -> NDArray[np.float32]:
-        """Values of numbers that a reader has divided by 65535."""
+        """Decode integers that a reader has divided by 65535."""
         linear = srgb_decode(parts) if self.transfer == "srgb" else parts
         values = np.asarray(linear, np.float64) * self.scale + self.offset
-        # Ids are whole numbers, which dividing and multiplying does not always give back.
+        # Ids are integers, which a division and a multiplication do not always preserve.
         return np.asarray(np.rint(values) if self.scale == GREATEST else values, np.float32)
 
 
 def encoding_from(said: Any) -> Encoding:
-    """The encoding that JSON says; ValueError where it says none."""
+    """Return the encoding that a JSON value describes; raise ValueError if it is invalid."""
     if not isinstance(said, dict) or set(said) != {"transfer", "scale", "offset"}:
         raise ValueError("an encoding has 'transfer', 'scale' and 'offset'")
     transfer, scale, offset = said["transfer"], said["scale"], said["offset"]
@@ -76,11 +75,11 @@ _FIXED = {
     "angle": (math.pi, -0.5 * math.pi),
     "id": (float(GREATEST), -1.0),
 }
-"""Scale and offset by kind of map; others take what they span."""
+"""Scale and offset by kind of map; the other kinds are scaled to the range of their values."""
 
 
 def encoding_of(one: TextureMap, bands: Iterable[NDArray[Any]]) -> Encoding:
-    """How a map is stored; its `bands` are read only where its kind has no bounds."""
+    """Return a map's encoding; its `bands` are read only if its kind is unbounded."""
     if one.kind_of in _FIXED:
         scale, offset = _FIXED[one.kind_of]
         return Encoding(transfer="srgb" if one.color else "linear", scale=scale, offset=offset)
@@ -91,7 +90,7 @@ def encoding_of(one: TextureMap, bands: Iterable[NDArray[Any]]) -> Encoding:
 
 
 def stored_by(file_format: str) -> Callable[[TextureMap, NDArray[Any]], NDArray[Any]]:
-    """What files of a format make of a map's values (..., channels)."""
+    """Return a function that rounds a map's values (..., channels) as the file format does."""
 
     def stored(one: TextureMap, values: NDArray[Any]) -> NDArray[Any]:
         if file_format == "exr":

@@ -1,7 +1,7 @@
-"""A square of texels as one lay of a fabric sees it, level by level.
+"""Compute a square of texels of one lay, level by level.
 
-Two layers with the same face: one computes every texel, the other looks texels up by their phase
-and computes those alone that the layout's border cuts.
+There are two implementations of one interface. One computes every texel. The other looks texels up
+by their phase, and computes only those that are cut by the border of the UV layout.
 """
 
 from __future__ import annotations
@@ -19,37 +19,43 @@ from fabricusd.appearance.weave.lookup import find
 from fabricusd.bake.texels import moments as m
 from fabricusd.bake.texels.cell_table import CellLevel, CellTable
 from fabricusd.bake.texels.maps import Texels, TextureMap
-from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.sheet import Sheet, Window, texel_start, texel_step
 from fabricusd.kernels.real import LEAN
 
-Planes = NDArray[np.float32]
+Moments = NDArray[np.float32]
 
 LOOKED_UP = -1
-"""Instead of a column of own planes: the table holds the texel."""
+"""Stands for a column of own moments if the table holds the texel."""
 
-NONE: Planes = np.empty((PLANES, 0), np.float32)
+NONE: Moments = np.empty((MOMENTS, 0), np.float32)
 
 
 class Layer(Protocol):
-    """Texels of one lay at one level. owned : (h, w) float32 - share of each that is the lay's."""
+    """Texels of one lay at one mip level.
+
+    owned : (h, w) float32 - share of each texel that belongs to the lay
+    """
 
     owned: NDArray[np.float32]
 
     def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
-        """(n, channels) of a map, of the texels in `mine` (h, w), or of all."""
+        """(n, channels) values of a map for the texels in the mask `mine` (h, w), or for all."""
 
     def halved(self) -> Layer:
-        """The next coarser level."""
+        """Return the next coarser level."""
 
-    def planes_at(self, j: int, i: int) -> Planes:
-        """(PLANES,) of one texel."""
+    def moments_at(self, j: int, i: int) -> Moments:
+        """(MOMENTS,) moments of one texel."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Centres:
-    """What lies at the texels' centres: weave coordinates (h, w, 2) modulo the repeat, set and
-    thread type (h, w) there."""
+    """The weave at the texels' centres.
+
+    weave : (h, w, 2) weave coordinates, modulo the repeat
+    sets, threads : (h, w) thread set and thread type
+    """
 
     weave: NDArray[np.float64]
     sets: NDArray[np.uint8]
@@ -58,7 +64,11 @@ class Centres:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Place:
-    """Which texels, and which lay's."""
+    """A square of texels of one lay.
+
+    window : the texels at the finest level
+    level : mip level, 0 the finest
+    """
 
     sheet: Sheet
     lay: int
@@ -67,16 +77,16 @@ class Place:
 
     @property
     def size(self) -> int:
-        """Texels along a side."""
+        """Number of texels along a side."""
         return (self.window[2] - self.window[0]) >> self.level
 
     def halved(self) -> Place:
-        """The same place one level coarser."""
+        """Return the same place one level coarser."""
         return Place(sheet=self.sheet, lay=self.lay, window=self.window, level=self.level + 1)
 
     @cached_property
     def centres(self) -> Centres:
-        """What lies at the texels' centres."""
+        """The weave at the texels' centres."""
         n = self.size
         found = Centres(
             weave=np.empty((n, n, 2)),
@@ -90,7 +100,7 @@ class Place:
         return found
 
     def phases(self, counts: tuple[int, int]) -> NDArray[np.int32]:
-        """(h, w) entries of a table with `counts` phases along U and V."""
+        """(h, w) entries of a cell table with `counts` phases along U and V."""
         found = np.empty((self.size, self.size), np.int32)
         _phases(*self._raster(), *counts, found)
         return found
@@ -103,12 +113,15 @@ class Place:
             np.array(true_repeat(self.sheet.garment.lays[self.lay].fabric), np.float64),
         )
 
-    def texels(self, planes: Planes, mine: NDArray[np.bool_] | None) -> Texels:
-        """What a map is a function of. planes : (PLANES, n) of the texels in `mine`, or of all"""
+    def texels(self, moments: Moments, mine: NDArray[np.bool_] | None) -> Texels:
+        """Return the input of the maps' functions for the texels in the mask `mine`, or for all.
+
+        moments : (MOMENTS, n) of these texels
+        """
         lay = self.sheet.garment.lays[self.lay]
         chosen: Any = slice(None) if mine is None else mine
         return Texels(
-            planes=planes,
+            moments=moments,
             usual=self.sheet.recipes[self.lay].mean,
             along=lay.along,
             weave=self.centres.weave[chosen].reshape(-1, 2),
@@ -119,63 +132,63 @@ class Place:
 
 
 class ComputedLayer:
-    """Every texel has planes of its own, (PLANES, h, w)."""
+    """A layer that stores the moments of every texel, (MOMENTS, h, w)."""
 
-    def __init__(self, place: Place, planes: Planes, owned: NDArray[np.float32]) -> None:
-        self.place, self.planes, self.owned = place, planes, owned
+    def __init__(self, place: Place, moments: Moments, owned: NDArray[np.float32]) -> None:
+        self.place, self.moments, self.owned = place, moments, owned
 
     @classmethod
     def finest(cls, place: Place, owned: NDArray[np.float32]) -> ComputedLayer:
-        """Planes from samples of the weave, where `owned` is not 0."""
+        """Compute the moments from samples of the weave wherever `owned` is not 0."""
         sheet, lay = place.sheet, place.lay
-        planes = np.zeros((PLANES, *owned.shape), np.float32)
+        moments = np.zeros((MOMENTS, *owned.shape), np.float32)
         step = texel_step(sheet, lay)
         side = m.samples_for(step, true_repeat(sheet.garment.lays[lay].fabric))
         start = texel_start(sheet, lay, *place.window[:2])
         m.texels(
             sheet.recipes[lay], step, step, start, place.window[:2], owned.astype(np.int32), 1,
-            side, np.empty(PLANES, np.float32), planes,
+            side, np.empty(MOMENTS, np.float32), moments,
         )  # fmt: skip
-        return cls(place, planes, owned)
+        return cls(place, moments, owned)
 
     def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
         """(n, channels) of a map."""
-        planes = self.planes.reshape(PLANES, -1) if mine is None else self.planes[:, mine]
-        return one.function(self.place.texels(planes, mine))
+        moments = self.moments.reshape(MOMENTS, -1) if mine is None else self.moments[:, mine]
+        return one.function(self.place.texels(moments, mine))
 
     def halved(self) -> ComputedLayer:
         """The next coarser level."""
-        return ComputedLayer(self.place.halved(), *m.halve(self.planes, self.owned))
+        return ComputedLayer(self.place.halved(), *m.halve(self.moments, self.owned))
 
-    def planes_at(self, j: int, i: int) -> Planes:
-        """(PLANES,) of one texel."""
-        return self.planes[:, j, i]
+    def moments_at(self, j: int, i: int) -> Moments:
+        """(MOMENTS,) of one texel."""
+        return self.moments[:, j, i]
 
 
 class TableLayer:
-    """Texels looked up by phase; those that are owned in part have planes of their own.
+    """A layer whose texels are looked up by phase; partly owned texels have moments of their own.
 
-    own : (PLANES, n) - of the texels whose owned share is neither 0 nor 1, row by row
+    own : (MOMENTS, n) moments of the texels whose owned share is neither 0 nor 1, row by row
     """
 
     def __init__(
-        self, place: Place, table: CellTable, owned: NDArray[np.float32], own: Planes = NONE
+        self, place: Place, table: CellTable, owned: NDArray[np.float32], own: Moments = NONE
     ) -> None:
         self.place, self.table, self.owned, self.own = place, table, owned, own
 
     @cached_property
     def phases(self) -> NDArray[np.int32]:
-        """(h, w) entries of the table."""
+        """(h, w) entries of the cell table."""
         return self.place.phases(self.cell.counts)
 
     @cached_property
     def rows(self) -> NDArray[np.int32]:
-        """(h, w) columns of `own`, LOOKED_UP where a texel has none."""
+        """(h, w) columns of `own`, LOOKED_UP for texels without one."""
         return numbered(cut_texels(self.owned))
 
     @property
     def cell(self) -> CellLevel:
-        """The table's level."""
+        """The level of the cell table."""
         return self.table.levels[self.place.level]
 
     def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
@@ -189,7 +202,7 @@ class TableLayer:
         if self.own.shape[1]:
             rows = self.rows[chosen].ravel()
             cut = rows != LOOKED_UP
-            texels = Texels.of_planes(
+            texels = Texels.of_moments(
                 self.own[:, rows[cut]], sheet.recipes[lay], sheet.garment.lays[lay]
             )
             found[cut] = one.function(texels)
@@ -199,21 +212,26 @@ class TableLayer:
         """The next coarser level."""
         owned = shares(self.owned, 1)
         places = np.argwhere(cut_texels(owned))
-        own = np.empty((PLANES, len(places)), np.float32)
+        own = np.empty((MOMENTS, len(places)), np.float32)
         if len(places):
-            _cut_planes(places, self.owned, self.rows, self.own, self.phases, self.cell.planes, own)
+            _cut_moments(
+                places, self.owned, self.rows, self.own, self.phases, self.cell.moments, own
+            )
         return TableLayer(self.place.halved(), self.table, owned, own)
 
-    def planes_at(self, j: int, i: int) -> Planes:
-        """(PLANES,) of one texel."""
+    def moments_at(self, j: int, i: int) -> Moments:
+        """(MOMENTS,) of one texel."""
         row = self.rows[j, i]
         if row != LOOKED_UP:
             return self.own[:, row]
-        return self.cell.planes[:, self.phases[j, i]]
+        return self.cell.moments[:, self.phases[j, i]]
 
 
 def layer_of(place: Place, owned: NDArray[np.float32]) -> Layer:
-    """The finest layer of a lay. owned : (h, w) float32, 1 where it lies and 0 elsewhere"""
+    """Return the finest layer of a lay.
+
+    owned : (h, w) float32 - 1 for the lay's texels, 0 elsewhere
+    """
     table = place.sheet.tables[place.lay]
     if table is None:
         return ComputedLayer.finest(place, owned)
@@ -221,25 +239,25 @@ def layer_of(place: Place, owned: NDArray[np.float32]) -> Layer:
 
 
 def _gathered(known: NDArray[Any], phases: NDArray[np.int32]) -> NDArray[Any]:
-    """(n, channels) rows of `known` (phases, channels), a row copied as one number."""
+    """(n, channels) rows of `known` (phases, channels); each row is copied as a single item."""
     channels = known.shape[1]
     packed = known.view(np.dtype((np.void, known.itemsize * channels))).ravel()
     return packed.take(phases).view(known.dtype).reshape(-1, channels)
 
 
 def shares(owned: NDArray[np.float32], levels: int) -> NDArray[np.float32]:
-    """(h, w) owned shares so many levels coarser; exact, being multiples of a power of 1/4."""
+    """(h, w) owned shares `levels` levels coarser; exact, since they are multiples of 1/4**k."""
     n, size = owned.shape[0] >> levels, 1 << levels
     return owned.reshape(n, size, n, size).mean(axis=(1, 3), dtype=np.float32)
 
 
 def cut_texels(owned: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Where a texel is owned in part."""
+    """(h, w) mask of the texels that are partly owned."""
     return (owned > 0) & (owned < 1)
 
 
 def numbered(cut: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """(h, w) number of each texel in `cut`, row by row, LOOKED_UP elsewhere."""
+    """(h, w) running number of each texel in `cut`, row by row; LOOKED_UP elsewhere."""
     rows = np.full(cut.shape, LOOKED_UP, np.int32)
     rows[cut] = np.arange(np.count_nonzero(cut))
     return rows
@@ -247,7 +265,10 @@ def numbered(cut: NDArray[np.bool_]) -> NDArray[np.int32]:
 
 @njit(**LEAN)
 def _phases(start, step, repeat, along, down, out):  # type: ignore[no-untyped-def]
-    """Phases, `along` of them along U and `down` along V, of texels; see `_centres`."""
+    """Write the phases of texels to out (h, w), for `along` phases along U and `down` along V.
+
+    start, step, repeat : see `_centres`
+    """
     for j in range(out.shape[0]):
         for i in range(out.shape[1]):
             u = (start[0] + step[0, 0] * (i + 0.5) + step[0, 1] * (j + 0.5)) / repeat[0]
@@ -259,7 +280,10 @@ def _phases(start, step, repeat, along, down, out):  # type: ignore[no-untyped-d
 
 @njit(**LEAN)
 def _centres(cloth, start, step, repeat, weave, sets, threads):  # type: ignore[no-untyped-def]
-    """Fill what `Centres` holds; start, step as `moments.texels`, repeat (2,) float64."""
+    """Fill the arrays of `Centres`.
+
+    start, step : as for `moments.texels`; repeat : (2,) float64
+    """
     for j in range(sets.shape[0]):
         for i in range(sets.shape[1]):
             u = start[0] + step[0, 0] * (i + 0.5) + step[0, 1] * (j + 0.5)
@@ -271,8 +295,8 @@ def _centres(cloth, start, step, repeat, weave, sets, threads):  # type: ignore[
 
 
 @njit(**LEAN)
-def _cut_planes(places, owned, rows, own, phases, table, out):  # type: ignore[no-untyped-def]
-    """Planes of texels (n, 2) from what is owned of their four texels one level finer."""
+def _cut_moments(places, owned, rows, own, phases, table, out):  # type: ignore[no-untyped-def]
+    """Compute moments of texels `places` (n, 2) from the owned parts of their four finer texels."""
     R = np.float32
     for k in range(places.shape[0]):
         weight = R(0)

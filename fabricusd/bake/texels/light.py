@@ -1,4 +1,4 @@
-"""The direction to a light that a shadow map is baked for."""
+"""Check and normalise the direction to the light that the map `shadow` is baked for."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from typing import Any
 from fabricusd.errors import FabricError
 
 LOWEST = 1e-3
-"""Sine of a light's elevation: nearer to the horizon single precision says that none arrives."""
+"""Smallest sine of a light's elevation: below it, single precision yields no light at all."""
 
 
 def unit_light(light: Sequence[float]) -> tuple[float, float, float]:
-    """The direction at length 1; FabricError for one that is none, or is not over the cloth."""
+    """Normalise a direction; raise FabricError if it is invalid or not above the cloth."""
     where = f"--light {','.join(map(str, light))}"
     if len(light) != 3 or not all(is_number(x) and math.isfinite(x) for x in light):
-        raise FabricError(where, "is no direction; it must be three finite numbers")
-    # Scaled first: the squares of great numbers are infinite, those of small ones 0.
+        raise FabricError(where, "is not a direction; it must be three finite numbers")
+    # Scale first, so that squares neither overflow nor underflow.
     largest = max(abs(x) for x in light)
     x, y, z = (part / largest for part in light) if largest > 0 else (0.0, 0.0, 0.0)
     length = math.hypot(x, y, z)
     if not z > LOWEST * length:
         raise FabricError(
-            where, f"does not stand over the cloth; its z must be above {LOWEST} of its length"
+            where, f"is not above the cloth; its z must be above {LOWEST} times its length"
         )
     return x / length, y / length, z / length
 
 
 def is_number(value: Any) -> bool:
-    """Whether `value` is a real number that a float holds, finite or not; no truth value is."""
+    """Whether `value` is a real number, finite or not, that fits a float; booleans do not count."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return False
     try:

@@ -1,8 +1,8 @@
-"""The maps that can be asked for: each a registered function of a texel's planes.
+"""Define the maps that can be baked: each is a registered function of a texel's moments.
 
-Tangent-space maps are in the mesh's UV axes: x along growing u, y along growing v, z out of the
-cloth, which is the frame of MikkTSpace tangents whichever way a shell is mirrored. To add a map,
-write its function here under `@texture_map`, and its row in docs/baking.md.
+Tangent-space maps are in the mesh's UV axes: x along increasing u, y along increasing v, z out of
+the cloth. This is the frame of MikkTSpace tangents, whether or not a shell is mirrored. To add a
+map, write its function here under `@texture_map` and add its row to docs/baking.md.
 """
 
 from __future__ import annotations
@@ -18,32 +18,33 @@ from numpy.typing import NDArray
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.lookup import NO_THREAD, thread_number
 from fabricusd.bake.layout.garment import Lay
-from fabricusd.bake.texels import planes as m
+from fabricusd.bake.texels import moment_indices as m
 from fabricusd.bake.texels.recipe import Recipe
 from fabricusd.errors import FabricError
 
-Planes = NDArray[np.float32]
+Moments = NDArray[np.float32]
 
 NO_LAY = 255
-"""Lay of a texel outside the layout."""
+"""Lay number of a texel outside the UV layout."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Texels:
-    """A block of texels at one mip level, owned by one lay of a fabric.
+    """Texels of one lay at one mip level.
 
-    planes : (PLANES, n) float32
-    usual : (PLANES,) float32 - of the whole repeat; stands in where a texel shows no thread at all,
-        so that a lookup between a thread and a gap finds the thread's values on both sides
-    along : (2, 2) float64 - unit directions in UV of growing U and V, as columns
+    moments : (MOMENTS, n) float32
+    usual : (MOMENTS,) float32 - moments of the whole repeat; they replace those of a texel that
+        shows no thread at all, so that a lookup between a thread and a gap finds the thread's
+        values on both sides
+    along : (2, 2) float64 - unit directions in UV of increasing U and V, as columns
     weave : (n, 2) float64 - weave coordinates of the centres, modulo the repeat
-    hit : (set, thread) (n,) each - of the thread under the centre, GAP where none is
-    types : thread types of the fabric
+    hit : (set, thread), each (n,) - the thread under the centre, GAP if there is none
+    types : number of thread types of the fabric
     lay : number of the lay
     """
 
-    planes: Planes
-    usual: Planes
+    moments: Moments
+    usual: Moments
     along: NDArray[np.float64]
     weave: NDArray[np.float64]
     hit: tuple[NDArray[Any], NDArray[Any]]
@@ -51,11 +52,11 @@ class Texels:
     lay: int
 
     @classmethod
-    def of_planes(cls, planes: Planes, recipe: Recipe, lay: Lay) -> Texels:
-        """Texels without a place: for maps that depend on the planes alone."""
+    def of_moments(cls, moments: Moments, recipe: Recipe, lay: Lay) -> Texels:
+        """Return texels without weave coordinates, for maps that depend on the moments alone."""
         nothing: NDArray[Any] = np.empty(0, np.int32)
         return cls(
-            planes=planes,
+            moments=moments,
             usual=recipe.mean,
             along=lay.along,
             weave=np.empty((0, 2)),
@@ -64,12 +65,12 @@ class Texels:
             lay=-1,
         )
 
-    def mean(self, plane: int, count: int = 1) -> Planes:
-        """(n, count) planes of what the threads show, gaps left out."""
-        chosen = slice(plane, plane + count)
-        cover, least = self.planes[m.COVER], np.float32(1e-6)
+    def mean(self, moment: int, count: int = 1) -> Moments:
+        """(n, count) moments relative to the area of the threads, without the gaps."""
+        chosen = slice(moment, moment + count)
+        cover, least = self.moments[m.COVER], np.float32(1e-6)
         usual = self.usual[chosen] / np.maximum(self.usual[m.COVER], least)
-        shown = self.planes[chosen] / np.maximum(cover, least)
+        shown = self.moments[chosen] / np.maximum(cover, least)
         return np.asarray(np.where(cover > least, shown, usual[:, None]).T)
 
 
@@ -78,20 +79,20 @@ Function = Callable[[Texels], NDArray[Any]]
 
 @dataclass(frozen=True, kw_only=True)
 class TextureMap:
-    """One entry of the registry.
+    """A map of the registry.
 
-    channels : names of the channels, as EXR spells them
-    empty : what texels outside the layout hold
-    color : whether it is a colour (linear Rec. 709) rather than data
-    exact : float32 instead of half, and each level taken at its texels' centres
-    needs_light : made only when a light is named
-    spare : made only when it is asked for
-    kind_of : what the numbers are, which says how they are compared and how they fit 16 bits:
-        "share" from 0 to 1, "direction", "axis" (a direction whose sign means nothing), "angle" in
-        [-pi/2, pi/2], "id", "place" in the repeat, or any "number"
-    unit : of the numbers, "" where they have none
-    weight : how much a texel's value counts, (n,) or (n, channels); by how much threads cover where
-        it is None
+    channels : names of the channels, as in EXR
+    empty : value of texels outside the UV layout
+    color : whether the map is a colour (linear Rec. 709) rather than data
+    exact : stored as float32 instead of half; each level is point-sampled at its texels' centres
+    needs_light : baked only if a light is given
+    spare : baked only if it is requested by name
+    kind_of : the meaning of the numbers, which determines how they are compared and how they are
+        encoded in 16 bits: "share" from 0 to 1, "direction", "axis" (a direction whose sign is
+        arbitrary), "angle" in [-pi/2, pi/2], "id", "place" in the repeat, or any "number"
+    unit : unit of the numbers, "" if they have none
+    weight : weight of a texel's value in errors, (n,) or (n, channels); None for the cover of the
+        threads
     """
 
     name: str
@@ -109,12 +110,12 @@ class TextureMap:
 
     @property
     def bytes_per_texel(self) -> int:
-        """Before compression, at the finest level."""
+        """Bytes of a texel at the finest level, before compression."""
         return len(self.channels) * np.dtype(self.kind).itemsize
 
     @property
     def kind(self) -> type[Any]:
-        """Number type of a channel in the file."""
+        """Number type of a channel in an EXR file."""
         return np.float32 if self.exact else np.float16
 
 
@@ -124,7 +125,7 @@ REGISTRY: dict[str, TextureMap] = {}
 def texture_map(
     name: str, channels: str, empty: Sequence[float] = (0.0,), **options: Any
 ) -> Callable[[Function], Function]:
-    """Register a function (n texels) -> (n, channels); its docstring is the meaning."""
+    """Register a function from n texels to (n, channels); its docstring is the map's meaning."""
     names = tuple(channels.split())
 
     def keep(function: Function) -> Function:
@@ -142,7 +143,7 @@ def texture_map(
 
 
 def chosen_maps(names: Sequence[str] | None, *, light: bool) -> list[TextureMap]:
-    """The maps called for, in the registry's order; all that can be made where `names` is None."""
+    """Return the maps in `names`, in the registry's order; None selects all that can be baked."""
     if names is None:
         return [t for t in REGISTRY.values() if (light or not t.needs_light) and not t.spare]
     unknown = [n for n in names if n not in REGISTRY]
@@ -152,43 +153,43 @@ def chosen_maps(names: Sequence[str] | None, *, light: bool) -> list[TextureMap]
         )
     for n in names:
         if REGISTRY[n].needs_light and not light:
-            raise FabricError(f"map '{n}'", "needs a light; name one with --light X,Y,Z")
+            raise FabricError(f"map '{n}'", "needs a light; give one with --light X,Y,Z")
     return [t for t in REGISTRY.values() if t.name in names]
 
 
 def _whole(t: Texels) -> NDArray[Any]:
-    """Weight of maps whose value means something in gaps as well."""
-    return np.ones(t.planes.shape[1])
+    """Weight of maps whose values are meaningful in gaps as well."""
+    return np.ones(t.moments.shape[1])
 
 
 @texture_map("thread_id", "Y", (NO_THREAD,), exact=True, kind_of="id", weight=_whole)
 def thread_id(t: Texels) -> NDArray[Any]:
-    """Thread at the texel's centre: index of type for weft, index + types for warp, -1 for none"""
+    """Thread at the texel's centre: its type for weft, its type + types for warp, -1 for none"""
     return thread_number(*t.hit, t.types)[:, None]
 
 
 @texture_map("lay", "Y", (NO_LAY,), exact=True, kind_of="id", weight=_whole)
 def lay(t: Texels) -> NDArray[Any]:
-    """Which of the manifest's lays, a fabric and how it lies, a texel belongs to; 255 for none"""
+    """Index in the manifest's lays (a fabric and its UV transform) of the texel; 255 for none"""
     return np.full((len(t.weave), 1), t.lay)
 
 
 @texture_map("weave_coordinate", "R G", exact=True, kind_of="place", unit="threads", weight=_whole)
 def weave_coordinate(t: Texels) -> NDArray[Any]:
-    """Place of the texel's centre in the repeat, in threads: ends along U, picks along V"""
+    """Position of the texel's centre in the repeat, in threads: ends along U, picks along V"""
     return t.weave
 
 
 @texture_map("base_color", "R G B", (0.5,), color=True)
 def base_color(t: Texels) -> NDArray[Any]:
-    """Reflectance of the threads' volume seen from above, gaps left out"""
+    """Reflectance of the threads' volume term seen from above, without the gaps"""
     return t.mean(m.VOLUME, 3)
 
 
 @texture_map("albedo", "R G B", (0.5,), color=True, weight=_whole)
 def albedo(t: Texels) -> NDArray[Any]:
-    """Reflectance of the cloth seen from above, surface and volume, gaps black"""
-    return np.asarray((t.planes[m.VOLUME : m.VOLUME + 3] + t.planes[m.SURFACE]).T)
+    """Reflectance of the cloth seen from above, surface and volume terms; gaps are black"""
+    return np.asarray((t.moments[m.VOLUME : m.VOLUME + 3] + t.moments[m.SURFACE]).T)
 
 
 @texture_map("specular_color", "R G B", (0.04,), color=True)
@@ -198,7 +199,7 @@ def specular_color(t: Texels) -> NDArray[Any]:
 
 
 def _slope_widths(t: Texels) -> tuple[NDArray[np.float64], ...]:
-    """Mean slopes along U and V (2, n), their variances and covariance (n,)."""
+    """Return the mean slopes along U and V (2, n), their variances and their covariance (n,)."""
     mean = t.mean(m.SLOPE, 2).T.astype(np.float64)
     uu, vv, uv = t.mean(m.SLOPE_2, 3).T.astype(np.float64)
     return (
@@ -210,7 +211,8 @@ def _slope_widths(t: Texels) -> tuple[NDArray[np.float64], ...]:
 
 
 def _principal(t: Texels) -> tuple[NDArray[np.float64], ...]:
-    """Narrow and wide variance of the slopes, and the angle of the narrow axis from U [rad]."""
+    """Return the smaller and larger principal variance of the slopes, and the angle [rad] of the
+    smaller one's axis from U."""
     _, uu, vv, uv = _slope_widths(t)
     lobes = t.mean(m.LOBE_2, 2).T
     uu, vv = uu + lobes[0], vv + lobes[1]
@@ -220,36 +222,36 @@ def _principal(t: Texels) -> tuple[NDArray[np.float64], ...]:
 
 
 def _alpha(variance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Microfacet alpha of a slope variance: Beckmann's slopes have variance alpha^2/2."""
+    """Convert a slope variance to a microfacet alpha: Beckmann slopes have variance alpha^2/2."""
     return np.minimum(np.sqrt(2.0 * variance), 1.0)
 
 
 @texture_map("roughness_along", "Y", (0.5,))
 def roughness_along(t: Texels) -> NDArray[Any]:
-    """Square root of microfacet alpha along the tangent direction, the smoother one"""
+    """Square root of the microfacet alpha along the map `tangent`, the smoother direction"""
     return np.sqrt(_alpha(_principal(t)[0]))[:, None]
 
 
 @texture_map("roughness_across", "Y", (0.5,))
 def roughness_across(t: Texels) -> NDArray[Any]:
-    """Square root of microfacet alpha across the tangent direction"""
+    """Square root of the microfacet alpha across the map `tangent`, the rougher direction"""
     return np.sqrt(_alpha(_principal(t)[1]))[:, None]
 
 
 @texture_map("anisotropy", "Y")
 def anisotropy(t: Texels) -> NDArray[Any]:
-    """1 - alpha along/alpha across, 0 where all directions are alike"""
+    """1 - (alpha along)/(alpha across); 0 if isotropic"""
     narrow, wide, _ = _principal(t)
     return (1.0 - _alpha(narrow) / _alpha(wide))[:, None]
 
 
 @texture_map("tangent", "R G B", (1.0, 0.0, 0.0), kind_of="axis", unit="degrees", weight=anisotropy)
 def tangent(t: Texels) -> NDArray[Any]:
-    """Direction along the smoother axis in UV axes, a unit vector whose sign means nothing"""
+    """Direction of the smoother axis in UV axes, a unit vector whose sign is arbitrary"""
     angle = _principal(t)[2]
     flat = t.along @ np.stack((np.cos(angle), np.sin(angle)))
     flat /= np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
-    # One of the two signs, so that neighbours interpolate: x positive.
+    # Choose the sign with positive x, so that neighbouring texels can be interpolated.
     flat *= np.where(flat[0] < -1e-6, -1.0, 1.0)
     return np.stack((flat[0], flat[1], np.zeros_like(flat[0])), axis=1)
 
@@ -276,26 +278,26 @@ def slope_variance(t: Texels) -> NDArray[Any]:
 
 @texture_map("height", "Y", kind_of="number", unit="mm")
 def height(t: Texels) -> NDArray[Any]:
-    """Mean height of the threads above their ends [mm], gaps left out"""
+    """Mean height of the threads above their ends [mm], without the gaps"""
     return np.asarray(t.mean(m.HEIGHT) * np.float32(1e3))
 
 
 @texture_map("opacity", "Y", weight=_whole)
 def opacity(t: Texels) -> NDArray[Any]:
-    """Share of the texel that threads cover; the rest is gap"""
-    return np.asarray(t.planes[m.COVER][:, None])
+    """Share of the texel that is covered by threads; the rest is gap"""
+    return np.asarray(t.moments[m.COVER][:, None])
 
 
 @texture_map("visibility", "Y", (1.0,))
 def visibility(t: Texels) -> NDArray[Any]:
-    """Share of a cosine-weighted sky that neighbouring threads leave visible"""
+    """Share of a cosine-weighted sky that neighbouring threads do not hide"""
     hidden = t.mean(m.HORIZON, m.AZIMUTHS) @ _sector()
     return np.asarray(np.clip(1.0 - hidden, 0.0, 1.0))[:, None]
 
 
 def _sector() -> NDArray[np.float32]:
-    """(AZIMUTHS,) share of the circle that belongs to each azimuth of the table."""
-    # Azimuths are even in y/(|x| + |y|), so those near the diagonals stand for less angle.
+    """(AZIMUTHS,) share of the full circle that each azimuth of the horizon table represents."""
+    # Azimuths are uniform in y/(|x| + |y|), so those near the diagonals represent less angle.
     places = (np.arange(m.AZIMUTHS + 1) - 0.5) * (4.0 / m.AZIMUTHS)
     quadrant, f = np.divmod(places, 1.0)
     edges = quadrant * (math.pi / 2) + np.arctan2(f, 1.0 - f)
@@ -320,27 +322,27 @@ for _first in range(0, m.AZIMUTHS, 4):
 
 @texture_map("fuzz", "Y")
 def fuzz(t: Texels) -> NDArray[Any]:
-    """Reflectance that a view at 75 degrees gains over one from above, which a base has not"""
+    """Reflectance that a view at 75 degrees gains over one from above; a diffuse base gains none"""
     return t.mean(m.FUZZ)
 
 
 @texture_map("shadow", "Y", (1.0,), needs_light=True, weight=_whole)
 def shadow(t: Texels) -> NDArray[Any]:
-    """Share of the named light that arrives, gaps lit"""
-    return np.asarray(t.planes[m.LIT][:, None])
+    """Share of the given light that arrives; gaps are lit"""
+    return np.asarray(t.moments[m.LIT][:, None])
 
 
 def _of_set(which: int, noun: str) -> None:
-    """The maps that the loader re-lights a thread set from."""
+    """Register the maps from which the loader re-lights a thread set."""
     least = np.float32(1e-6)
     first = m.TINT + 3 * which
 
-    def parts(t: Texels, plane: int) -> Planes:
-        return t.planes[plane + m.PARTS * which : plane + m.PARTS * (which + 1)]
+    def parts(t: Texels, moment: int) -> Moments:
+        return t.moments[moment + m.PARTS * which : moment + m.PARTS * (which + 1)]
 
     def thread(t: Texels) -> NDArray[Any]:
         share = parts(t, m.SHARE).sum(axis=0)
-        tint = t.planes[first : first + 3] / np.maximum(share, least)
+        tint = t.moments[first : first + 3] / np.maximum(share, least)
         return np.concatenate((tint, share[None])).T
 
     def share(t: Texels) -> NDArray[Any]:
@@ -363,11 +365,13 @@ def _of_set(which: int, noun: str) -> None:
         return share(t).sum(axis=1)
 
     by_part = "where it falls gently, falls steeply, rises gently, rises steeply along its axis"
-    thread.__doc__ = f"`A` of the {noun} in the texel, and in alpha the share that it covers"
+    thread.__doc__ = f"`A` of the {noun} in the texel; alpha is the share that the {noun} covers"
     share.__doc__ = f"Share of the texel that the {noun} covers {by_part}"
     angle.__doc__ = f"Mean tangent angle [rad] of the {noun} {by_part}"
     spread.__doc__ = f"Standard deviation of the {noun}'s tangent angle [rad] {by_part}"
-    lean.__doc__ = f"Mean and standard deviation of the {noun}'s tangent angle [rad], no parts kept"
+    lean.__doc__ = (
+        f"Mean and standard deviation of the {noun}'s tangent angle [rad], over all parts"
+    )
     by_angle: dict[str, Any] = {"kind_of": "angle", "unit": "rad"}
     texture_map(f"{noun}_thread", "R G B A", kind_of="number", weight=covered)(thread)
     texture_map(f"{noun}_share", "R G B A", weight=_whole)(share)

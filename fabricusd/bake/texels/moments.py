@@ -1,10 +1,10 @@
-"""What every map is made of: means over a texel of what the weave shows there.
+"""Compute the moments of the weave over a texel, from which every map is made.
 
-A plane of moments is linear: the mean of four texels' planes is the plane of the texel that holds
-them. So mip levels are means of planes, and each map is computed from the planes of its own level;
-that is why a slope, a variance or a direction is right at every level. Tangent angles and slopes
-carry second moments, after [Olano2010]; horizons the mean of the squared sine, which is the share
-of a cosine-weighted sky that they hide.
+Moments are linear: the moments of a texel are the means of those of the four finer texels in it.
+Mip levels are therefore means of moments, and each map is computed from the moments of its own
+level, so that slopes, variances and directions are correct at every level. Tangent angles and
+slopes have second moments, after [Olano2010]. Horizons are stored as the mean of the squared sine,
+which is the share of a cosine-weighted sky that they hide.
 """
 
 from __future__ import annotations
@@ -19,25 +19,33 @@ from fabricusd.appearance.shadow.methods import lit
 from fabricusd.appearance.weave.coverage import GAP, WARP
 from fabricusd.appearance.weave.lookup import crown_on, find, wrap
 from fabricusd.bake.texels.angle_rows import HEIGHTS, STEPS
-from fabricusd.bake.texels.planes import AZIMUTHS, HEIGHT, HORIZON, LIT, PLANES, SLOPE, SLOPE_2
+from fabricusd.bake.texels.moment_indices import (
+    AZIMUTHS,
+    HEIGHT,
+    HORIZON,
+    LIT,
+    MOMENTS,
+    SLOPE,
+    SLOPE_2,
+)
 from fabricusd.kernels.real import INLINE, LEAN
 
 ROUNDEST = 0.95
-"""Place across a thread beyond which its round gets no steeper: at its edge the slope is infinite,
-and its square has no mean."""
+"""Position across a round thread beyond which its slope is held constant: the slope is infinite at
+the edge, and its square has no mean."""
 
 WHOLE = 2.0
-"""Repeats that a texel must span along both axes before it takes the repeat's mean. What it would
-show besides is how the repeat beats against the texel, which is moire."""
+"""Repeats that a texel must span along both axes to take the repeat's mean. Any deviation from the
+mean would be moire, the beat of the repeat against the texel raster."""
 
 MOST_SAMPLES = 8
-"""Along each side of a texel."""
+"""Largest number of samples along each side of a texel."""
 
 
 def samples_for(step: NDArray[np.float64], repeat: tuple[int, int]) -> int:
-    """Samples along each side of a texel that spans `step` (2, 2) threads; 0 to take the mean.
+    """Return the samples along each side of a texel that spans `step` (2, 2) threads.
 
-    Three to a thread, from four to MOST_SAMPLES.
+    Three per thread, from four to MOST_SAMPLES; 0 if the texel takes the repeat's mean.
     """
     if spans_repeats(step, repeat):
         return 0
@@ -54,17 +62,17 @@ def spans_repeats(step: NDArray[np.float64], repeat: tuple[int, int]) -> bool:
 def texels(  # type: ignore[no-untyped-def]
     made, apart, step, start, corner, owner, mine, side, sums, out
 ):
-    """Planes of the texels that are owned by `mine`, into out (PLANES, h, w); others stay.
+    """Write the moments of the texels that `mine` owns to out (MOMENTS, h, w); leave the others.
 
-    apart : (2, 2) float64 - threads from a texel to the next: columns for right and for down
-    step : (2, 2) float64 - threads that a texel spans; as `apart`, but where texels overlap
+    apart : (2, 2) float64 - threads from one texel to the next: columns for right and for down
+    step : (2, 2) float64 - threads that a texel spans; differs from `apart` if texels overlap
     start : (2,) float64 - weave coordinates of the first texel's outer corner
     corner : (x, y) of the first texel on its sheet
     side : samples along each side of a texel, 0 to take the repeat's mean
-    sums : (PLANES,) float32 - room to add samples up in
+    sums : (MOMENTS,) float32 - scratch space for the sums over samples
 
-    A sample lies anywhere in its square of a texel, by a hash of the texel's place on the sheet:
-    a regular raster would see a weave of the same pitch wrongly, and alike in all texels.
+    Samples are stratified and jittered by a hash of the texel's position on the sheet: a regular
+    raster would alias with a weave of the same pitch, and identically in all texels.
     """
     R = np.float32
     height, width = owner.shape
@@ -73,10 +81,10 @@ def texels(  # type: ignore[no-untyped-def]
             if owner[j, i] != mine:
                 continue
             if side == 0:
-                for p in range(PLANES):
+                for p in range(MOMENTS):
                     out[p, j, i] = made.mean[p]
                 continue
-            for p in range(PLANES):
+            for p in range(MOMENTS):
                 sums[p] = R(0)
             seed = _mixed(np.uint64(corner[0] + i) << np.uint64(32) | np.uint64(corner[1] + j))
             left = start[0] + apart[0, 0] * i + apart[0, 1] * j
@@ -90,20 +98,20 @@ def texels(  # type: ignore[no-untyped-def]
                     v = top + step[1, 0] * x + step[1, 1] * y
                     _add(made, u, v, sums)
             share = R(1.0 / (side * side))
-            for p in range(PLANES):
+            for p in range(MOMENTS):
                 out[p, j, i] = sums[p] * share
 
 
 @njit(**LEAN)
 def threads_under(cloth, weave, sets, threads):  # type: ignore[no-untyped-def]
-    """Set and thread type under weave coordinates (n, 2) float64, into sets (n,), threads (n,)."""
+    """Write the thread set and type at weave coordinates (n, 2) float64 to sets, threads (n,)."""
     for k in range(weave.shape[0]):
         sets[k], threads[k], _, _, _, _ = find(np.float32, cloth, weave[k, 0], weave[k, 1])
 
 
 @njit(**INLINE)
 def _mixed(x):  # type: ignore[no-untyped-def]
-    """A hash of 64 bits to 64 bits, [Steele2014]."""
+    """Hash 64 bits to 64 bits, [Steele2014]."""
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return x ^ (x >> np.uint64(31))
@@ -111,7 +119,7 @@ def _mixed(x):  # type: ignore[no-untyped-def]
 
 @njit(**INLINE)
 def _add(made, u, v, out):  # type: ignore[no-untyped-def]
-    """Add what is seen at weave coordinates (u, v) to a texel's sums."""
+    """Add the sample at weave coordinates (u, v) to a texel's sums."""
     R = np.float32
     which, thread, s, w, angle, length = find(R, made.cloth, u, v)
     if which == GAP:
@@ -141,7 +149,7 @@ def _add(made, u, v, out):  # type: ignore[no-untyped-def]
 
 @njit(**INLINE)
 def _add_round(made, which, thread, w, step, out):  # type: ignore[no-untyped-def]
-    """Add the slope across a round thread, at `w` in [-1, 1] across its width."""
+    """Add the slope across a round thread at position `w` in [-1, 1] across its width."""
     R = np.float32
     edge = min(max(w, R(-ROUNDEST)), R(ROUNDEST))
     share = made.cloth.width[which] if made.cloth.width[which] > R(0) else R(1)
@@ -158,7 +166,7 @@ def _add_round(made, which, thread, w, step, out):  # type: ignore[no-untyped-de
 
 @njit(**INLINE)
 def _add_horizon(made, u, v, which, out):  # type: ignore[no-untyped-def]
-    """The nearest texel of the horizon table: the mean over a texel's samples interpolates."""
+    """Add the nearest entry of the horizon table; averaging a texel's samples interpolates it."""
     R = np.float32
     table = made.table
     if table.shape[5] != AZIMUTHS:
@@ -186,21 +194,22 @@ def _add_horizon(made, u, v, which, out):  # type: ignore[no-untyped-def]
 
 
 def halve(
-    planes: NDArray[np.float32], owned: NDArray[np.float32]
+    moments: NDArray[np.float32], owned: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The next mip level: means of 2 by 2 texels over what of them is owned.
+    """Return the next mip level: means of 2 x 2 texels, weighted by their owned shares.
 
-    planes : (p, h, w), owned : (h, w) share of each texel that belongs to the layout
+    moments : (p, h, w)
+    owned : (h, w) share of each texel that belongs to the UV layout
     """
-    p, h, w = planes.shape
+    p, h, w = moments.shape
     half = np.empty((p, h // 2, w // 2), np.float32)
     share = np.empty((h // 2, w // 2), np.float32)
-    _halve(planes, owned, half, share)
+    _halve(moments, owned, half, share)
     return half, share
 
 
 @njit(**LEAN)
-def _halve(planes, owned, half, share):  # type: ignore[no-untyped-def]
+def _halve(moments, owned, half, share):  # type: ignore[no-untyped-def]
     R = np.float32
     height, width = share.shape
     for j in range(height):
@@ -209,14 +218,14 @@ def _halve(planes, owned, half, share):  # type: ignore[no-untyped-def]
                 (owned[2 * j, 2 * i] + owned[2 * j, 2 * i + 1])
                 + (owned[2 * j + 1, 2 * i] + owned[2 * j + 1, 2 * i + 1])
             )
-    for p in range(planes.shape[0]):
+    for p in range(moments.shape[0]):
         for j in range(height):
             for i in range(width):
                 total = (
-                    planes[p, 2 * j, 2 * i] * owned[2 * j, 2 * i]
-                    + planes[p, 2 * j, 2 * i + 1] * owned[2 * j, 2 * i + 1]
+                    moments[p, 2 * j, 2 * i] * owned[2 * j, 2 * i]
+                    + moments[p, 2 * j, 2 * i + 1] * owned[2 * j, 2 * i + 1]
                 ) + (
-                    planes[p, 2 * j + 1, 2 * i] * owned[2 * j + 1, 2 * i]
-                    + planes[p, 2 * j + 1, 2 * i + 1] * owned[2 * j + 1, 2 * i + 1]
+                    moments[p, 2 * j + 1, 2 * i] * owned[2 * j + 1, 2 * i]
+                    + moments[p, 2 * j + 1, 2 * i + 1] * owned[2 * j + 1, 2 * i + 1]
                 )
                 half[p, j, i] = R(0.25) * total / max(share[j, i], R(1e-20))

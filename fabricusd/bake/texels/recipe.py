@@ -1,4 +1,4 @@
-"""What a fabric's texels are computed from: its tables for the kernels of `moments`."""
+"""Compile a fabric into the tables from which the kernels of `moments` compute its texels."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric, true_repeat
 from fabricusd.bake.texels.angle_rows import angle_rows, height_rows
 from fabricusd.bake.texels.light import unit_light
+from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.moments import texels
-from fabricusd.bake.texels.planes import PLANES
 from fabricusd.fabric import Fabric
 
 
 class Recipe(NamedTuple):
-    """What a fabric's texels are computed from.
+    """The tables of a fabric.
 
-    cloth, shadow : compiled for float32; `shadow` answers for the chosen light, by `light`
+    cloth, shadow : compiled for float32; `shadow` is evaluated for the direction `light`
     table : horizon table of `compile_shadow(..., "horizon")`
     rows, heights : see `angle_rows`
-    rounded : int - 1 where threads are round across their width
+    rounded : int - 1 if threads are round across their width
     light : (3,) float32 - unit vector to the light in the weave's frame; zero for none
-    mean : (PLANES,) float32 - of the whole repeat
+    mean : (MOMENTS,) float32 - moments of the whole repeat
     """
 
     cloth: CompiledFabric
@@ -44,10 +44,11 @@ def recipe(
     light: tuple[float, float, float] | None = None,
     method: str = "peak",
 ) -> Recipe:
-    """Tables of `fabric` for the kernels.
+    """Compile the tables of `fabric`.
 
-    level : "weave" or "thread", whether threads are flat or round across their width
-    light : direction to the light in the surface frame, for the shadow mask by `method`
+    level : "weave" for threads that are flat across their width, "thread" for round ones
+    light : direction to the light in the surface frame, for the shadow mask
+    method : method of the shadow mask
     """
     cloth = compile_fabric(fabric, precision=np.float32)
     horizon = compile_shadow(fabric, "horizon", level=level)
@@ -61,22 +62,22 @@ def recipe(
         heights=height_rows(fabric),
         rounded=int(level == "thread"),
         light=towards.astype(np.float32),
-        mean=np.zeros(PLANES, np.float32),
+        mean=np.zeros(MOMENTS, np.float32),
     )
     return made._replace(mean=repeat_mean(fabric, made))
 
 
 def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:
-    """(PLANES,) over one repeat, from about 16 samples a thread each way."""
+    """(MOMENTS,) means over one repeat, from about 16 samples per thread along each axis."""
     repeat = true_repeat(fabric)
     count = [min(max(16 * n, 256), 2048) for n in repeat]
-    planes = np.empty((PLANES, count[1], 1), np.float32)
-    sums = np.empty(PLANES, np.float32)
+    moments = np.empty((MOMENTS, count[1], 1), np.float32)
+    sums = np.empty(MOMENTS, np.float32)
     nobody = np.zeros((count[1], 1), np.int32)
-    total = np.zeros(PLANES)
+    total = np.zeros(MOMENTS)
     across = np.array([[repeat[0] / count[0], 0.0], [0.0, repeat[1] / count[1]]])
     for column in range(count[0]):
         start = np.array([across[0, 0] * column, 0.0])
-        texels(made, across, across, start, (column, 0), nobody, 0, 1, sums, planes)
-        total += planes[:, :, 0].mean(axis=1, dtype=np.float64)
+        texels(made, across, across, start, (column, 0), nobody, 0, 1, sums, moments)
+        total += moments[:, :, 0].mean(axis=1, dtype=np.float64)
     return (total / count[0]).astype(np.float32)

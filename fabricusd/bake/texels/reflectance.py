@@ -1,7 +1,7 @@
-"""How much a bit of thread reflects in the cloth, by its tangent angle: the maps' colours.
+"""Tabulate the reflectance of a thread in the cloth by its tangent angle, for the colour maps.
 
-Reflectance is the integral of level `weave` over all lights, for a viewer straight above. Its mean
-over the repeat is that of level `far`.
+Reflectance is the integral of level `weave` over all light directions, for a viewer at the normal.
+Its mean over the repeat is the reflectance of level `far`.
 """
 
 from __future__ import annotations
@@ -22,13 +22,15 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
 ANGLES = 181
-"""Tangent angles from -90 to 90 degrees, one a degree: the narrowest published lobe has 2.5."""
+"""Tangent angles from -90 to 90 degrees in steps of one degree: the narrowest published lobe is 2.5
+degrees wide."""
 
 COLUMNS = 3
-"""Surface term, volume term without `A`, and what both gain at a grazing view."""
+"""Surface term, volume term without `A`, and the gain of both at a grazing view."""
 
 GRAZING = math.radians(75.0)
-"""View that the fuzz is measured at: farther out the published models have hardly any light."""
+"""Inclination of the view at which fuzz is measured [rad]; closer to the horizon the published
+models reflect hardly any light."""
 
 _POLAR, _AZIMUTHAL, _VIEWS = 24, 48, 4
 
@@ -53,7 +55,7 @@ def reflectance_table(fabric: Fabric) -> NDArray[np.float64]:
                 if column == 1:
                     grazing = _reflected(tables, thread_set, thread, GRAZING)
                     table[thread_set, thread, :, 2] = np.maximum(grazing - above, 0.0)
-    # With A = 1 both terms are there; the volume's own share is the difference.
+    # The second run, with A = 1, holds both terms; the volume term is the difference.
     table[..., 1] = np.maximum(table[..., 1] - table[..., 0], 0.0)
     brightness = np.array([np.mean(t.albedo) for t in fabric.thread_list])
     table[..., 2] *= np.minimum(brightness, 1.0)[None, :, None]
@@ -61,19 +63,19 @@ def reflectance_table(fabric: Fabric) -> NDArray[np.float64]:
 
 
 def refuse_conserving(fabric: Fabric) -> None:
-    """Raise FabricError where a thread's model is one that the baker does not know."""
+    """Raise FabricError if a thread's model cannot be baked."""
     for name, thread in fabric.threads.items():
         if model_of(fabric, thread).law == CONSERVING:
             baked = " or ".join(f"'{n}'" for n in sorted(names(PUBLISHED)))
             raise FabricError(
                 f"{fabric.name} {name} model",
-                f"is '{fabric.model_of(thread)}', whose light goes from thread to thread and is "
-                f"not baked; it must be {baked}",
+                f"is '{fabric.model_of(thread)}', whose light travels between threads and cannot "
+                f"be baked; it must be {baked}",
             )
 
 
 def _reflected(tables: Any, thread_set: int, thread: int, view: float) -> NDArray[np.float64]:
-    """(ANGLES,) reflectance for a viewer `view` [rad] from the normal, mean over azimuths."""
+    """(ANGLES,) reflectance for a viewer `view` [rad] from the normal, averaged over azimuths."""
     x, weight = np.polynomial.legendre.leggauss(_POLAR)
     z = 0.5 * (x + 1.0)
     phi = (np.arange(_AZIMUTHAL) + 0.5) * (2.0 * math.pi / _AZIMUTHAL)

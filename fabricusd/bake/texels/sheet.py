@@ -1,4 +1,4 @@
-"""One texture of a set: a UDIM tile of a garment at a resolution, cut into blocks."""
+"""Describe a sheet: one UDIM tile of a garment at a given resolution, divided into blocks."""
 
 from __future__ import annotations
 
@@ -15,21 +15,24 @@ from fabricusd.bake.texels.cell_table import CellTable, tables_of
 from fabricusd.bake.texels.recipe import Recipe
 
 SMALLEST, LARGEST = 64, 32768
-"""Texels along a side: beyond it a texture is more than most tools open; use more UDIM tiles."""
+"""Texels along a side of a texture. Most tools cannot open larger ones; use more UDIM tiles."""
 
-BLOCK = 256
-"""Texels along a block's side: 12 MB of planes."""
+BLOCK_SIDE = 256
+"""Texels along the side of a block, whose moments take 12 MB."""
 
 Window = tuple[int, int, int, int]
-"""(x0, y0, x1, y1): texels of the finest level from x0 to before x1, and so on."""
+"""(x0, y0, x1, y1): texels of the finest level in the half-open ranges [x0, x1) and [y0, y1)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sheet:
-    """One texture of a set: a UDIM tile of a garment at a resolution.
+    """A UDIM tile of a garment at a given resolution; every map has one texture of it.
 
+    recipes : of each lay
+    tile : (column, row); number : its UDIM number
+    margin : texels by which UV shells are extended beyond their border
     corners : (m, 3, 2) float64 - the garment's triangles in texels of this tile
-    tables : of each lay, None where its texels are computed one by one
+    tables : cell table of each lay, None if its texels are computed one by one
     """
 
     garment: Garment
@@ -42,23 +45,23 @@ class Sheet:
     tables: tuple[CellTable | None, ...] = ()
 
     @property
-    def block(self) -> int:
+    def block_side(self) -> int:
         """Texels along a block's side."""
-        return min(BLOCK, self.resolution)
+        return min(BLOCK_SIDE, self.resolution)
 
     @property
     def across(self) -> int:
         """Blocks along the sheet's side."""
-        return self.resolution // self.block
+        return self.resolution // self.block_side
 
     @property
     def levels(self) -> int:
         """Mip levels inside a block, down to one texel."""
-        return self.block.bit_length()
+        return self.block_side.bit_length()
 
     def window(self, bx: int, by: int) -> Window:
-        """Texels of a block."""
-        size = self.block
+        """Return the texels of a block."""
+        size = self.block_side
         return bx * size, by * size, (bx + 1) * size, (by + 1) * size
 
 
@@ -69,7 +72,7 @@ def sheets_of(
     resolution: int,
     margin: int,
 ) -> list[Sheet]:
-    """The sheets of a garment's tiles, by UDIM number; they share their tables."""
+    """Return the sheets of a garment's tiles, by UDIM number; they share their cell tables."""
     found = [
         Sheet(
             garment=garment,
@@ -87,7 +90,7 @@ def sheets_of(
 
 
 def texel_step(sheet: Sheet, lay: int, scale: int = 1) -> NDArray[np.float64]:
-    """(2, 2) threads that one texel of side `scale` spans: columns for right and for down."""
+    """(2, 2) threads that a texel of side `scale` spans: columns for right and for down."""
     return sheet.garment.lays[lay].matrix @ np.diag((1.0, -1.0)) * (scale / sheet.resolution)
 
 

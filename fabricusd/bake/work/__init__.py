@@ -1,1 +1,1 @@
-"""How a bake is carried out, kept and gone on with."""
+"""Run a bake on several workers, checkpoint it, and resume it after an interruption."""

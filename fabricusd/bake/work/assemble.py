@@ -1,4 +1,4 @@
-"""Computing the blocks of a bake and putting the textures together, on several workers."""
+"""Compute the blocks of a bake and assemble them into textures, on several workers."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from fabricusd.bake.texels.blocks import Layers, composed
 from fabricusd.bake.texels.encoding import FORMATS, encoding_of
 from fabricusd.bake.texels.layers import ComputedLayer, Place
 from fabricusd.bake.texels.maps import TextureMap
-from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.sheet import Sheet
-from fabricusd.bake.work.kept import Kept, kept, read_top
+from fabricusd.bake.work.checkpoint import Checkpoint, checkpoint_of, read_top
 from fabricusd.bake.work.scratch import Scratch
 from fabricusd.images.files import write_16_bit, write_mip_exr
 from fabricusd.run.workers import Batches
 
 Progress = Callable[[str, int, int], Any]
-"""Told what is counted, how many there are, and how many are done."""
+"""Called with the noun that is counted, the total, and the number done."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Files:
-    """Where textures go and what they are called."""
+    """The folder and the names of the textures."""
 
     folder: Path
     udim: bool
     file_format: str
 
     def path(self, sheet: Sheet, one: TextureMap) -> Path:
-        """A texture: garment, map, and the tile's number where there are tiles."""
+        """Return a texture's path: garment, map and, with UDIM tiles, the tile's number."""
         number = f".{sheet.number}" if self.udim else ""
         name = f"{sheet.garment.name}.{one.name}{number}{FORMATS[self.file_format]}"
         return self.folder / name
@@ -45,7 +45,7 @@ class Files:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Work:
-    """The sheets and maps of one bake, where they are kept and go, and who works on them."""
+    """The sheets and maps of one bake, its scratch folder and output files, and its workers."""
 
     scratch: Scratch
     sheets: Sequence[Sheet]
@@ -55,36 +55,36 @@ class Work:
     progress: Progress | None
 
     def missing(self, sheet: Sheet) -> list[int]:
-        """Maps whose texture of this sheet is not there yet."""
+        """Return the indices of the maps whose texture of this sheet is not finished."""
         paths = (self.files.path(sheet, one) for one in self.maps)
         return [k for k, path in enumerate(paths) if not self.scratch.is_done(path)]
 
     def run(self, task: Callable[[int, int], None], count: int, noun: str) -> bool:
-        """`count` jobs of `task`, reported as `noun`; False where interrupted."""
+        """Run `count` jobs of `task`, reported as `noun`; return False if interrupted."""
         report = partial(self.progress, noun, count) if self.progress else None
         return Batches(self.workers, task).run(count, report)
 
 
 def compute(work: Work) -> bool:
-    """Every block that is not there yet; False where interrupted."""
+    """Compute every block that is missing; return False if interrupted."""
     jobs = []
     for sheet in work.sheets:
         if work.missing(sheet):
             jobs += [(sheet, x, y) for y in range(sheet.across) for x in range(sheet.across)]
-    ways = {id(sheet): kept(sheet, work.maps) for sheet in work.sheets}
+    checkpoints = {id(sheet): checkpoint_of(sheet, work.maps) for sheet in work.sheets}
 
     def one_block(_: int, k: int) -> None:
         sheet, x, y = jobs[k]
         path = work.scratch.block(sheet, x, y)
-        way = ways[id(sheet)]
-        if not way.is_sound(path):
-            way.write(path, x, y)
+        checkpoint = checkpoints[id(sheet)]
+        if not checkpoint.is_sound(path):
+            checkpoint.write(path, x, y)
 
     return work.run(one_block, len(jobs), "blocks")
 
 
 def assemble(work: Work) -> bool:
-    """Every texture that is not there yet; False where interrupted."""
+    """Write every texture that is missing; return False if interrupted."""
     for sheet in work.sheets:
         todo = work.missing(sheet)
         if not todo:
@@ -99,12 +99,12 @@ def assemble(work: Work) -> bool:
 def _write_texture(
     work: Work, sheet: Sheet, todo: Sequence[int], upper: Layers, _worker: int, job: int
 ) -> None:
-    """One texture, from the blocks and the levels above them."""
+    """Write one texture from its blocks and from the mip levels coarser than a block."""
     k = todo[job]
-    files, one, way = work.files, work.maps[k], kept(sheet, work.maps)
+    files, one, checkpoint = work.files, work.maps[k], checkpoint_of(sheet, work.maps)
     path, encoding = files.path(sheet, one), None
     levels: list[Any] = [
-        partial(bands, work.scratch, sheet, way, k, level) for level in range(sheet.levels)
+        partial(bands, work.scratch, sheet, checkpoint, k, level) for level in range(sheet.levels)
     ]
     metadata = {
         "fabricusd:map": one.name,
@@ -128,31 +128,34 @@ def _whole(level: np.ndarray[Any, Any]) -> Any:
     return iter((level,))
 
 
-def bands(scratch: Scratch, sheet: Sheet, way: Kept, k: int, level: int) -> Iterator[NDArray[Any]]:
-    """Rows of a map's level that lies inside the blocks, from the top, in heights for tiles."""
+def bands(
+    scratch: Scratch, sheet: Sheet, checkpoint: Checkpoint, k: int, level: int
+) -> Iterator[NDArray[Any]]:
+    """Yield a mip level of a map in bands of rows, from the top, each high enough for EXR tiles."""
     waiting: list[NDArray[Any]] = []
     for by in range(sheet.across):
         row = [
-            way.values(scratch.block(sheet, x, by), x, by, k, level) for x in range(sheet.across)
+            checkpoint.values(scratch.block(sheet, x, by), x, by, k, level)
+            for x in range(sheet.across)
         ]
         waiting.append(np.concatenate(row, axis=1))
-        if len(waiting) * (sheet.block >> level) >= 64 or by == sheet.across - 1:
+        if len(waiting) * (sheet.block_side >> level) >= 64 or by == sheet.across - 1:
             yield np.ascontiguousarray(np.concatenate(waiting))
             waiting = []
 
 
 def uppermost(scratch: Scratch, sheet: Sheet) -> Layers:
-    """Layers of the level at which each block is one texel."""
+    """Return the layers of the mip level at which each block is one texel."""
     lays, n = len(sheet.garment.lays), sheet.across
-    planes, owned = np.empty((lays, PLANES, n, n), np.float32), np.empty((lays, n, n), np.float32)
+    moments, owned = np.empty((lays, MOMENTS, n, n), np.float32), np.empty((lays, n, n), np.float32)
     for by in range(n):
         for bx in range(n):
             found = read_top(scratch.block(sheet, bx, by), sheet)
-            planes[:, :, by, bx], owned[:, by, bx] = found
+            moments[:, :, by, bx], owned[:, by, bx] = found
     window = (0, 0, sheet.resolution, sheet.resolution)
     return {
         k: ComputedLayer(
-            Place(sheet=sheet, lay=k, window=window, level=sheet.levels - 1), planes[k], owned[k]
+            Place(sheet=sheet, lay=k, window=window, level=sheet.levels - 1), moments[k], owned[k]
         )
         for k in range(lays)
         if owned[k].any()
@@ -160,7 +163,10 @@ def uppermost(scratch: Scratch, sheet: Sheet) -> Layers:
 
 
 def upper_levels(one: TextureMap, layers: Layers, size: int) -> list[NDArray[Any]]:
-    """The levels of a map above the blocks' own, whole; layers : as `uppermost` gives them"""
+    """Return the mip levels of a map that are coarser than a block.
+
+    layers : as returned by `uppermost`
+    """
     found = []
     while size > 1:
         layers = {k: layer.halved() for k, layer in layers.items()}

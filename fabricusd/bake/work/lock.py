@@ -1,7 +1,7 @@
-"""One writer a folder: a lock that says who holds it.
+"""Lock an output folder so that only one process writes to it; the lock names its holder.
 
-The system lets go of the lock when its process ends, however it ends, so a lock that a killed
-process left behind stops nobody.
+The operating system releases the lock when the process ends, however it ends, so a killed process
+does not block others.
 """
 
 from __future__ import annotations
@@ -22,28 +22,30 @@ from fabricusd.files import remove_partial_files
 
 LOCK = ".fabricusd.lock"
 HOLDER = ".fabricusd.holder"
-"""Who holds the lock, in a file of its own: Windows lets nobody read a file that is locked."""
+"""File that names the lock's holder. It is separate because Windows forbids reading a locked file.
+"""
 
 PATIENCE = 0.2
-"""Seconds to wait for a lock: another process may just be about to remove its file."""
+"""Time to wait for a lock [s]: another process may be about to remove its file."""
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Be the only one that writes into `folder`, which must exist, and clear it of what a killed
-    writer left half written.
+    """Hold the lock of `folder`, which must exist, and remove a killed writer's partial files.
 
-    Raises FabricError, saying who, where another process, or another thread of this one, writes.
+    Raises FabricError, naming the holder, if another process or another thread of this process
+    holds the lock.
     """
     lock = FileLock(folder / LOCK, timeout=PATIENCE)
     try:
         with warnings.catch_warnings():
-            # A file system without such locks takes a file with the process's number instead.
+            # On file systems without locks, filelock warns and writes a file with the process id.
             warnings.simplefilter("ignore")
             lock.acquire()
     except Timeout:
         raise FabricError(
-            str(folder), f"is being written by {_holder(folder)}; wait for it, or name another"
+            str(folder),
+            f"is being written by {_holder(folder)}; wait for it to finish, or name another folder",
         ) from None
     except OSError as error:
         raise FabricError(str(folder), f"cannot be written: {error.strerror}") from error
@@ -52,7 +54,7 @@ def locked(folder: Path) -> Iterator[None]:
         remove_partial_files(folder)
         yield
     finally:
-        # The files go while the lock is held: whoever opened them before finds them gone.
+        # Remove the files before releasing the lock, so that waiting processes find them gone.
         for name in (HOLDER, LOCK):
             with suppress(OSError):
                 (folder / name).unlink(missing_ok=True)
@@ -60,7 +62,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def refuse_locked(folder: Path) -> None:
-    """Raise FabricError where somebody writes into `folder`; nothing is written."""
+    """Raise FabricError if another process is writing to `folder`; write nothing."""
     if not (folder / LOCK).is_file() or not os.access(folder, os.W_OK):
         return
     with locked(folder):
@@ -75,14 +77,14 @@ def _sign(folder: Path) -> None:
     }
     path = folder / HOLDER
     with suppress(OSError):
-        # A new file: what is there may be a link to somewhere else.
+        # Replace the file rather than write to it: it may be a link to a file elsewhere.
         path.unlink(missing_ok=True)
         with path.open("x", encoding="utf-8") as stream:
             json.dump(said, stream)
 
 
 def _holder(folder: Path) -> str:
-    """Who holds the lock, in words."""
+    """Describe the holder of the lock."""
     path = folder / HOLDER
     if not path.is_file():
         return "another process"

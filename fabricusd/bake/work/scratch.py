@@ -1,7 +1,8 @@
-"""What a bake keeps between its start and its end, so that a killed one can go on.
+"""Manage a bake's scratch folder, from which an interrupted bake resumes.
 
-`.bake` in the output folder holds the key of the job, the blocks that are done and a mark for each
-texture that is. Everything in it is written whole; a block whose checksum is wrong counts as none.
+The folder `.bake` in the output folder holds the key of the job, the finished blocks, and a mark
+for each finished texture. Every file in it is written atomically. A block whose checksum is wrong
+is computed again.
 """
 
 from __future__ import annotations
@@ -21,29 +22,29 @@ from fabricusd.files import whole_file
 FOLDER = ".bake"
 
 LONGEST = 4096
-"""Bytes of a key or a mark: none that was written here has as many."""
+"""Bytes of the longest key or mark that is read; those written here are shorter."""
 
 
 class Scratch:
-    """The folder of one job, in an output folder that nobody else writes.
+    """The scratch folder of one job, in a locked output folder.
 
-    key : what the job is, in one word; another key means that nothing in the folder can be used
+    key : a digest of the job; files of a job with another key cannot be used
     """
 
     def __init__(self, out: Path, key: str, *, resume: bool) -> None:
         self.folder = out / FOLDER
         if self.folder.is_symlink():
-            raise FabricError(str(self.folder), "is a link; it must be a folder of the bake's own")
+            raise FabricError(str(self.folder), "is a link; it must be a folder: remove the link")
         held = self.folder / "key"
         known = _small_file(held)
         if resume and known is not None and known != key:
             raise FabricError(
                 str(out),
-                "holds a bake of another scene, fabric or settings; leave --resume out to start "
-                "anew",
+                "holds an unfinished bake of another scene, fabric or settings; leave --resume out "
+                "to start again",
             )
         try:
-            # Blocks without a key may be of any job.
+            # Blocks without a key may belong to any job.
             if self.folder.exists() and not (resume and known == key):
                 shutil.rmtree(self.folder)
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -53,33 +54,33 @@ class Scratch:
             temporary.write_text(key)
 
     def block(self, sheet: Sheet, bx: int, by: int) -> Path:
-        """Where a block is kept."""
+        """Return the path of a block's file."""
         folder = self.folder / f"{sheet.garment.name}.{sheet.number}"
         folder.mkdir(exist_ok=True)
         return folder / f"{bx}_{by}.block"
 
     def drop(self, sheet: Sheet) -> None:
-        """Forget the blocks of a sheet whose textures are all done."""
+        """Delete the blocks of a sheet whose textures are all finished."""
         shutil.rmtree(self.folder / f"{sheet.garment.name}.{sheet.number}", ignore_errors=True)
 
     def is_done(self, file: Path) -> bool:
-        """Whether a texture is there, as it was when it was marked."""
+        """Whether a texture is finished and unchanged since it was marked."""
         said = self._said(file)
         return said is not None and file.is_file() and said[0] == sha256(file)
 
     def mark_done(self, file: Path, encoding: Encoding | None = None) -> None:
-        """Remember that a texture is finished, and how its values are stored."""
+        """Record that a texture is finished, and how its values are encoded."""
         said = {"sha256": sha256(file), "encoding": encoding and asdict(encoding)}
         with whole_file(self._mark(file)) as temporary:
             temporary.write_text(json.dumps(said), "utf-8")
 
     def encoding(self, file: Path) -> Encoding | None:
-        """How a finished texture's values are stored; None where they are stored as they are."""
+        """Return the encoding of a finished texture; None if it stores the values themselves."""
         said = self._said(file)
         return said[1] if said is not None else None
 
     def _said(self, file: Path) -> tuple[str, Encoding | None] | None:
-        """Checksum and encoding by a texture's mark; None where it has none, or a damaged one."""
+        """Return the checksum and encoding in a texture's mark; None if missing or damaged."""
         text = _small_file(self._mark(file))
         try:
             said: Any = json.loads(text or "")
@@ -93,12 +94,12 @@ class Scratch:
 
     @staticmethod
     def remove(out: Path) -> None:
-        """Remove the folder of a job that is done from an output folder."""
+        """Remove the scratch folder of a finished job from an output folder."""
         shutil.rmtree(out / FOLDER, ignore_errors=True)
 
 
 def _small_file(path: Path) -> str | None:
-    """The text of a key or a mark, "" for what is none; None where there is no such file."""
+    """Return the text of a key or a mark: "" if it is unreadable, None if there is no file."""
     if not path.is_file():
         return None
     try:
@@ -110,6 +111,6 @@ def _small_file(path: Path) -> str | None:
 
 
 def sha256(path: Path) -> str:
-    """Checksum of a file."""
+    """Return the SHA-256 checksum of a file in hexadecimal."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -1,1 +1,1 @@
-"""Materials of other renderers fitted to a fabric."""
+"""Fit the surface models of other renderers to a fabric."""

@@ -1,10 +1,10 @@
-"""Parameters of a standard surface, by least squares against the cloth's own reflectance.
+"""Fit the parameters of a standard surface to the cloth's reflectance by least squares.
 
-The forward model is what a renderer shows: the mean over texels of the surface model with each
-texel's own colour, roughness, normal and tangent, as the bake has them, over all texels and over
-those of each thread, see `target`. What is least is a smooth form of what is judged, see `judge`;
-of several starts, the textures alone among them, that is taken which is judged best. [Branch1999]
-by `scipy.optimize.least_squares`.
+The forward model is what a renderer shows: the mean of the surface model over texels, with each
+texel's colour, roughness, normal and tangent from the bake. The mean is taken over all texels and
+over those of each thread, see `target`. The solver minimises a smooth form of the score, see
+`judge`. It starts from several looks, among them the textures alone, and the result with the best
+score is kept. The solver is `scipy.optimize.least_squares`, after [Branch1999].
 """
 
 from __future__ import annotations
@@ -27,23 +27,25 @@ from fabricusd.materials.networks.look import Look
 Floats = NDArray[np.float64]
 
 REGULAR = 0.2
-"""Pull of each parameter to its start, so that what the data cannot tell stays put: a parameter
-that is off by all of its range costs as much as this delta E."""
+"""Regularisation, so that parameters that the data do not determine keep their starting values: a
+parameter that moves by its whole range costs as much as this delta E."""
 
 FIRST, MORE, ROUNDS = 8, 8, 3
-"""Steps from each start; and from what is best then, in as many rounds."""
+"""Solver steps from each start, then steps per round from the best look so far, and rounds."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fitted:
-    """A fit and how far it is from the cloth.
+    """A fitted look and its error against the cloth.
 
-    delta_e, delta_e_95 : mean and 95th percentile of delta E 2000 over the pairs of directions, in
-        a light under which a white diffuser is white
-    albedo : mean relative difference of the directional albedo, all channels and views
-    threads_delta_e : mean delta E 2000 of each thread's own texels, where texels resolve threads
-    score : what was least, `Judge.score`
-    start_delta_e, start_score : the same of the textures as they are, without a fit
+    delta_e, delta_e_95 : mean and 95th percentile of delta E 2000 over pairs of directions, in a
+        light under which a white diffuser is white
+    albedo : mean relative error of the directional albedo over all channels and views
+    threads_delta_e : mean delta E 2000 of each thread's own texels; None unless texels resolve
+        threads
+    score : the value of `Judge.score`
+    start_delta_e, start_score : the same figures for the textures without a fit
+    pairs : number of pairs of directions
     """
 
     look: Look
@@ -57,7 +59,7 @@ class Fitted:
     pairs: int
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the fit for JSON."""
         said = asdict(self)
         return {"parameters": said.pop("look"), **said}
 
@@ -65,18 +67,22 @@ class Fitted:
 def fit(
     kind: str, texels: TexelSample, fabric: Fabric, *, baked: TexelSample | None = None
 ) -> Fitted:
-    """The `Look` with which `kind` (one of `models.KINDS`) over `texels` is nearest to `fabric`.
+    """Return the look with which surface `kind`, one of `models.KINDS`, best matches `fabric`.
 
-    baked : the textures as they were, where `texels` are no longer those; what the start is of
+    baked : the texels of the bake, if `texels` were modified; the start figures refer to them
 
-    Never worse than `texels` alone, by `Judge.score` and by the mean delta E of the pairs.
+    The result is never worse than `texels` alone, neither in `Judge.score` nor in the mean delta E
+    of the pairs.
     """
     return _fitted(kind, texels, target_of(fabric, texels), _free(kind), baked or texels)
 
 
 def fit_threads(texels: TexelSample, fabric: Fabric) -> dict[int, Fitted]:
-    """A look of surface `openpbr` without fuzz for each thread that the texels resolve; their
-    index is one, that of the strongest reflection, and the others' tints are weaker for it."""
+    """Fit a look of surface `openpbr` without fuzz to each thread that the texels resolve.
+
+    All looks share one index of refraction, that of the strongest reflection; the tints of the
+    others are reduced accordingly.
+    """
     target, free = target_of(fabric, texels), _free("openpbr")[:5]
     found = {
         one: _fitted("openpbr", texels, target.row(row), free, texels)
@@ -87,7 +93,7 @@ def fit_threads(texels: TexelSample, fabric: Fabric) -> dict[int, Fitted]:
 
 
 def _with_index(look: Look, ior: float) -> Look:
-    """The same reflection at normal incidence, by another index and tint."""
+    """Return a look with index `ior` and the same reflectance at normal incidence."""
 
     def normal(n: float) -> float:
         return ((n - 1.0) / (n + 1.0)) ** 2
@@ -98,7 +104,7 @@ def _with_index(look: Look, ior: float) -> Look:
 
 
 def with_threads(texels: TexelSample, looks: Mapping[int, Look]) -> TexelSample:
-    """Texels with their thread's look in them; those of no thread take the mean of the looks."""
+    """Multiply each texel by its thread's look; texels of no thread take the mean of the looks."""
     base, smooth, rough, tint = (np.ones((len(texels.base), c)) for c in (3, 1, 1, 3))
     numbers = np.broadcast_to(texels.thread, len(texels.base))
     factors = thread_factors(looks, texels.shares)
@@ -115,8 +121,10 @@ def with_threads(texels: TexelSample, looks: Mapping[int, Look]) -> TexelSample:
 
 
 def thread_factors(looks: Mapping[int, Look], share: Mapping[int, float]) -> dict[int, Floats]:
-    """By thread (8,): factors on base colour, both roughnesses, and the tint; the mean of all by
-    their share under NO_THREAD."""
+    """(8,) factors of each thread: on the base colour, both roughnesses, and the tint.
+
+    The entry NO_THREAD is the mean of all threads, weighted by their shares.
+    """
     found = {
         one: np.array(
             (*look.base_color_scale, look.smooth_scale, look.rough_scale, *look.specular_tint)
@@ -161,7 +169,7 @@ def _fitted(
 
 
 def _renderer(kind: str, texels: TexelSample, target: Target) -> Callable[[Look], Floats]:
-    """From a look to (rows, n, 3) values, rows as the target has them."""
+    """Return a function from a look to (rows, n, 3) values, with the rows of `target`."""
     frames = _frames(texels)
     wi, wo = (np.einsum("kab,nb->kna", frames, w) for w in direction_pairs())
     return lambda look: np.einsum(
@@ -170,7 +178,7 @@ def _renderer(kind: str, texels: TexelSample, target: Target) -> Callable[[Look]
 
 
 _BARE = {f.name: getattr(Look(), f.name) for f in fields(Look) if f.name != "fuzz_color"}
-"""The textures alone, but for a colour that does not show without fuzz."""
+"""The parameters of the textures alone, except a colour that has no effect without fuzz."""
 
 
 def _sought(
@@ -179,7 +187,7 @@ def _sought(
     judge: Judge,
     starts: tuple[Look, ...],
 ) -> list[Look]:
-    """Looks of least squares: what each start leads to in a few steps, and the best one's end."""
+    """Return candidate looks: each start improved by a few steps, then the best one refined."""
     low, high = (np.concatenate([np.atleast_1d(f.bound(end)) for f in free]) for end in (0, 1))
 
     def improved(first: Look, steps: int, less: Floats | float = 1.0) -> Look:
@@ -194,18 +202,19 @@ def _sought(
         return _unpack(best.x, free, first)
 
     tried = [improved(first, FIRST) for first in starts]
-    # Squares heed the worst pairs most. Reweighted [Holland1977], they go over to the mean itself.
+    # Least squares favours the worst pairs. Reweighting [Holland1977] turns it towards the mean.
     for _ in range(ROUNDS):
         best = min(tried, key=lambda look: judge.score(values_of(look)))
         tried.append(improved(best, MORE, judge.evened(values_of(best))))
-    # On the way from the textures alone, for a surface that gains one figure at another's cost.
+    # Also try looks between the textures alone and the end: a fit may improve one figure at
+    # another's cost.
     plain, end = _pack(replace(tried[-1], **_BARE), free), _pack(tried[-1], free)
     between = [_unpack(plain + t * (end - plain), free, tried[-1]) for t in (0.25, 0.5, 0.75)]
     return [*tried, *between]
 
 
 def forward(kind: str, look: Look, texels: TexelSample, wi: Floats, wo: Floats) -> Floats:
-    """(k, n, 3) radiance of each texel; wi, wo : (k, n, 3) in each texel's frame."""
+    """(k, n, 3) radiance of each texel, for wi, wo (k, n, 3) in the texel's frame."""
     one = np.ones((len(texels.base), 1))
     smooth = np.minimum((texels.smooth * look.smooth_scale) ** 2, 1.0)[:, None]
     rough = np.minimum((texels.rough * look.rough_scale) ** 2, 1.0)[:, None]
@@ -225,7 +234,7 @@ def forward(kind: str, look: Look, texels: TexelSample, wi: Floats, wo: Floats) 
 
 
 def _frames(texels: TexelSample) -> Floats:
-    """(k, 3, 3) rows x (rougher axis), y, z (normal) of each texel."""
+    """(k, 3, 3) frame of each texel: rows x (the rougher axis), y, z (the normal)."""
     z = texels.normal
     x = texels.tangent - np.sum(texels.tangent * z, axis=1, keepdims=True) * z
     x = x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-9)
@@ -234,7 +243,7 @@ def _frames(texels: TexelSample) -> Floats:
 
 @dataclass(frozen=True)
 class _Free:
-    """A parameter that is sought, and between which values."""
+    """A parameter to fit and its bounds."""
 
     name: str
     bounds: tuple[float, float]
@@ -262,8 +271,10 @@ def _free(kind: str) -> tuple[_Free, ...]:
 
 
 def _starts(target: Floats) -> tuple[Look, ...]:
-    """Where the search begins: little reflection and much fuzz, the other way round, the textures
-    alone. The fuzz keeps the hue that the cloth has over all directions."""
+    """Return the starting looks: weak reflection with much fuzz, the reverse, the textures alone.
+
+    The fuzz takes the hue of the cloth averaged over all directions.
+    """
     color = target.mean(axis=0)
     red, green, blue = (float(c) for c in color / max(float(color.max()), 1e-9))
     hue = (red, green, blue)

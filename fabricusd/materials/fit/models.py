@@ -1,9 +1,9 @@
-"""NumPy evaluation of the standard surfaces that fabrics are fitted with.
+"""Evaluate, in NumPy, the standard surface models that are fitted to fabrics.
 
-Written from the public definitions in MaterialX 1.39 ([MaterialX2024]: `bxdf/*.mtlx` and
-`pbrlib/genglsl`), which is what renderers generate their shaders from: GGX with the smooth-surface
-Fresnel of a dielectric or Schlick's form, height-correlated masking at the mean alpha, Turquin's
-energy compensation, albedo-scaled layering, sheen by [Zeltner2022] or Conty and Kulla.
+The code follows the public definitions in MaterialX 1.39 ([MaterialX2024]: `bxdf/*.mtlx` and
+`pbrlib/genglsl`), from which renderers generate their shaders: GGX with the Fresnel reflectance of
+a dielectric or Schlick's approximation, height-correlated masking at the mean alpha, Turquin's
+energy compensation, albedo-scaled layering, and sheen by [Zeltner2022] or Conty and Kulla.
 
 All directions are in the texel's frame: x along the rougher axis, z the shading normal. Values are
 radiance per unit `L dwi`, cosine included.
@@ -20,20 +20,21 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 SMALLEST = 1e-6
-"""Floor of cosines and alphas, MaterialX's M_FLOAT_EPS."""
+"""Lower bound of cosines and alphas, MaterialX's M_FLOAT_EPS."""
 
 KINDS = ("openpbr", "standard_surface", "gltf_pbr", "preview", "principled")
-"""Surfaces that can be evaluated; `preview` is UsdPreviewSurface, metallic workflow, metallic 0,
-`principled` is Blender's Principled BSDF, which differs from OpenPBR in what the tint colours."""
+"""Surfaces that can be evaluated. `preview` is UsdPreviewSurface in the metallic workflow with
+metallic 0. `principled` is Blender's Principled BSDF, which differs from OpenPBR in its tint."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Surface:
-    """Parameters, each broadcast against the directions' leading shape.
+    """Parameters of a surface, each broadcast against the leading shape of the directions.
 
-    base : (..., 3); ior : (...); alpha_rough, alpha_smooth : (...) - GGX widths along x and y
-    tint : (..., 3) factor on the specular reflection; fuzz_weight, fuzz_roughness : (...);
-    fuzz_color : (..., 3)
+    base : (..., 3); ior : (...)
+    alpha_rough, alpha_smooth : (...) GGX widths along x and y
+    tint : (..., 3) factor on the specular reflection
+    fuzz_weight, fuzz_roughness : (...); fuzz_color : (..., 3)
     """
 
     base: Floats
@@ -47,7 +48,7 @@ class Surface:
 
 
 def evaluate(kind: str, s: Surface, wi: Floats, wo: Floats) -> Floats:
-    """(..., 3) for unit wi, wo (..., 3); 0 where either is below the shading normal."""
+    """(..., 3) value for unit vectors wi, wo (..., 3); 0 if either is below the shading plane."""
     above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
     cos_i = np.clip(wi[..., 2], SMALLEST, 1.0)
     cos_o = np.clip(wo[..., 2], SMALLEST, 1.0)
@@ -70,7 +71,7 @@ def evaluate(kind: str, s: Surface, wi: Floats, wo: Floats) -> Floats:
 def specular(
     kind: str, s: Surface, wi: Floats, wo: Floats, cos_i: Floats, cos_o: Floats
 ) -> tuple[Floats, Floats]:
-    """(..., 3) GGX reflection, and the share (..., 1) that it leaves to the layer below."""
+    """(..., 3) GGX reflection, and the share (..., 1) of light that reaches the layer below."""
     h = wi + wo
     h = h / np.maximum(np.linalg.norm(h, axis=-1, keepdims=True), SMALLEST)
     ax = np.clip(s.alpha_rough, SMALLEST, 1.0)
@@ -95,23 +96,23 @@ def specular(
 
 
 def _fresnel(kind: str, s: Surface, cos_h: Floats) -> tuple[Floats, Floats, Floats]:
-    """Reflectance at normal incidence and at cos_h, and a factor on the whole: (..., 1 or 3)."""
+    """Return reflectance at normal incidence and at cos_h, and an overall factor: (..., 1 or 3)."""
     ior, c = s.ior[..., None], cos_h[..., None]
     f0 = ((ior - 1.0) / (ior + 1.0)) ** 2
     if kind in ("openpbr", "standard_surface"):
         return f0, dielectric_fresnel(c, ior), s.tint
     if kind == "principled":
-        # The tint colours normal incidence alone; between, the dielectric's own curve.
+        # The tint colours normal incidence only; beyond, reflectance rises as a dielectric's does.
         rise = (dielectric_fresnel(c, ior) - f0) / np.maximum(1.0 - f0, SMALLEST)
         tinted = f0 * s.tint
         return tinted, tinted + (1.0 - tinted) * rise, np.ones(1)
-    # UsdPreviewSurface has no tint, glTF's colours normal incidence alone.
+    # UsdPreviewSurface has no tint; that of glTF colours normal incidence only.
     tinted = f0 if kind == "preview" else np.minimum(f0 * s.tint, 1.0)
     return tinted, tinted + (1.0 - tinted) * (1.0 - c) ** 5, np.ones(1)
 
 
 def dielectric_fresnel(c: Floats, ior: Floats) -> Floats:
-    """Unpolarised reflectance at cosine c."""
+    """Return the unpolarised Fresnel reflectance at cosine c."""
     g = np.sqrt(np.maximum(ior * ior + c * c - 1.0, 0.0))
     return np.asarray(
         0.5 * ((g - c) / (g + c)) ** 2 * (1.0 + (((g + c) * c - 1.0) / ((g - c) * c + 1.0)) ** 2)
@@ -135,7 +136,7 @@ _ALBEDO = np.array(
 
 
 def ggx_albedo(x: Any, y: Any, f0: Any, f90: Any) -> Floats:
-    """Directional albedo at cosine x and alpha y between the reflectances f0 and f90."""
+    """Return the directional albedo at cosine x and alpha y for reflectances f0 and f90."""
     x, y = np.broadcast_arrays(x, y)
     terms = (np.ones_like(x), x, y, x * y, x * x, y * y, x * x * y, x * y * y, x * x * y * y)
     r = sum(t[..., None] * row for t, row in zip(terms, _ALBEDO, strict=True))
@@ -145,7 +146,7 @@ def ggx_albedo(x: Any, y: Any, f0: Any, f90: Any) -> Floats:
 
 
 def zeltner(s: Surface, wi: Floats, wo: Floats, cos_o: Floats) -> tuple[Floats, Floats]:
-    """Sheen of [Zeltner2022] (..., 3), and the share left below."""
+    """(..., 3) sheen of [Zeltner2022], and the share of light that reaches the layer below."""
     x, y = cos_o, np.clip(s.fuzz_roughness, 0.01, 1.0)
     sigma = y * (0.0206607 + 1.58491 * y) / (0.0379424 + y * (1.32227 + y))
     m = y * (-0.193854 + y * (-1.14885 + y * (1.7932 - 0.95943 * y * y))) / (0.046391 + y)
@@ -175,7 +176,7 @@ def zeltner(s: Surface, wi: Floats, wo: Floats, cos_o: Floats) -> tuple[Floats, 
 def conty_kulla(
     s: Surface, roughness: Floats, wi: Floats, wo: Floats, cos_i: Floats, cos_o: Floats
 ) -> tuple[Floats, Floats]:
-    """Imageworks' sheen [Conty2017] (..., 3), and the share left below."""
+    """(..., 3) sheen of Imageworks [Conty2017], and the share that reaches the layer below."""
     h = wi + wo
     h = h / np.maximum(np.linalg.norm(h, axis=-1, keepdims=True), SMALLEST)
     inverse = 1.0 / np.maximum(roughness, 0.005)

@@ -1,4 +1,5 @@
-"""What textures are to look like: the whole cloth, and each thread where texels resolve threads."""
+"""Compute the target of a fit: the radiance of the whole cloth, and of each thread that texels
+resolve."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ from fabricusd.materials.fit.judge import direction_pairs
 Floats = NDArray[np.float64]
 
 PLACES = 24
-"""Along a thread's curve, that its mean radiance is taken from."""
+"""Number of positions along a thread's curve over which its radiance is averaged."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -24,10 +25,11 @@ class TexelSample:
     """Texels of one lay in the weave's frame, x along the weft, y along the warp.
 
     base : (k, 3); smooth, rough : (k,) - maps `roughness_along` and `_across`; opacity : (k,)
-    normal : (k, 3) unit; tangent : (k, 3) unit, along the rougher axis, across `normal`
-    weight : (k,) share of the lay that each stands for
+    normal : (k, 3) unit vectors
+    tangent : (k, 3) unit vectors along the rougher axis, perpendicular to `normal`
+    weight : (k,) share of the lay that each texel represents
     tint : (k, 3) factor on the reflection, or 1
-    thread : (k,) number of the thread in map `thread_id`, NO_THREAD for texels of none alone
+    thread : (k,) thread number as in the map `thread_id`; NO_THREAD for texels of no single thread
     """
 
     base: Floats
@@ -42,11 +44,11 @@ class TexelSample:
 
     @property
     def threads(self) -> list[int]:
-        """Numbers of the threads that there are texels of."""
+        """Numbers of the threads that have texels."""
         return [int(one) for one in np.unique(self.thread) if one != NO_THREAD]
 
     def part(self, chosen: slice) -> TexelSample:
-        """Some of the texels."""
+        """Return some of the texels."""
         held = {f.name: getattr(self, f.name) for f in fields(self)}
         return TexelSample(
             **{n: v[chosen] if isinstance(v, np.ndarray) else v for n, v in held.items()}
@@ -54,17 +56,17 @@ class TexelSample:
 
     @property
     def shares(self) -> dict[int, float]:
-        """The share of the lay that each of `threads` has."""
+        """The share of the lay of each of `threads`."""
         return {one: float(self.weight @ (self.thread == one)) for one in self.threads}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Target:
-    """Rows of values, and what share each texel has in a row.
+    """Rows of radiance values that a fit is compared with.
 
     values : (rows, VIEWS * LIGHTS, 3) radiance per unit `L_i dwi`
-    weight : (rows,) how much a row counts
-    members : (rows, k) sums of texels' values by these are what a row's values are compared with
+    weight : (rows,) weight of each row
+    members : (rows, k) weights of the texels whose weighted sum is compared with the row
     """
 
     values: Floats
@@ -72,14 +74,17 @@ class Target:
     members: Floats
 
     def row(self, number: int) -> Target:
-        """One of the rows alone."""
+        """Return a target of one of the rows."""
         one = slice(number, number + 1)
         return Target(values=self.values[one], weight=self.weight[one], members=self.members[one])
 
 
 def target_of(fabric: Fabric, texels: TexelSample) -> Target:
-    """Level `far` in the first row; then for each of `texels.threads` the mean of level `weave`
-    over its places. All threads together count as much as the whole."""
+    """Return the target of a fabric: level `far` in the first row, then a row for each thread.
+
+    The row of a thread in `texels.threads` is the mean of level `weave` over the thread's area. All
+    threads together have the same weight as the first row.
+    """
     wi, wo = direction_pairs()
     values, members = [surface.evaluate(fabric, wi, wo, level="far")], [texels.weight]
     shares = []
@@ -87,21 +92,21 @@ def target_of(fabric: Fabric, texels: TexelSample) -> Target:
         mine = texels.weight * (texels.thread == one)
         shares.append(mine.sum())
         values.append(of_thread(fabric, one, wi, wo))
-        # A thread's own radiance is that of what it covers.
+        # A thread's radiance refers to the area that it covers.
         members.append(mine / max(float(mine @ texels.opacity), 1e-9))
     weight = np.array([1.0, *(np.array(shares) / max(sum(shares), 1e-9))])
     return Target(values=np.stack(values), weight=weight, members=np.stack(members))
 
 
 def of_thread(fabric: Fabric, number: int, wi: Floats, wo: Floats) -> Floats:
-    """(n, 3) mean of level `weave` over the places where a thread of map `thread_id` lies."""
+    """(n, 3) mean of level `weave` over the area of the thread `number` of map `thread_id`."""
     rng = np.random.default_rng(0)
     places = rng.random((8192, 2)) * np.array(true_repeat(fabric))
     hit = lookup(fabric, places)
     mine = np.flatnonzero(thread_number(hit.set, hit.thread, len(fabric.threads)) == number)
     if not len(mine):
         return np.zeros_like(wi)
-    # A place matters by its tangent angle alone: even quantiles of it stand for all.
+    # Radiance depends on the tangent angle alone, so uniform quantiles of it represent the area.
     order = mine[np.argsort(hit.angle[mine])]
     chosen = order[((np.arange(PLACES) + 0.5) / PLACES * len(order)).astype(int)]
     total = np.zeros_like(wi)

@@ -1,4 +1,4 @@
-"""Texels of a bake, drawn for a fit."""
+"""Draw texels from a bake for a fit, and cluster them."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from fabricusd.materials.bake_folder import BakedLay, MapSet
 from fabricusd.materials.fit.target import TexelSample
 
 DRAWN, KINDS = 2048, 12
-"""Texels drawn of each lay, and the kinds that they are sorted into, each standing for its share:
-the threads of a repeat at several tangent angles."""
+"""Number of texels drawn from each lay, and of the clusters that represent them: the threads of a
+repeat at several tangent angles."""
 
 LEAST, MOST = 0.02, 8
-"""Share of the texels that a thread must have to be fitted by itself, and how many threads are."""
+"""Smallest share of the texels of a thread that is fitted individually, and most such threads."""
 
 NEEDED = ("base_color", "roughness_along", "roughness_across", "normal", "tangent", "opacity")
 
 
 def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
-    """Kinds of texels of the lay `number`; None where the bake lacks a map that a fit needs."""
+    """Draw and cluster texels of the lay `number`; None if the bake lacks maps that a fit needs."""
     if any(name not in maps.textures for name in NEEDED):
         return None
     tile = next(iter(maps.textures["base_color"]))
@@ -42,7 +42,7 @@ def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
         name: pixels.reshape(-1, pixels.shape[-1])[chosen].astype(np.float64)
         for name, pixels in read.items()
     }
-    # The weave's frame: U and V of the weave as rows, so that fits do not depend on the grain.
+    # Rotate to the weave's frame, with rows U and V, so that fits do not depend on the grain.
     turn = np.eye(3)
     u = lay.matrix[0] / np.linalg.norm(lay.matrix[0])
     turn[:2, :2] = [u, [-u[1], u[0]]]
@@ -79,7 +79,7 @@ def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
 
 
 def resolved(maps: MapSet, lay: BakedLay) -> bool:
-    """Whether a texel belongs to one thread, mostly, and the bake says to which."""
+    """Whether most texels belong to a single thread and the bake has the map `thread_id`."""
     if "thread_id" not in maps.textures or lay.fabric is None:
         return False
     width = read_mip_level(next(iter(maps.textures["thread_id"].values()))).shape[1]
@@ -87,9 +87,11 @@ def resolved(maps: MapSet, lay: BakedLay) -> bool:
 
 
 def _threads(ids: NDArray[np.float32], types: int) -> NDArray[np.int64]:
-    """Numbers of the threads, NO_THREAD for gaps and for threads that hardly show; for all where
-    but one thread shows."""
-    # Bakes of earlier versions have 255 for none.
+    """Return thread numbers, with NO_THREAD for gaps and for threads that hardly show.
+
+    All are NO_THREAD if only one thread shows.
+    """
+    # Earlier versions stored 255 for texels without a thread.
     numbers = np.where((ids >= 0) & (ids < 2 * types), ids, NO_THREAD).astype(np.int64)
     shown, counts = np.unique(numbers[numbers != NO_THREAD], return_counts=True)
     kept = shown[counts >= LEAST * len(ids)][:MOST]
@@ -99,13 +101,13 @@ def _threads(ids: NDArray[np.float32], types: int) -> NDArray[np.int64]:
 def _kinds(
     rows: NDArray[np.float64], most: int = KINDS
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(n, c) texels -> at most `most` means of like ones, and their shares."""
+    """Cluster (n, c) texels into at most `most` groups; return the groups' means and shares."""
     different, counts = np.unique(np.round(rows, 2), axis=0, return_counts=True)
     if len(different) <= most:
-        # Where a texel spans whole repeats all texels are alike, and one stands for them.
+        # If a texel spans whole repeats, all texels are alike and one represents them.
         return different, counts / counts.sum()
     with warnings.catch_warnings():
-        # A kind may stay empty; its share is then 0.
+        # A cluster may stay empty; it is dropped below.
         warnings.simplefilter("ignore", UserWarning)
         means, kind = kmeans2(rows, most, minit="++", seed=1)
     counts = np.bincount(kind, minlength=most)
@@ -113,7 +115,7 @@ def _kinds(
 
 
 def mean_texel(maps: MapSet, number: int) -> dict[str, tuple[float, ...]]:
-    """The mean of each map that there is over the texels of a lay; directions normalised."""
+    """Return the mean of each available map over the texels of a lay; directions are normalised."""
     from fabricusd.materials.networks.surfaces import MAPS
 
     tile = next(iter(next(iter(maps.textures.values()))), 0) if maps.textures else 0

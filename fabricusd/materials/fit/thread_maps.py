@@ -1,8 +1,8 @@
-"""Textures with each thread's own fit in them: colour, roughness and the tint of the reflection.
+"""Write textures that include each thread's own fit: colour, roughness and tint of the reflection.
 
-At the finest level a texel takes the factors of the thread in map `thread_id`; a coarser level has
-the mean of the finer level's colours, and for roughness the baked level times the mean factor, so
-that what the bake knows about slopes stays.
+At the finest level a texel takes the factors of its thread in the map `thread_id`. Coarser levels
+of a colour are means of the finer level. Coarser levels of a roughness are the baked level times
+the mean factor, which preserves the effect of slopes on the baked roughness.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fabricusd.materials.bake_folder import MapSet
 
 Floats = NDArray[np.float64]
 Factors = Mapping[int, Floats]
-"""By number of a thread, and of none: (8,) as `fit.thread_factors` gives them."""
+"""(8,) factors by thread number, including NO_THREAD, as returned by `fit.thread_factors`."""
 
 COLUMNS = {
     "base_color": slice(0, 3),
@@ -30,13 +30,13 @@ COLUMNS = {
     "roughness_across": slice(4, 5),
     "specular_tint": slice(5, 8),
 }
-"""Which of the factors a map takes."""
+"""The factors that each map takes."""
 
 
 def write_thread_maps(maps: MapSet, factors: Mapping[int, Factors], folder: Path) -> MapSet:
-    """`maps` with the textures of COLUMNS written anew into `folder`.
+    """Write the textures of COLUMNS with the factors applied to `folder`; return the new map set.
 
-    factors : by number of the lay; lays that are not there stay as they are
+    factors : by lay number; lays that are not listed stay unchanged
     """
     textures = {name: dict(files) for name, files in maps.textures.items()}
     textures["specular_tint"] = {}
@@ -53,7 +53,7 @@ def write_thread_maps(maps: MapSet, factors: Mapping[int, Factors], folder: Path
 def _rows(
     maps: MapSet, tile: int, factors: Mapping[int, Factors]
 ) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
-    """(h, w) which row of the (m, 8) table each texel takes."""
+    """(h, w) index of each texel's row in a table of factors, and the (m, 8) table."""
     ids = read_mip_level(maps.textures["thread_id"][tile])[..., 0]
     lays = read_mip_level(maps.textures["lay"][tile])[..., 0] if "lay" in maps.textures else 0 * ids
     rows, table = np.zeros(ids.shape, np.uint16), [np.ones(8)]
@@ -70,7 +70,10 @@ def _rows(
 def _write(
     target: Path, source: Path | None, rows: NDArray[np.uint16], factors: NDArray[np.float32]
 ) -> None:
-    """One texture with all its levels; source : None for a map that the bake has not, all 1."""
+    """Write one texture with all its mip levels.
+
+    source : the baked texture; None for a map that the bake lacks, taken as 1 everywhere
+    """
     color = factors.shape[1] == 3
     factor = factors[rows]
     levels: list[NDArray[np.float16]] = []
@@ -97,6 +100,6 @@ def _whole(level: NDArray[Any]) -> Iterator[NDArray[Any]]:
 
 
 def _halved(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(h/2, w/2, c) means of four."""
+    """(h/2, w/2, c) means of 2 x 2 pixels."""
     h, w, c = pixels.shape
     return np.asarray(pixels.reshape(h // 2, 2, w // 2, 2, c).mean(axis=(1, 3)), np.float32)

@@ -1,1 +1,1 @@
-"""Networks of shading nodes."""
+"""Build networks of shading nodes for each surface model."""

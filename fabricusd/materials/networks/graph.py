@@ -1,6 +1,6 @@
-"""A shading network, before it is written as USD prims or as a MaterialX document.
+"""Represent a shading network independently of its file format.
 
-One description, so that the prims and the document cannot differ. `write_usd` and `mtlx` write it.
+`write_usd` writes it as USD prims and `mtlx` as a MaterialX document, so the two cannot differ.
 """
 
 from __future__ import annotations
@@ -11,7 +11,10 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Value:
-    """A constant. kind : a MaterialX type, "float", "color3", "vector3", "boolean", ..."""
+    """A constant.
+
+    kind : a MaterialX type, "float", "color3", "vector3", "boolean", ...
+    """
 
     kind: str
     value: float | int | bool | str | tuple[float, ...]
@@ -19,7 +22,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Link:
-    """Another node's output."""
+    """A connection to another node's output."""
 
     node: str
     output: str = "out"
@@ -27,14 +30,17 @@ class Link:
 
 @dataclass(frozen=True)
 class Parameter:
-    """An input of the material itself, which a user may turn."""
+    """A connection to an input of the material, which users can adjust."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class Texture:
-    """A file, `<UDIM>` standing for the tile. color : linear Rec. 709 colour, not data."""
+    """A texture file; `<UDIM>` in its name stands for the tile's number.
+
+    color : whether the file holds linear Rec. 709 colour rather than data
+    """
 
     path: Path
     color: bool = False
@@ -45,10 +51,10 @@ Source = Value | Link | Parameter | Texture
 
 @dataclass(frozen=True)
 class Node:
-    """One node.
+    """A shading node.
 
-    category, kind : as MaterialX spells them, `<multiply type="color3">`
-    identifier : of the node definition, the `info:id` of a USD prim
+    category, kind : the node's category and type in MaterialX, as in `<multiply type="color3">`
+    identifier : name of the node definition, the `info:id` of a USD prim
     """
 
     name: str
@@ -60,10 +66,10 @@ class Node:
 
 @dataclass(frozen=True)
 class Graph:
-    """Nodes that end in a surface.
+    """A network of nodes that ends in a surface.
 
-    terminal : name of the surface node; output : its output
-    context : of the material's output in USD, "" for the universal one
+    terminal : name of the surface node; output : name of its output
+    context : render context of the material's output in USD, "" for the universal one
     """
 
     nodes: tuple[Node, ...]
@@ -72,7 +78,7 @@ class Graph:
     context: str
 
     def node(self, name: str) -> Node:
-        """The node of that name."""
+        """Return the node of that name."""
         return next(n for n in self.nodes if n.name == name)
 
 
@@ -83,7 +89,7 @@ class Builder:
         self.nodes: dict[str, Node] = {}
 
     def add(self, name: str, category: str, kind: str, identifier: str, **inputs: Source) -> Link:
-        """A node, added once for each name."""
+        """Add a node unless there is one of that name; return a link to it."""
         output = {"UsdPrimvarReader_float2": "result", "UsdUVTexture": "rgb"}.get(identifier, "out")
         self.nodes.setdefault(name, Node(name, category, kind, identifier, inputs))
         return Link(name, output)
@@ -91,7 +97,11 @@ class Builder:
     def math(
         self, name: str, category: str, kind: str, one: Source, two: Source, *, short: bool = False
     ) -> Link:
-        """A node of two inputs; a float second input of a longer type is the `FA` definition."""
+        """Add a node of two inputs.
+
+        The `FA` node definition is used if `short` or if the second input is a float while the
+        node's type is not.
+        """
         short = short or (isinstance(two, Value) and two.kind == "float" and kind != "float")
         suffix = f"{kind}FA" if short else kind
         return self.add(name, category, kind, f"ND_{category}_{suffix}", in1=one, in2=two)

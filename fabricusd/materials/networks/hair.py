@@ -1,8 +1,8 @@
-"""The threads themselves for renderers with hair: MaterialX's `chiang_hair_bsdf` [Chiang2016].
+"""Approximate the threads by hair: MaterialX's `chiang_hair_bsdf` [Chiang2016].
 
 Weft and warp are two hair scatterers along their own directions, mixed by the area that they cover.
-The lobes' variances, the index and the directions are the thread's own; there is no shadowing and
-masking between threads, and the textures give opacity alone. It is not fitted.
+The lobes' variances, the index of refraction and the directions are those of the threads. Threads
+do not shadow or mask one another, and the textures provide opacity only. The surface is not fitted.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from fabricusd.materials.networks.graph import Builder, Graph, Link, Node, Sourc
 from fabricusd.materials.networks.surfaces import Inputs, Maps, one
 
 AZIMUTHAL = 0.2
-"""Scale of the logistic distribution in azimuth [rad]; the thread model has no such width."""
+"""Scale of the logistic distribution in azimuth [rad]; the thread model has no azimuthal width."""
 
 
 def hair(maps: Inputs, opaque: bool, lay: BakedLay) -> Graph:
-    """A surface of two hair scatterers; `lay.fabric` must be known."""
+    """Return a surface of two hair scatterers; `lay.fabric` must not be None."""
     fabric = lay.fabric
     assert fabric is not None
     b = Builder()
@@ -61,7 +61,7 @@ def _scatterer(b: Builder, noun: str, thread: Thread, direction: np.ndarray) -> 
         "tint_TT": Value("color3", (1.0, 1.0, 1.0)),
         "tint_TRT": black,
         "ior": one(thread.ior),
-        # Half the sum of both inclinations has the thread's widths; the lobes' are of the sum.
+        # The thread's widths are those of half the sum of the inclinations; hair lobes use the sum.
         "roughness_R": Value("vector2", ((2.0 * thread.gamma_surface) ** 2, AZIMUTHAL)),
         "roughness_TT": Value("vector2", ((2.0 * thread.gamma_volume) ** 2, 1.0)),
         "roughness_TRT": Value("vector2", ((2.0 * thread.gamma_volume) ** 2, 1.0)),
@@ -73,7 +73,7 @@ def _scatterer(b: Builder, noun: str, thread: Thread, direction: np.ndarray) -> 
 
 
 def absorption(color: tuple[float, ...]) -> tuple[float, float, float]:
-    """Absorption that gives hair of azimuthal roughness 0.3 that colour, [Chiang2016] eq. 9."""
+    """Convert a colour to the absorption of hair of azimuthal roughness 0.3, [Chiang2016] eq. 9."""
     x = 0.3
     scale = 5.969 - 0.215 * x + 2.532 * x**2 - 10.73 * x**3 + 5.574 * x**4 + 0.245 * x**5
     found = (np.log(np.clip(color, 1e-3, 0.99)) / scale) ** 2

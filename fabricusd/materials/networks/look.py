@@ -1,4 +1,4 @@
-"""What a material adds to its textures: the factors and constants that a fit finds."""
+"""Hold the factors and constants that a fit adds to a material's textures."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Look:
-    """Parameters of one surface model over one set of textures.
+    """Parameters of one surface model for one set of textures.
 
-    base_color_scale : (3,) factor on map `base_color`
-    specular_ior : of the reflecting layer; a fit, not the thread's: threads reflect more than a
-        smooth dielectric
+    base_color_scale : (3,) factor on the map `base_color`
+    specular_ior : index of refraction of the reflecting layer. It is fitted and differs from the
+        thread's: threads reflect more than a smooth dielectric
     specular_tint : (3,) factor on the reflection
-    smooth_scale, rough_scale : factors on maps `roughness_along` and `roughness_across`, whose
+    smooth_scale, rough_scale : factors on the maps `roughness_along` and `roughness_across`, whose
         squares are microfacet alphas
-    fuzz_weight, fuzz_roughness, fuzz_color (3,) : the layer on top
+    fuzz_weight, fuzz_roughness, fuzz_color (3,) : the top layer
     """
 
     base_color_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)

@@ -1,6 +1,6 @@
-"""From textures and a look to a shading network, for each surface model.
+"""Build the shading network of each surface model from textures and a look.
 
-To add a model: a function that returns its `Graph`, and its name in GRAPHS.
+To add a model, write a function that returns its `Graph` and list it in GRAPHS.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from fabricusd.materials.networks.graph import (
 from fabricusd.materials.networks.look import Look
 
 Inputs = Mapping[str, Texture | Value]
-"""For each map of MAPS its texture, or a constant. `normal` is coded, (n + 1)/2, as every reader of
-normal maps expects; the others are what the bake holds."""
+"""A texture or a constant for each map of MAPS. `normal` is encoded as (n + 1)/2, as readers of
+normal maps expect; the other maps hold the values of the bake."""
 
 MAPS = {
     "base_color": "color3",
@@ -35,7 +35,7 @@ MAPS = {
 """Maps that a surface reads, and their types."""
 
 NO_TINT = Value("color3", (1.0, 1.0, 1.0))
-"""What stands for map `specular_tint`, which only fits to threads have."""
+"""Replaces the map `specular_tint`, which exists only if threads are fitted."""
 
 PARAMETERS = {
     "base_color_scale": "color3",
@@ -51,28 +51,28 @@ PARAMETERS = {
 
 
 def parameter_values(look: Look, prefix: str = "") -> dict[str, Value]:
-    """The material's own inputs."""
+    """Return the inputs of the material itself."""
     return {prefix + name: Value(kind, getattr(look, name)) for name, kind in PARAMETERS.items()}
 
 
 def one(value: float) -> Value:
-    """A number as a source."""
+    """Return a number as a source."""
     return Value("float", value)
 
 
 class Maps:
-    """The image nodes of a MaterialX network, made when they are asked for."""
+    """Adds the image nodes of a MaterialX network on demand."""
 
     def __init__(self, builder: Builder, maps: Inputs) -> None:
         self.builder, self.maps = builder, maps
 
     def __call__(self, name: str) -> Source:
-        """An image node's output, or the constant that stands in for it."""
+        """Return an image node's output, or the constant that replaces the map."""
         source, kind = self.maps[name], MAPS[name]
         if isinstance(source, Value):
             return source
         st = self.builder.add("st", "texcoord", "vector2", "ND_texcoord_vector2")
-        # A graph's nodes and inputs share their names.
+        # Nodes and inputs of a graph share one name space.
         node = f"{name}_map" if name in PARAMETERS else name
         return self.builder.add(
             node, "image", kind, f"ND_image_{kind}",
@@ -81,7 +81,7 @@ class Maps:
 
 
 def _alphas(b: Builder, read: Maps) -> tuple[Link, Link]:
-    """Microfacet alphas along the smoother and the rougher axis, at most 1."""
+    """Return the microfacet alphas along the smoother and the rougher axis, at most 1."""
     found = []
     for name, texture in (("smooth", "roughness_along"), ("rough", "roughness_across")):
         scaled = b.math(
@@ -93,15 +93,18 @@ def _alphas(b: Builder, read: Maps) -> tuple[Link, Link]:
 
 
 def _anisotropy(b: Builder, smooth: Link, rough: Link) -> Link:
-    """1 - smooth/rough."""
+    """Return 1 - smooth/rough."""
     safe = b.math("rough_floor", "max", "float", rough, one(1e-6))
     ratio = b.math("alpha_ratio", "divide", "float", smooth, safe)
     return b.math("anisotropy", "subtract", "float", one(1.0), ratio)
 
 
 def _frame(b: Builder, read: Maps) -> dict[str, Source]:
-    """Normal and tangent in the world; the tangent runs along the rougher axis, so that is the
-    map's direction turned by a quarter."""
+    """Return the normal and the tangent in world space.
+
+    The tangent is the rougher axis, so it is the direction in the map `tangent` rotated by a
+    quarter turn.
+    """
     space = Value("string", "world")
     normal = b.add(
         "world_normal", "normalmap", "vector3", "ND_normalmap_float", **{"in": read("normal")}
@@ -149,7 +152,7 @@ def _finished(b: Builder, node: Node) -> Graph:
 
 
 def openpbr(maps: Inputs, opaque: bool) -> Graph:
-    """OpenPBR 1.1: base, anisotropic reflection with a tangent map, fuzz, opacity, thin wall."""
+    """OpenPBR 1.1: a thin-walled base, anisotropic reflection with a tangent map, fuzz, opacity."""
     b = Builder()
     read = Maps(b, maps)
     smooth, rough = _alphas(b, read)
@@ -185,7 +188,7 @@ def openpbr(maps: Inputs, opaque: bool) -> Graph:
 
 
 def standard_surface(maps: Inputs, opaque: bool) -> Graph:
-    """Autodesk Standard Surface."""
+    """Autodesk Standard Surface with the same layers."""
     b = Builder()
     read = Maps(b, maps)
     smooth, rough = _alphas(b, read)
@@ -220,8 +223,10 @@ def standard_surface(maps: Inputs, opaque: bool) -> Graph:
 
 
 def gltf_pbr(maps: Inputs, opaque: bool) -> Graph:
-    """glTF PBR with KHR_materials_anisotropy and _sheen: alpha along the tangent is
-    `mix(roughness^2, 1, strength^2)`."""
+    """glTF PBR with KHR_materials_anisotropy and KHR_materials_sheen.
+
+    The alpha along the tangent is `mix(roughness^2, 1, strength^2)`.
+    """
     b = Builder()
     read = Maps(b, maps)
     smooth, rough = _alphas(b, read)
@@ -260,11 +265,11 @@ GRAPHS: dict[str, Callable[[Inputs, bool], Graph]] = {
     "standard_surface": standard_surface,
     "gltf_pbr": gltf_pbr,
 }
-"""MaterialX surfaces that a look can be written as."""
+"""MaterialX surfaces in which a look can be written."""
 
 
 def preview(maps: Inputs, look: Look, opaque: bool) -> Graph:
-    """UsdPreviewSurface: the look's factors sit in the texture readers, which is all it has."""
+    """UsdPreviewSurface; the texture readers' scales are the only place for the look's factors."""
     b = Builder()
     st = b.add(
         "Preview_st", "", "", "UsdPrimvarReader_float2", varname=Value("string", "st"),
@@ -298,7 +303,7 @@ def preview(maps: Inputs, look: Look, opaque: bool) -> Graph:
 
 
 def _scaled(value: Value, scale: tuple[float, ...], bias: float) -> Value:
-    """A constant as a reader's scale and bias would give it."""
+    """Apply a texture reader's scale and bias to a constant."""
     held = value.value
     if isinstance(held, tuple):
         return Value(value.kind, tuple(x * k + bias for x, k in zip(held, scale, strict=False)))

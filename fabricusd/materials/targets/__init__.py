@@ -1,13 +1,13 @@
-"""What a bake is turned into besides its look: a registry, one module a target.
+"""Register the targets that a bake can be written as besides its look; each target is a module.
 
-To add one: a module in this folder with the functions below, and its line in `TARGETS`. The command
-line's options come from here, so this file imports no USD.
+To add a target, write a module in this folder with the functions below and list it in `TARGETS`.
+The command line's options are generated from this file, so it imports no USD.
 
-    check(where, clobber)  FabricError, before any work, for what could not be written after it
-    folder(look, where)    the folder that gets its files, which is locked meanwhile
-    write(job, where)      the files that were made
+    check(where, clobber)  raise FabricError, before any work, if the target could not be written
+    folder(look, where)    return the folder that the target writes to, so that it can be locked
+    write(job, where)      write the target and return its files
 
-`where` is what the option was given, None for one that is given nothing.
+`where` is the option's value, None for a switch.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """A form that a bake is written in when it is asked for.
+    """A form in which a bake is written on request.
 
-    metavar : what the option is given, "" for a switch
-    module : in this folder
+    metavar : placeholder of the option's value, "" for a switch
+    module : name of its module in this folder
     """
 
     name: str
@@ -37,32 +37,33 @@ class Target:
 
     @property
     def functions(self) -> Any:
-        """Its module."""
+        """The target's module."""
         return import_module(f"{__name__}.{self.module}")
 
 
 TARGETS = (
     Target(
-        name="usdz", metavar="FILE", module="package", help="also package the look in one file"
+        name="usdz", metavar="FILE", module="package", help="also package the look as a USDZ file"
     ),
-    Target(name="osl", module="osl", help="also each fabric's threads as an OSL shader"),
+    Target(name="osl", module="osl", help="also write each fabric's threads as an OSL shader"),
     Target(
         name="u3m", metavar="FOLDER", module="u3m",
-        help="also a U3M swatch of each fabric, for garment CAD",
+        help="also write a U3M swatch of each fabric, for garment CAD",
     ),
 )  # fmt: skip
 
 Wanted = Mapping[str, Path | None]
-"""Names of targets that are asked for -> where."""
+"""Values of `where` by the name of each requested target."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """What a target is made of.
+    """The input of a target.
 
-    look : the layer, which has been written
-    fabrics : those of the bake by their names
-    fitted : whether parameters are sought; otherwise textures stand as they are
+    look : the look's layer, which exists already
+    fabrics : fabrics of the bake by name
+    fitted : whether parameters are fitted; otherwise textures are used unchanged
+    clobber : whether existing files may be overwritten
     """
 
     look: Path
@@ -72,5 +73,5 @@ class Job:
 
 
 def chosen(wanted: Wanted) -> list[tuple[Target, Path | None]]:
-    """The targets that are asked for, in the order of the registry."""
+    """Return the requested targets in the order of the registry."""
     return [(target, wanted[target.name]) for target in TARGETS if target.name in wanted]

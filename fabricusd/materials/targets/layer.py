@@ -1,7 +1,7 @@
-"""The look layer: a garment, by reference, with the variant set `fabricLook` over it.
+"""Write the look's layer: it references a garment and adds the variant set `fabricLook`.
 
-Variants are stronger than references and weaker than sublayers. The garment is therefore
-referenced, prim by root prim, and not a sublayer, whose own material bindings would win.
+Variants are stronger than references but weaker than sublayers. The layer therefore references each
+root prim of the garment instead of sublayering its file, whose own material bindings would win.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
 from fabricusd.files import whole_file
 from fabricusd.materials.bake_folder import BakedLay, MapSet
+from fabricusd.materials.bound_prims import BoundPrim, BoundScene, NewUV
 from fabricusd.materials.networks.graph import Graph, Value
 from fabricusd.materials.targets.paths import asset_path
 from fabricusd.materials.targets.write_usd import write_material
-from fabricusd.materials.wearers import Dressed, NewUV, Wearer
 from fabricusd.schema import export, write_binding, write_fabric
 from fabricusd.schema.access import BINDING_API
 from fabricusd.schema.names import prim_name
@@ -32,14 +32,14 @@ from fabricusd.schema.source import usd_errors
 
 VARIANT_SET = "fabricLook"
 VARIANTS = ("baked", "procedural", "off")
-"""Textures; the fabric itself, with constants for tools that do not know it; neither."""
+"""Textures; the fabric itself, with constants for tools that cannot render it; neither."""
 
 SCOPE = "FabricLooks"
 
 
 @dataclass(frozen=True, kw_only=True)
 class MaterialRecipe:
-    """A material to be written: its name, networks by name prefix, and own inputs."""
+    """A material to write: its name, its networks with their name prefixes, and its inputs."""
 
     name: str
     graphs: tuple[tuple[str, Graph], ...]
@@ -47,18 +47,18 @@ class MaterialRecipe:
 
 
 Recipes = Mapping[tuple[str, int, str], MaterialRecipe]
-"""By garment, number of the lay and variant, "baked" or "procedural"."""
+"""Materials by garment, lay number and variant, "baked" or "procedural"."""
 
 
 def write_baked_look(
     path: Path, sets: Sequence[MapSet], recipes: Recipes, custom: Mapping[str, Any], up_axis: str
 ) -> None:
-    """A look over the meshes that the bake wrote, for garments of any file."""
+    """Write a look for the meshes that the bake wrote, whatever the scene's file format was."""
     with _new_layer(path, custom, up_axis, 1.0) as stage:
         root = UsdGeom.Xform.Define(stage, "/Garment").GetPrim()
         stage.SetDefaultPrim(root)
         Usd.ModelAPI(root).SetKind("component")
-        wearers = []
+        bound = []
         for one in sets:
             mesh = root.GetPath().AppendChild(prim_name(one.name))
             prim = stage.OverridePrim(mesh)
@@ -70,22 +70,23 @@ def write_baked_look(
                     str(one.mesh),
                     f"has {len(places)} parts; the manifest says {len(one.lays)} lays, bake again",
                 )
-            wearers += [
-                Wearer(path=place, maps=one, lay=k, worn=False) for k, place in enumerate(places)
+            bound += [
+                BoundPrim(path=place, maps=one, lay=k, binds_fabric=False)
+                for k, place in enumerate(places)
             ]
-        _dress(stage, path, wearers, (), recipes)
+        _bind_materials(stage, path, bound, (), recipes)
 
 
 def write_scene_look(
-    path: Path, scene: Path, dressed: Dressed, recipes: Recipes, custom: Mapping[str, Any]
+    path: Path, scene: Path, bound: BoundScene, recipes: Recipes, custom: Mapping[str, Any]
 ) -> None:
-    """A look over the prims of a scene; the scene's own file is not touched.
+    """Write a look for the prims of a scene; the scene's file is not modified.
 
-    Moved UVs go into `<name>.uv.usdc` beside the layer.
+    Moved UVs are written to `<name>.uv.usdc` beside the layer.
     """
-    source = dressed.stage
-    if dressed.uv:
-        _write_uv(path.with_suffix(".uv.usdc"), dressed.uv)
+    source = bound.stage
+    if bound.uv:
+        _write_uv(path.with_suffix(".uv.usdc"), bound.uv)
     axis, metres = UsdGeom.GetStageUpAxis(source), UsdGeom.GetStageMetersPerUnit(source)
     with _new_layer(path, custom, axis, metres) as stage:
         for prim in source.GetPseudoRoot().GetAllChildren():
@@ -97,18 +98,18 @@ def write_scene_look(
             if source.HasAuthoredMetadata(name):
                 stage.SetMetadata(name, source.GetMetadata(name))
         if not stage.HasDefaultPrim():
-            first = Sdf.Path(dressed.wearers[0].path).GetPrefixes()[0]
+            first = Sdf.Path(bound.prims[0].path).GetPrefixes()[0]
             stage.SetDefaultPrim(stage.GetPrimAtPath(first))
-        _dress(stage, path, dressed.wearers, dressed.uv, recipes)
+        _bind_materials(stage, path, bound.prims, bound.uv, recipes)
 
 
 @contextmanager
 def _new_layer(
     path: Path, custom: Mapping[str, Any], up_axis: str, metres: float
 ) -> Iterator[Usd.Stage]:
-    """A stage whose layer becomes `path` when the block succeeds.
+    """Open a stage whose layer becomes `path` when the block succeeds.
 
-    The layer is in `path`'s folder from the start, so relative paths resolve while it is made.
+    The layer is in the folder of `path` from the start, so that relative paths resolve meanwhile.
     """
     with usd_errors(str(path), "written"), whole_file(path) as temporary:
         layer = Sdf.Layer.CreateNew(str(temporary))
@@ -116,19 +117,19 @@ def _new_layer(
         UsdGeom.SetStageUpAxis(stage, up_axis)
         UsdGeom.SetStageMetersPerUnit(stage, metres)
         yield stage
-        layer.documentation = f"Look of a baked fabric, made by fabricusd {__version__}"
+        layer.documentation = f"Look of a baked fabric, written by fabricusd {__version__}"
         layer.customLayerData = {"fabricusd": dict(custom)}
         layer.Save()
 
 
-def _dress(
-    stage: Usd.Stage, path: Path, wearers: Sequence[Wearer], uv: Sequence[NewUV], recipes: Recipes
+def _bind_materials(
+    stage: Usd.Stage, path: Path, bound: Sequence[BoundPrim], uv: Sequence[NewUV], recipes: Recipes
 ) -> None:
-    """Materials and fabrics under each root, and the variants that bind them."""
-    roots = {str(Sdf.Path(w.path).GetPrefixes()[0]) for w in wearers}
+    """Write materials and fabrics under each root prim, and the variants that bind them."""
+    roots = {str(Sdf.Path(w.path).GetPrefixes()[0]) for w in bound}
     for root in sorted(roots):
         prim = stage.GetPrimAtPath(root)
-        mine = [w for w in wearers if Sdf.Path(w.path).HasPrefix(root)]
+        mine = [w for w in bound if Sdf.Path(w.path).HasPrefix(root)]
         scope = Sdf.Path(root).AppendChild(SCOPE)
         UsdGeom.Scope.Define(stage, scope)
         _write_looks(stage, scope, mine, recipes, path.parent)
@@ -137,53 +138,53 @@ def _dress(
             variants.AddVariant(name)
             variants.SetVariantSelection(name)
             with variants.GetVariantEditContext():
-                for wearer in mine:
-                    _fill(stage, name, wearer, scope, recipes)
+                for one in mine:
+                    _fill(stage, name, one, scope, recipes)
                 if name == "baked":
                     _refer_uv(stage, path, [u for u in uv if Sdf.Path(u.path).HasPrefix(root)])
         variants.SetVariantSelection("baked")
 
 
 def _write_looks(
-    stage: Usd.Stage, scope: Sdf.Path, wearers: Sequence[Wearer], recipes: Recipes, folder: Path
+    stage: Usd.Stage, scope: Sdf.Path, bound: Sequence[BoundPrim], recipes: Recipes, folder: Path
 ) -> None:
-    for wearer in wearers:
+    for one in bound:
         for variant in ("baked", "procedural"):
-            recipe = recipes[wearer.maps.name, wearer.lay, variant]
+            recipe = recipes[one.maps.name, one.lay, variant]
             where = scope.AppendChild(recipe.name)
             if not stage.GetPrimAtPath(where):
                 write_material(stage, where, list(recipe.graphs), dict(recipe.parameters), folder)
-        fabric = wearer.maps.lays[wearer.lay].fabric
-        if fabric is not None and not wearer.worn:
+        fabric = one.maps.lays[one.lay].fabric
+        if fabric is not None and not one.binds_fabric:
             where = scope.AppendChild(prim_name(fabric.name))
             if not stage.GetPrimAtPath(where):
                 write_fabric(stage, where, fabric)
 
 
 def _fill(
-    stage: Usd.Stage, variant: str, wearer: Wearer, scope: Sdf.Path, recipes: Recipes
+    stage: Usd.Stage, variant: str, one: BoundPrim, scope: Sdf.Path, recipes: Recipes
 ) -> None:
-    """One prim in one variant: `off` is the garment as any tool shows it without fabrics."""
-    prim = stage.OverridePrim(wearer.path)
-    lay = wearer.maps.lays[wearer.lay]
+    """Write one prim in one variant; `off` is the garment as tools show it without fabrics."""
+    prim = stage.OverridePrim(one.path)
+    lay = one.maps.lays[one.lay]
     if variant == "procedural":
-        if not wearer.worn and lay.fabric is not None:
+        if not one.binds_fabric and lay.fabric is not None:
             write_binding(prim, scope.AppendChild(prim_name(lay.fabric.name)), binding_of(lay))
-    elif wearer.worn:
+    elif one.binds_fabric:
         prim.RemoveAppliedSchema(BINDING_API)
         prim.CreateRelationship("fabric:binding", custom=False).SetTargets([])
     if variant != "off":
-        recipe = recipes[wearer.maps.name, wearer.lay, variant]
+        recipe = recipes[one.maps.name, one.lay, variant]
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(
             UsdShade.Material(stage.GetPrimAtPath(scope.AppendChild(recipe.name))),
             UsdShade.Tokens.strongerThanDescendants
-            if wearer.forced
+            if one.forced
             else UsdShade.Tokens.fallbackStrength,
         )
 
 
 def binding_of(lay: BakedLay) -> Binding:
-    """The binding whose weave coordinates are `lay.matrix @ uv + lay.offset`."""
+    """Return the binding whose weave coordinates are `lay.matrix @ uv + lay.offset`."""
     assert lay.fabric is not None
     scale = np.linalg.norm(lay.matrix, axis=1)
     return Binding(
@@ -195,7 +196,7 @@ def binding_of(lay: BakedLay) -> Binding:
 
 
 def _write_uv(path: Path, uv: Sequence[NewUV]) -> None:
-    """A crate with one root prim a mesh, holding primvar `st`."""
+    """Write a crate file with one root prim per mesh, which holds the primvar `st`."""
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     stage = Usd.Stage.Open(layer)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)

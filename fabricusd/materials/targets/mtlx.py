@@ -1,4 +1,4 @@
-"""Shading networks as a MaterialX 1.39 document."""
+"""Write shading networks as a MaterialX 1.39 document."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from fabricusd.materials.targets.paths import asset_path
 def write_mtlx(
     path: Path, materials: Sequence[tuple[str, Graph, dict[str, Value]]], *, clobber: bool = True
 ) -> None:
-    """A document with one `surfacematerial` for each (name, graph, parameters).
+    """Write a document with a `surfacematerial` for each (name, graph, parameters).
 
-    A material's parameters are inputs of its node graph; the surface stands outside of it.
+    A material's parameters are inputs of its node graph; its surface node is outside the graph.
     """
     root = ElementTree.Element("materialx", version="1.39", colorspace="lin_rec709")
     for name, graph, parameters in materials:
@@ -40,7 +40,7 @@ def _add(
     for node in graph.nodes:
         if node is not surface:
             element = ElementTree.SubElement(inside, node.category, name=node.name, type=node.kind)
-            # A definition of its own name, where the inputs' types do not tell which is meant.
+            # State the node definition if the types of the inputs do not determine it.
             if node.identifier.endswith("FA"):
                 element.set("nodedef", node.identifier)
             for key, source in node.inputs.items():
@@ -70,7 +70,7 @@ def _add(
 
 
 def _used(graph: Graph) -> set[str]:
-    """Parameters that nodes other than the surface read."""
+    """Return the parameters that nodes other than the surface use."""
     return {
         source.name
         for node in graph.nodes

@@ -1,4 +1,4 @@
-"""The thread model as an OSL shader, with one fabric's tables as its parameters."""
+"""Write the thread model as an OSL shader, with a fabric's tables as its parameters."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ SOURCE = Path(__file__).resolve().parent / "blender" / "fabric_thread.osl"
 
 
 def check(where: None, clobber: bool) -> None:
-    """Shaders lie beside the look, which is checked."""
+    """Check nothing: shaders are written beside the look, which is checked already."""
 
 
 def folder(look: Path, where: None) -> Path:
-    """The look's."""
+    """Return the look's folder."""
     return look.parent
 
 
 def write(job: Job, where: None) -> list[Path]:
-    """A shader for each fabric, beside the look."""
+    """Write a shader for each fabric beside the look."""
     made = []
     for name, fabric in job.fabrics.items():
         made.append(job.look.with_name(f"{job.look.stem}.{name}.osl"))
@@ -35,21 +35,22 @@ def write(job: Job, where: None) -> list[Path]:
 
 
 def write_osl(fabric: Fabric, path: Path) -> None:
-    """The shader for `fabric`, whole or not at all.
+    """Write the shader for `fabric` atomically.
 
-    Raises FabricError where a thread's model is not `microcylinder`, the one the shader has.
+    Raises FabricError if a thread's model is not `microcylinder`, the only one in the shader.
     """
     with whole_file(path) as temporary:
         temporary.write_text(osl_source(fabric), "utf-8")
 
 
 def osl_source(fabric: Fabric) -> str:
-    """Text of the shader: the tables of `fabric` as array parameters with defaults."""
+    """Return the shader's text, with the tables of `fabric` as defaults of array parameters."""
     for name, thread in fabric.threads.items():
         if fabric.model_of(thread) != "microcylinder":
             raise FabricError(
                 f"thread '{name}'",
-                f"has the model '{fabric.model_of(thread)}'; the OSL shader has 'microcylinder'",
+                f"has the model '{fabric.model_of(thread)}'; it must be 'microcylinder' for the "
+                "OSL shader",
             )
     nodes = curve_nodes(fabric, DEFAULT)
     threads = fabric.thread_list
@@ -75,7 +76,7 @@ def osl_source(fabric: Fabric) -> str:
 
 
 def _array(kind: str, name: str, values: Iterable[Any]) -> str:
-    # Blender takes an array of one for a number.
+    # Blender treats an array of length one as a number.
     words = [f"{v:.9g}" if kind == "float" else str(int(v)) for v in values]
     words *= 2 if len(words) == 1 else 1
     return f"    {kind} {name}[{len(words)}] = {{{', '.join(words)}}},\n"

@@ -1,4 +1,4 @@
-"""A look in one file: USDZ."""
+"""Package a look as a single USDZ file."""
 
 from __future__ import annotations
 
@@ -13,34 +13,34 @@ from fabricusd.materials.targets import Job
 
 
 def check(where: Path, clobber: bool) -> None:
-    """Another suffix, and what cannot be written."""
+    """Raise FabricError if the suffix is not .usdz or the file cannot be written."""
     if where.suffix != ".usdz":
-        raise FabricError(f"--usdz '{where}'", "has another suffix; it must be .usdz")
+        raise FabricError(f"--usdz '{where}'", f"has the suffix '{where.suffix}'; it must be .usdz")
     require_writable(where, clobber=clobber)
 
 
 def folder(look: Path, where: Path) -> Path:
-    """The package's."""
+    """Return the package's folder."""
     return where.parent
 
 
 def write(job: Job, where: Path) -> list[Path]:
-    """The package alone."""
+    """Write the package."""
     write_usdz(job.look, where, clobber=job.clobber)
     return [where]
 
 
 def write_usdz(look: Path, path: Path, *, clobber: bool = True) -> None:
-    """Package the variant `baked` of a look with its textures, whole or not at all.
+    """Package the variant `baked` of a look with its textures, atomically.
 
-    The stage is flattened into one crate: many readers of USDZ compose neither references nor
-    variants. Raises FabricError for another suffix, and where a file that is needed is missing.
+    The stage is flattened into one crate file: many readers of USDZ compose neither references nor
+    variants. Raises FabricError for another suffix and if a file that the look needs is missing.
     """
     if path.suffix != ".usdz":
-        raise FabricError(str(path), "is no package's name; it must end in .usdz")
+        raise FabricError(str(path), "is not the name of a USDZ package; it must end in .usdz")
     missing = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(look)))[2]
     if missing:
-        raise FabricError(str(look), f"refers to {missing[0]}, which is not there")
+        raise FabricError(str(look), f"refers to {missing[0]}, which does not exist")
     stage = Usd.Stage.Open(str(look))
     unused = _unused(stage)
     with tempfile.TemporaryDirectory() as folder, whole_file(path, clobber=clobber) as temporary:
@@ -51,17 +51,19 @@ def write_usdz(look: Path, path: Path, *, clobber: bool = True) -> None:
         single = Path(folder) / f"{path.stem}.usdc"
         layer.Export(str(single))
         temporary.unlink()
-        # USD warns of textures that it has just moved into the package.
+        # Silence USD's warnings about textures that it has just moved into the package.
         silence = UsdUtils.CoalescingDiagnosticDelegate()
         good = UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(single)), str(temporary))
         silence.TakeUncoalescedDiagnostics()
         del silence
         if not good:
-            raise FabricError(str(path), "cannot be packaged; a texture may be in the way")
+            raise FabricError(
+                str(path), "cannot be packaged; check that all textures of the look are readable"
+            )
 
 
 def _unused(stage: Usd.Stage) -> list[Sdf.Path]:
-    """Fabrics, and materials that nothing is bound to: the other variants need them."""
+    """Return the fabrics and the unbound materials, which only the other variants need."""
     bound = set()
     for prim in stage.Traverse():
         if prim.IsA(UsdGeom.Imageable) or prim.IsA(UsdGeom.Subset):

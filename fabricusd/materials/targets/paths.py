@@ -1,4 +1,4 @@
-"""Paths from a written file to another, so that a folder can be moved as a whole."""
+"""Make paths between files relative, so that a folder can be moved as a whole."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 
 
 def asset_path(target: Path, folder: Path) -> str:
-    """`target` relative to `folder`, with forward slashes and a leading `./` or `../`.
+    """Return `target` relative to `folder`, with forward slashes and a leading `./` or `../`.
 
-    Absolute only where there is no relative path, on another drive.
+    The path is absolute if `target` is on another drive.
     """
     try:
         relative = Path(os.path.relpath(target.absolute(), folder.absolute())).as_posix()

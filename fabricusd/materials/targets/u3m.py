@@ -1,7 +1,7 @@
-"""U3M 1.1 for garment CAD: one seamless swatch of the fabric, in millimetres.
+"""Write U3M 1.1 materials for garment CAD: one seamless swatch of a fabric, in millimetres.
 
-The format is Vizoo's open one ([U3M2021]). Its images must be RGB, so data sits in three equal
-channels; colours are sRGB. The swatch is a whole number of repeats, baked on a square of its own.
+The format is Vizoo's open one ([U3M2021]). Its images must be RGB, so data are stored in three
+equal channels; colours are sRGB. The swatch is a whole number of repeats, baked on its own square.
 """
 
 from __future__ import annotations
@@ -34,30 +34,30 @@ from fabricusd.srgb import srgb_encode
 from fabricusd.weaves.recognise import recognise
 
 THREADS = 32
-"""Threads along a side of the swatch at least: fewer would repeat visibly."""
+"""Smallest number of threads along a side of the swatch; with fewer, it would repeat visibly."""
 
 FIBRES = (
     "Polyester", "Linen", "Silk", "Cotton", "Wool", "Rayon", "Nylon", "Acetate", "Acrylic",
     "Cashmere", "Hemp", "Jute", "Lyocell", "Mohair", "Ramie",
 )  # fmt: skip
-"""Words of the format for fibres that a fabric's or thread's name may hold."""
+"""The format's names of fibres, which are looked up in the names of fabrics and threads."""
 
 PILE = "velvet", "velour", "corduroy"
 
 
 def check(where: Path, clobber: bool) -> None:
-    """A folder that is not there."""
+    """Raise FabricError if the folder does not exist."""
     if not where.is_dir():
-        raise FabricError(f"--u3m '{where}'", "is no directory; make it first")
+        raise FabricError(f"--u3m '{where}'", "is not a folder; create it first")
 
 
 def folder(look: Path, where: Path) -> Path:
-    """The folder itself."""
+    """Return the folder itself."""
     return where
 
 
 def write(job: Job, where: Path) -> list[Path]:
-    """A swatch of each fabric, and its pictures."""
+    """Write a swatch of each fabric and its pictures."""
     made: list[Path] = []
     for name, fabric in job.fabrics.items():
         made += write_u3m(fabric, where / f"{name}.u3m", fitted=job.fitted)
@@ -67,12 +67,12 @@ def write(job: Job, where: Path) -> list[Path]:
 def write_u3m(
     fabric: Fabric, path: Path, *, resolution: int = 512, fitted: bool = True
 ) -> list[Path]:
-    """The material at `path` (`.u3m`) and its PNG files in `<stem>/` beside it; all of them.
+    """Write the material `path` (`.u3m`) and its PNG files in `<stem>_u3m/` beside it.
 
-    Raises FabricError for another suffix or a fabric that cannot be baked.
+    Returns all files. Raises FabricError for another suffix or a fabric that cannot be baked.
     """
     if path.suffix != ".u3m":
-        raise FabricError(str(path), "is no U3M material's name; it must end in .u3m")
+        raise FabricError(str(path), "is not the name of a U3M material; it must end in .u3m")
     ends, picks = _threads(fabric)
     with tempfile.TemporaryDirectory() as folder:
         maps = _swatch(fabric, Path(folder), ends, picks, resolution)
@@ -92,13 +92,13 @@ def write_u3m(
         codes = np.rint(np.clip(pixels, 0.0, 1.0) * 65535).astype(np.uint16)
         write_png(target, codes, color_space="sRGB" if name == "basecolor" else "raw")
         written.append(target)
-    sheet = _Sheet(folder_name, size, resolution)
-    write_json(path, material(fabric, images, look, depth, sheet))
+    swatch = _SwatchImages(folder_name, size, resolution)
+    write_json(path, material(fabric, images, look, depth, swatch))
     return [path, *written]
 
 
 def _threads(fabric: Fabric) -> tuple[int, int]:
-    """Ends and picks of the swatch: whole repeats, nearly square, THREADS at least."""
+    """Return the ends and picks of the swatch: whole repeats, nearly square, at least THREADS."""
     ends, picks = true_repeat(fabric)
     across = math.ceil(THREADS / ends)
     width = across * ends * fabric.warp.pitch
@@ -120,15 +120,17 @@ def _swatch(fabric: Fabric, folder: Path, ends: int, picks: int, resolution: int
 
 
 def pictures(maps: MapSet, look: Look) -> tuple[dict[str, NDArray[np.float64]], float]:
-    """(h, w, 3) values from 0 to 1 of each image of the material, and the depth of the relief [mm]
-    that 1 stands for in `displacement`."""
+    """(h, w, 3) values from 0 to 1 of each image of the material, and the depth of the relief [mm].
+
+    The depth is the height that 1 represents in the image `displacement`.
+    """
     read = {
         name: read_mip_level(files[1001]).astype(np.float64)
         for name, files in maps.textures.items()
     }
     smooth = np.minimum((read["roughness_along"] * look.smooth_scale) ** 2, 1.0)
     rough = np.maximum(np.minimum((read["roughness_across"] * look.rough_scale) ** 2, 1.0), smooth)
-    # The principled shader: aspect^2 = 1 - 0.9 anisotropy, alphas r^2/aspect and r^2 aspect.
+    # In the principled shader aspect^2 = 1 - 0.9 anisotropy; alphas are r^2/aspect and r^2 aspect.
     anisotropy = np.clip((1.0 - smooth / rough) / 0.9, 0.0, 1.0)
     x, y = -read["tangent"][..., 1], read["tangent"][..., 0]
     turn = (np.arctan2(y, x) / (2.0 * math.pi)) % 1.0
@@ -148,38 +150,45 @@ def pictures(maps: MapSet, look: Look) -> tuple[dict[str, NDArray[np.float64]], 
     return found, depth
 
 
-class _Sheet:
-    """Writes values as the schema wants them, with the images' common size."""
+class _SwatchImages:
+    """Formats values as the U3M schema requires, with the common size of the images."""
 
     def __init__(self, folder: str, size: tuple[float, float], resolution: int) -> None:
         self.folder, self.size = folder, size
         self.dpi = {k: resolution / mm * 25.4 for k, mm in zip("xy", size, strict=True)}
 
     def image(self, name: str) -> dict[str, Any]:
-        """One picture."""
+        """Return an image."""
         return {
             "path": f"{self.folder}/{name}.png", "width": self.size[0], "height": self.size[1],
             "dpi": self.dpi, "repeat": {"rotation": 0.0, "mode": "normal"},
         }  # fmt: skip
 
     def number(self, constant: float, name: str = "", factor: float = 1.0) -> dict[str, Any]:
-        """A number, with a picture where it has one."""
+        """Return a number, with an image if it has one."""
         texture = {"factor": factor, "offset": 0.0, "image": self.image(name)} if name else None
         return {"constant": constant, "texture": texture}
 
     def color(self, rgb: Iterable[float], name: str = "") -> dict[str, Any]:
-        """A colour, with a picture where it has one."""
+        """Return a colour, with an image if it has one."""
         white = {"r": 1.0, "g": 1.0, "b": 1.0}
         texture = {"mode": "multiply", "factor": white, "image": self.image(name)} if name else None
         return {"constant": dict(zip("rgb", map(float, rgb), strict=True)), "texture": texture}
 
 
 def material(
-    fabric: Fabric, images: dict[str, NDArray[np.float64]], look: Look, depth: float, sheet: _Sheet
+    fabric: Fabric,
+    images: dict[str, NDArray[np.float64]],
+    look: Look,
+    depth: float,
+    swatch: _SwatchImages,
 ) -> dict[str, Any]:
-    """The document, by the schema of version 1.1. depth : of the relief [mm]."""
+    """Return the document in version 1.1 of the schema.
+
+    depth : depth of the relief [mm]
+    """
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    digest = hashlib.sha256(repr((fabric.name, fabric.threads, sheet.size)).encode()).digest()
+    digest = hashlib.sha256(repr((fabric.name, fabric.threads, swatch.size)).encode()).digest()
     return {
         "schema": "1.1",
         "custom": None,
@@ -187,14 +196,14 @@ def material(
             "id": str(uuid.UUID(bytes=digest[:16], version=4)),
             "name": fabric.name, "description": fabric.documentation,
             "created": now, "modified": now,
-            "front": _front(images, look, depth, sheet), "back": None, "side": None,
+            "front": _front(images, look, depth, swatch), "back": None, "side": None,
             "physics": physics(fabric), "metadata": None,
         },
     }  # fmt: skip
 
 
 def _front(
-    images: dict[str, NDArray[np.float64]], look: Look, depth: float, sheet: _Sheet
+    images: dict[str, NDArray[np.float64]], look: Look, depth: float, swatch: _SwatchImages
 ) -> dict[str, Any]:
     mean = {name: values.mean(axis=(0, 1)) for name, values in images.items()}
     up = {"x": 0.0, "y": 0.0, "z": 1.0}
@@ -211,20 +220,22 @@ def _front(
     }  # fmt: skip
     return {
         "shader": "principled",
-        "basecolor": sheet.color(mean["basecolor"], "basecolor"),
-        "normal": {"constant": up, "texture": {"scale": 1.0, "image": sheet.image("normal")}},
-        **{key: sheet.number(float(mean[name][0]), name) for key, name in pictured.items()},
-        # A length, so in millimetres as all of the format's.
-        "displacement": sheet.number(depth * float(mean["displacement"][0]), "displacement", depth),
-        **{key: sheet.number(value) for key, value in plain.items()},
+        "basecolor": swatch.color(mean["basecolor"], "basecolor"),
+        "normal": {"constant": up, "texture": {"scale": 1.0, "image": swatch.image("normal")}},
+        **{key: swatch.number(float(mean[name][0]), name) for key, name in pictured.items()},
+        # The displacement is a length, and the format's lengths are in millimetres.
+        "displacement": swatch.number(
+            depth * float(mean["displacement"][0]), "displacement", depth
+        ),
+        **{key: swatch.number(value) for key, value in plain.items()},
         "clearcoat_normal": {"constant": up, "texture": None},
-        "subsurface_color": sheet.color((0.0, 0.0, 0.0)),
+        "subsurface_color": swatch.color((0.0, 0.0, 0.0)),
         "preview": None,
     }
 
 
 def physics(fabric: Fabric) -> dict[str, Any]:
-    """What is known of the cloth itself, in the format's words."""
+    """Return what is known about the cloth itself, in the format's terms."""
     thick = [t.thickness for t in fabric.thread_list]
     return {
         "thickness": 2e3 * max(thick) if all(thick) else None,
@@ -237,7 +248,10 @@ def physics(fabric: Fabric) -> dict[str, Any]:
 
 
 def _composition(fabric: Fabric) -> list[dict[str, Any]]:
-    """One fibre if the names tell of one; shares by mass are not known, so no mixture is stated."""
+    """Return the fibre if the names mention exactly one.
+
+    Shares by mass are not known, so a mixture is never stated.
+    """
     words = " ".join((fabric.name, *fabric.threads)).lower()
     found = [fibre for fibre in FIBRES if fibre.lower() in words]
     kind = found[0] if len(found) == 1 else "unknown"
@@ -245,7 +259,7 @@ def _composition(fabric: Fabric) -> list[dict[str, Any]]:
 
 
 def construction(fabric: Fabric) -> dict[str, Any]:
-    """The weave in the format's words, its own name where there is none."""
+    """Return the weave in the format's terms, or its own name if the format has no term."""
     if any(word in fabric.name.lower() for word in PILE):
         return {"type": "Velour", "name": None}
     name = recognise(fabric.weave.cells) or fabric.weave.name

@@ -1,4 +1,4 @@
-"""Shading networks as UsdShade prims."""
+"""Write shading networks as UsdShade prims."""
 
 from __future__ import annotations
 
@@ -42,9 +42,10 @@ def write_material(
     parameters: dict[str, Value],
     layer_folder: Path,
 ) -> UsdShade.Material:
-    """A Material with one output a graph; textures relative to `layer_folder`.
+    """Write a Material with an output for each graph.
 
     graphs : (prefix of the shaders' names, graph)
+    layer_folder : folder of the layer, which texture paths are relative to
     """
     material = UsdShade.Material.Define(stage, path)
     for name, value in parameters.items():

@@ -23,7 +23,7 @@ UNIT = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
         ({"uv": None}, "has no UVs"),
         ({"uv": np.full((2, 3, 2), np.nan)}, "2 of 2 triangles with UVs that are not finite"),
         ({"points": np.full((4, 3), np.inf)}, "points that are not finite"),
-        ({"uv": np.zeros((2, 3, 2))}, "UVs without any area"),
+        ({"uv": np.zeros((2, 3, 2))}, "UVs of zero area"),
     ],
 )
 def test_a_mesh_that_cannot_be_baked_is_refused_in_one_line(change, words):

@@ -23,8 +23,8 @@ from fabricusd.bake.layout.garment import garments
 from fabricusd.bake.texels.blocks import bake_block
 from fabricusd.bake.texels.layers import Place, TableLayer, layer_of
 from fabricusd.bake.texels.maps import REGISTRY, chosen_maps
+from fabricusd.bake.texels.moment_indices import COVER, HORIZON, MOMENTS, SHARE
 from fabricusd.bake.texels.moments import texels
-from fabricusd.bake.texels.planes import COVER, HORIZON, PLANES, SHARE
 from fabricusd.bake.texels.recipe import recipe
 from fabricusd.bake.texels.reflectance import reflectance_table
 from fabricusd.bake.texels.sheet import sheets_of, texel_start, texel_step
@@ -288,10 +288,10 @@ def test_a_texel_of_the_table_is_the_mean_over_its_own_area():
         for j, i in np.random.default_rng(0).integers(0, 256, (20, 2)):
             step = texel_step(sheet, 0)
             start = texel_start(sheet, 0, 256 + i, 256 + j)
-            true = np.empty((PLANES, 1, 1), np.float32)
-            nobody, sums = np.zeros((1, 1), np.int32), np.empty(PLANES, np.float32)
+            true = np.empty((MOMENTS, 1, 1), np.float32)
+            nobody, sums = np.zeros((1, 1), np.int32), np.empty(MOMENTS, np.float32)
             texels(made, step, step, start, (i, j), nobody, 0, 32, sums, true)
-            error = np.abs(got.planes_at(j, i) - true[:, 0, 0])
+            error = np.abs(got.moments_at(j, i) - true[:, 0, 0])
             assert error[COVER] < 0.05
             assert error[SHARE : SHARE + 8].max() < 0.08
             assert error[HORIZON:].max() < 0.08

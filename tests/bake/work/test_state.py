@@ -16,8 +16,8 @@ from fabricusd.bake import bake as module
 from fabricusd.bake.bake import bake
 from fabricusd.bake.job import Settings
 from fabricusd.bake.texels.encoding import encoding_from
-from fabricusd.bake.work import kept
-from fabricusd.bake.work.kept import DIGEST
+from fabricusd.bake.work import checkpoint
+from fabricusd.bake.work.checkpoint import DIGEST
 from fabricusd.bake.work.scratch import Scratch
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding
@@ -157,7 +157,9 @@ def signed(data: bytes) -> bytes:
 )
 def test_a_block_that_cannot_be_is_made_again(job, tmp_path, monkeypatch, way, change):
     if way == "values":
-        monkeypatch.setattr("fabricusd.bake.work.assemble.kept", kept.KeptValues)
+        monkeypatch.setattr(
+            "fabricusd.bake.work.assemble.checkpoint_of", checkpoint.ValuesCheckpoint
+        )
     out = stopped(job, tmp_path)
     for mark in (out / ".bake").glob("*.done"):
         mark.unlink()

@@ -1,4 +1,4 @@
-"""What a Blender user installs: the USD hook, and the thread model as an OSL shader.
+"""Files to install in Blender: the USD import hook, and the thread model as an OSL shader.
 
-Nothing here is imported by fabricusd: these files run inside Blender.
+These files run inside Blender; fabricusd does not import them.
 """

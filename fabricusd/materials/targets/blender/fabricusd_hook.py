@@ -1,8 +1,9 @@
-"""Blender add-on: on USD import, give baked fabrics back what Blender's importer drops.
+"""Blender add-on that restores, on USD import, the parts of baked fabrics that Blender drops.
 
-Blender reads UsdPreviewSurface alone, which has neither anisotropy nor a tangent nor a sheen. The
-OpenPBR network beside it has; this hook rebuilds the Principled BSDF from it. Install it under
-Edit > Preferences > Add-ons > Install from Disk, or run the file as a script. Blender 4.4 or later.
+Blender's importer reads only UsdPreviewSurface, which has no anisotropy, tangent or sheen. The
+OpenPBR network beside it has them, and this hook rebuilds the Principled BSDF from that network.
+Install it under Edit > Preferences > Add-ons > Install from Disk, or run the file as a script. It
+requires Blender 4.4 or later.
 """
 
 from __future__ import annotations
@@ -17,17 +18,17 @@ bl_info = {
     "version": (1, 0, 0),
     "blender": (4, 4, 0),
     "category": "Import-Export",
-    "description": "Anisotropy, tangents and sheen of baked fabrics on USD import",
+    "description": "Restores anisotropy, tangents and sheen of baked fabrics on USD import",
 }
 
 SURFACE = "ND_open_pbr_surface_surfaceshader"
 
 NARROWEST = 0.1
-"""Least ratio of alphas that Principled BSDF has: aspect^2 = 1 - 0.9 anisotropic."""
+"""Smallest ratio of alphas in the Principled BSDF: aspect^2 = 1 - 0.9 anisotropic."""
 
 
 class Network:
-    """A fabric material's network in USD: constants of the material, files by map."""
+    """The network of a fabric material in USD: the material's constants, and textures by map."""
 
     def __init__(self, material: Any) -> None:
         from pxr import UsdShade
@@ -41,7 +42,7 @@ class Network:
 
     @property
     def is_fabric(self) -> bool:
-        """Whether `fabricusd material` wrote it."""
+        """Whether `fabricusd material` wrote the material."""
         surface = self.shaders.get("surface")
         return bool(
             surface
@@ -50,12 +51,12 @@ class Network:
         )
 
     def constant(self, name: str) -> Any:
-        """A parameter of the look: the one fitted to Principled BSDF, or else OpenPBR's."""
+        """Return a parameter of the look as fitted to the Principled BSDF, or else to OpenPBR."""
         own = self.material.GetInput(f"principled:{name}")
         return (own or self.material.GetInput(name)).Get()
 
     def file(self, name: str) -> str | None:
-        """The texture of a map, `<UDIM>` in it for tiles; None where a constant stands in."""
+        """Return a map's texture, with `<UDIM>` for tiles; None if a constant replaces it."""
         shader = self.shaders.get(name)
         if shader is None:
             return None
@@ -68,14 +69,14 @@ class Network:
         return str(asset.resolvedPath or asset.path)
 
     def fixed(self, shader: str, name: str) -> Any:
-        """The constant on a shader's input, None where it is connected or absent."""
+        """Return the constant on a shader's input; None if the input is connected or absent."""
         found = self.shaders.get(shader)
         given = found.GetInput(name) if found else None
         return given.Get() if given and not given.HasConnectedSource() else None
 
 
 class Nodes:
-    """Shorthand for building a material's nodes."""
+    """Builds a material's nodes."""
 
     def __init__(self, tree: Any) -> None:
         self.tree = tree
@@ -83,14 +84,14 @@ class Nodes:
         self.uv.uv_map = "st"
 
     def set(self, socket: Any, value: Any) -> None:
-        """Connect or set an input."""
+        """Connect an input to a socket, or set it to a constant."""
         if isinstance(value, bpy.types.NodeSocket):
             self.tree.links.new(value, socket)
         else:
             socket.default_value = value
 
     def math(self, operation: str, *values: Any) -> Any:
-        """A Math node's output."""
+        """Add a Math node; return its output."""
         node = self.tree.nodes.new("ShaderNodeMath")
         node.operation = operation
         for socket, value in zip(node.inputs, values, strict=False):
@@ -98,7 +99,7 @@ class Nodes:
         return node.outputs[0]
 
     def image(self, path: str, *, data: bool) -> Any:
-        """The colour of an image, which is loaded once."""
+        """Add an image node, loading each image once; return its colour."""
         node = self.tree.nodes.new("ShaderNodeTexImage")
         known = (i for i in bpy.data.images if bpy.path.abspath(i.filepath) == path)
         node.image = next(known, None) or bpy.data.images.load(path.replace("<UDIM>", "1001"))
@@ -110,7 +111,7 @@ class Nodes:
         return node.outputs["Color"]
 
     def number(self, path: str | None, instead: float) -> Any:
-        """The first channel of an image, or a number."""
+        """Return the first channel of an image, or `instead` if there is no image."""
         if path is None:
             return instead
         node = self.tree.nodes.new("ShaderNodeSeparateColor")
@@ -118,7 +119,7 @@ class Nodes:
         return node.outputs[0]
 
     def vector(self, operation: str, *values: Any) -> Any:
-        """A Vector Math node's output."""
+        """Add a Vector Math node; return its output."""
         node = self.tree.nodes.new("ShaderNodeVectorMath")
         node.operation = operation
         for socket, value in zip(node.inputs, values, strict=False):
@@ -126,7 +127,7 @@ class Nodes:
         return node.outputs[0]
 
     def world(self, code: Any) -> Any:
-        """A coded tangent-space direction, in the world."""
+        """Convert an encoded tangent-space direction to world space."""
         node = self.tree.nodes.new("ShaderNodeNormalMap")
         node.uv_map = "st"
         self.set(node.inputs["Color"], code)
@@ -134,7 +135,7 @@ class Nodes:
 
 
 def rebuild(material: Any, network: Network) -> None:
-    """Make `material`'s Principled BSDF what the OpenPBR network says."""
+    """Replace the nodes of `material` by a Principled BSDF that matches the OpenPBR network."""
     tree = material.node_tree
     tree.nodes.clear()
     nodes = Nodes(tree)
@@ -167,7 +168,10 @@ def rebuild(material: Any, network: Network) -> None:
 
 
 def _reflection(nodes: Nodes, network: Network, give: Any) -> None:
-    """Roughness, anisotropy and tangent: alphas are r^2/aspect along it and r^2 aspect across."""
+    """Set roughness, anisotropy, index, tint and tangent.
+
+    The alphas are r^2/aspect along the tangent and r^2 aspect across it.
+    """
     alphas = []
     for name, file in (("smooth", "roughness_along"), ("rough", "roughness_across")):
         fixed = network.fixed(f"{name}_root", "in1")
@@ -186,7 +190,8 @@ def _reflection(nodes: Nodes, network: Network, give: Any) -> None:
     else:
         own = network.fixed("tint_scaled", "in1") or (1.0, 1.0, 1.0)
         give("Specular Tint", (*(a * b for a, b in zip(tint, own, strict=True)), 1.0))
-    # The rougher axis, a quarter turn from the map's direction: (-y, x), coded for a normal map.
+    # The rougher axis is the map's direction rotated by a quarter turn, (-y, x), encoded for a
+    # normal map node.
     fixed = network.fixed("tangent_x", "in")
     directions = network.file("tangent")
     if directions is not None:
@@ -208,7 +213,7 @@ def _arrange(tree: Any) -> None:
 
 
 def rebuild_all(stage: Any, prim_map: Any = None) -> int:
-    """Rebuild every fabric material of `stage` that Blender has; their number."""
+    """Rebuild every fabric material of `stage` that Blender imported; return their number."""
     done = 0
     for prim in stage.Traverse():
         if prim.GetTypeName() != "Material":
@@ -230,33 +235,31 @@ class FabricLooks(bpy.types.USDHook):  # type: ignore[misc]
 
     bl_idname = "fabricusd_looks"
     bl_label = "fabricusd looks"
-    bl_description = "Anisotropy, tangents and sheen of baked fabrics"
+    bl_description = "Restores anisotropy, tangents and sheen of baked fabrics"
 
     @staticmethod
     def on_import(import_context: Any) -> bool:
-        """Called by Blender when a USD file has been read."""
+        """Rebuild materials; Blender calls this after importing a USD file."""
         try:
-            # Blender ships USD's Python modules; the bpy wheel does not, and get_stage would abort,
-            # or with another USD's modules be of a type that they do not know.
+            # Blender ships USD's Python modules, the bpy wheel does not. Without them get_stage
+            # would abort; with those of another USD build it would return an unknown type.
             import pxr.UsdShade  # noqa: F401
 
             stage = import_context.get_stage()
             names: Any = getattr(import_context, "get_prim_map", dict)()
         except (ImportError, TypeError):
-            print(
-                "fabricusd looks: not Blender's own USD modules; call rebuild_all(stage) yourself"
-            )
+            print("fabricusd looks: Blender's USD modules are missing; call rebuild_all(stage)")
             return False
         return rebuild_all(stage, names) >= 0
 
 
 def register() -> None:
-    """Add the hook."""
+    """Register the hook."""
     bpy.utils.register_class(FabricLooks)
 
 
 def unregister() -> None:
-    """Take the hook away."""
+    """Unregister the hook."""
     bpy.utils.unregister_class(FabricLooks)
 
 

@@ -1,10 +1,11 @@
-"""Which means a texel holds: the numbers of its planes."""
+"""Indices of the moments stored per texel."""
 
 AZIMUTHS = 16
 PARTS = 4
 
-# Planes. Those of a set come twice, weft first. All but COVER are means over the whole texel, gaps
-# counting as 0, so that they stay linear; maps divide by the cover where they mean "of the thread".
+# A trailing comment starts with the number of entries if there are several. Moments of a thread set
+# occur twice, weft first. All moments are means over the whole texel, so that they stay linear;
+# gaps count as 0, but as lit in LIT. Maps that describe the threads alone divide by COVER.
 COVER = 0
 SHARE = 1  # 8: cover of each set in PARTS by its tangent angle: falling gently or steeply along its
 #            axis, rising gently or steeply. A hump has all four; their mean angle is none of them.
@@ -18,4 +19,4 @@ SURFACE, VOLUME, FUZZ = 39, 40, 43  # reflectances, see `reflectance`; VOLUME ha
 FRESNEL = 44
 LIT = 45  # share of the chosen light that arrives
 HORIZON = 46  # AZIMUTHS: squared sine of the horizon
-PLANES = HORIZON + AZIMUTHS
+MOMENTS = HORIZON + AZIMUTHS

@@ -1,8 +1,8 @@
-"""What is kept of a block until the textures are put together.
+"""Checkpoint the blocks of a bake on disk until the textures are assembled.
 
-Of a sheet whose lays all have a table the layout alone is kept, and each texture looks its texels
-up when it is written: that costs less than writing all maps and reading them again. Of any other
-sheet all maps are. Either way a killed bake goes on where it stopped.
+If all lays of a sheet have a cell table, only the layout of each block is stored, and each texture
+looks up its texels when it is written: that costs less than writing all maps and reading them back.
+For any other sheet all maps are stored. In both cases a killed bake resumes where it stopped.
 """
 
 from __future__ import annotations
@@ -19,51 +19,52 @@ from fabricusd.bake.layout.raster import NOBODY
 from fabricusd.bake.texels.blocks import Layers, bake_block, composed, layers_of, top
 from fabricusd.bake.texels.layers import Place, TableLayer, cut_texels, shares
 from fabricusd.bake.texels.maps import TextureMap
-from fabricusd.bake.texels.planes import PLANES
+from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.sheet import Sheet
 from fabricusd.files import whole_file
 
 DIGEST = 16
-"""Bytes of a checksum at a file's end; the block's top is before it."""
+"""Bytes of the checksum at a file's end; the block's top precedes it."""
 
 MOST = np.float32(1e12)
-"""Greatest value of a map or plane: sums of squares of it are within single precision."""
+"""Largest magnitude of a map's or moment's value, so that sums of its squares fit single precision.
+"""
 
 Floats = NDArray[np.float32]
 
 
-class Kept(Protocol):
-    """How the blocks of one sheet are kept in files, and the maps read from them."""
+class Checkpoint(Protocol):
+    """How the blocks of one sheet are stored in files, and how maps are read back from them."""
 
     @property
     def bytes_needed(self) -> int:
-        """Of all blocks, at most."""
+        """Upper bound on the size of all blocks [bytes]."""
 
     def write(self, path: Path, bx: int, by: int) -> None:
-        """Keep a block."""
+        """Compute a block and store it."""
 
     def is_sound(self, path: Path) -> bool:
-        """Whether a block's file is there and can be what was written."""
+        """Whether a block's file exists and its checksum and contents are valid."""
 
     def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
-        """(h, w, channels) of map `k` in a block."""
+        """(h, w, channels) values of map `k` in a block."""
 
 
-def kept(sheet: Sheet, maps: Sequence[TextureMap]) -> Kept:
-    """The way that suits a sheet."""
+def checkpoint_of(sheet: Sheet, maps: Sequence[TextureMap]) -> Checkpoint:
+    """Choose how to store a sheet's blocks."""
     if all(table is not None for table in sheet.tables):
-        return KeptLayout(sheet, maps)
-    return KeptValues(sheet, maps)
+        return LayoutCheckpoint(sheet, maps)
+    return ValuesCheckpoint(sheet, maps)
 
 
-class KeptValues:
-    """All levels of all maps."""
+class ValuesCheckpoint:
+    """A checkpoint that stores all levels of all maps."""
 
     def __init__(self, sheet: Sheet, maps: Sequence[TextureMap]) -> None:
         self.sheet, self.maps = sheet, maps
         self.places = [
             [
-                (sheet.block >> level) ** 2 * len(one.channels) * np.dtype(one.kind).itemsize
+                (sheet.block_side >> level) ** 2 * len(one.channels) * np.dtype(one.kind).itemsize
                 for level in range(sheet.levels)
             ]
             for one in maps
@@ -73,9 +74,9 @@ class KeptValues:
         self.bytes_needed = int(ends[-1]) * sheet.across**2
 
     def write(self, path: Path, bx: int, by: int) -> None:
-        """Keep a block."""
-        found, planes, share = bake_block(self.sheet, self.maps, bx, by)
-        write_block(path, [*(level for one in found for level in one), planes, share])
+        """Compute a block and store it."""
+        found, moments, share = bake_block(self.sheet, self.maps, bx, by)
+        write_block(path, [*(level for one in found for level in one), moments, share])
 
     def is_sound(self, path: Path) -> bool:
         """Whether a block's file is whole."""
@@ -92,18 +93,19 @@ class KeptValues:
 
     def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
         """(h, w, channels) of a map."""
-        one, side = self.maps[k], self.sheet.block >> level
+        one, side = self.maps[k], self.sheet.block_side >> level
         with path.open("rb") as stream:
             stream.seek(self.offsets[k, level])
             data = stream.read(self.places[k][level])
         return np.frombuffer(data, one.kind).reshape(side, side, len(one.channels))
 
 
-class KeptLayout:
-    """Whose each texel is, and the planes of texels that are owned in part.
+class LayoutCheckpoint:
+    """A checkpoint that stores owners of texels, and moments of texels that are partly owned.
 
-    A file holds owners (h, w) int16, one number where all are alike; then of each lay in it, by
-    number, and each level from the second, planes (PLANES, n) of the n cut texels.
+    A file holds the owners (h, w) int16, or a single number if all are equal. Then, for each lay in
+    increasing order and each level from the second, follow the moments (MOMENTS, n) of the n texels
+    that the lay owns in part.
     """
 
     def __init__(self, sheet: Sheet, maps: Sequence[TextureMap]) -> None:
@@ -111,8 +113,8 @@ class KeptLayout:
         self.bytes_needed = 2 * sheet.resolution**2
 
     def write(self, path: Path, bx: int, by: int) -> None:
-        """Keep a block."""
-        n = self.sheet.block
+        """Compute a block and store it."""
+        n = self.sheet.block_side
         levels = list(layers_of(self.sheet, bx, by))
         owner = np.full((n, n), NOBODY, np.int16)
         for k, layer in levels[0].items():
@@ -127,12 +129,12 @@ class KeptLayout:
         write_block(path, [*parts, *top(self.sheet, levels[-1])])
 
     def is_sound(self, path: Path) -> bool:
-        """Whether a block's file is whole, and its owners are lays of the sheet."""
-        n, lays = self.sheet.block, len(self.sheet.garment.lays)
+        """Whether a block's file is complete and its owners are lays of the sheet."""
+        n, lays = self.sheet.block_side, len(self.sheet.garment.lays)
         tail = top_bytes(self.sheet) + DIGEST
-        # Lays that share a texel have a texel each below it, so a level has at most n * n parts.
-        planes = 4 * PLANES * n * n * self.sheet.levels
-        data = sound_data(path, 2 + tail, 2 * n * n + planes + tail)
+        # Lays that share a texel each own a finer texel in it: at most n * n parts per level.
+        moments = 4 * MOMENTS * n * n * self.sheet.levels
+        data = sound_data(path, 2 + tail, 2 * n * n + moments + tail)
         if data is None:
             return False
         if not are_values(np.frombuffer(data[-tail:-DIGEST], np.float32)):
@@ -144,12 +146,12 @@ class KeptLayout:
         owner = np.frombuffer(data, np.int16, n * n).reshape(n, n)
         if owner.min() < NOBODY or owner.max() >= lays:
             return False
-        if len(data) != 2 * n * n + 4 * PLANES * self._cut(owner) + tail:
+        if len(data) != 2 * n * n + 4 * MOMENTS * self._cut(owner) + tail:
             return False
         return are_values(np.frombuffer(data[2 * n * n : -tail], np.float32))
 
     def _cut(self, owner: NDArray[np.int16]) -> int:
-        """Texels of all levels and lays that are owned in part."""
+        """Count the partly owned texels of all levels and lays."""
         count = 0
         for number in np.unique(owner[owner != NOBODY]).tolist():
             owned = (owner == number).astype(np.float32)
@@ -160,24 +162,26 @@ class KeptLayout:
 
     def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
         """(h, w, channels) of a map."""
-        return composed(self.maps[k], self._layers(path, bx, by, level), self.sheet.block >> level)
+        return composed(
+            self.maps[k], self._layers(path, bx, by, level), self.sheet.block_side >> level
+        )
 
     def _layers(self, path: Path, bx: int, by: int, level: int) -> Layers:
-        n, tail = self.sheet.block, top_bytes(self.sheet) + DIGEST
+        n, tail = self.sheet.block_side, top_bytes(self.sheet) + DIGEST
         data = path.read_bytes()
         if len(data) == 2 + tail:
             number = int(np.frombuffer(data, np.int16, 1)[0])
             whole = np.broadcast_to(np.float32(1), (n >> level, n >> level))
             return {} if number == NOBODY else {number: self._layer(number, bx, by, level, whole)}
         owner = np.frombuffer(data, np.int16, n * n).reshape(n, n)
-        planes = np.frombuffer(data[2 * n * n : -tail], np.float32)
+        moments = np.frombuffer(data[2 * n * n : -tail], np.float32)
         found, begin = {}, 0
         for number in np.unique(owner[owner != NOBODY]).tolist():
             owned = (owner == number).astype(np.float32)
             for one in range(self.sheet.levels):
-                count = int(np.count_nonzero(cut_texels(owned))) * PLANES
+                count = int(np.count_nonzero(cut_texels(owned))) * MOMENTS
                 if one == level:
-                    own = planes[begin : begin + count].reshape(PLANES, -1)
+                    own = moments[begin : begin + count].reshape(MOMENTS, -1)
                     found[number] = self._layer(number, bx, by, level, owned, own)
                 begin += count
                 owned = shares(owned, 1) if one + 1 < self.sheet.levels else owned
@@ -193,7 +197,7 @@ class KeptLayout:
 
 
 def write_block(path: Path, parts: Sequence[NDArray[Any]]) -> None:
-    """A block's file, whole or not at all, its checksum at the end."""
+    """Write a block's file atomically, with its checksum at the end."""
     digest = hashlib.blake2b(digest_size=DIGEST)
     with whole_file(path, durable=False) as temporary, temporary.open("wb") as stream:
         for part in parts:
@@ -204,8 +208,11 @@ def write_block(path: Path, parts: Sequence[NDArray[Any]]) -> None:
 
 
 def sound_data(path: Path, least: int, most: int) -> bytes | None:
-    """What a block's file holds; None where it is not there, its size is not between `least` and
-    `most`, or its checksum is wrong."""
+    """Return the contents of a block's file.
+
+    None if the file does not exist, if its size is not from `least` to `most`, or if its checksum
+    is wrong.
+    """
     try:
         if not path.is_file() or not least <= path.stat().st_size <= most:
             return None
@@ -217,19 +224,19 @@ def sound_data(path: Path, least: int, most: int) -> bytes | None:
 
 
 def are_values(numbers: NDArray[Any]) -> bool:
-    """Whether all could be values of maps or planes, finite and not out of all bounds."""
+    """Whether all numbers are finite and small enough to be values of maps or moments."""
     return bool((np.abs(numbers) <= MOST).all())
 
 
 def top_bytes(sheet: Sheet) -> int:
-    """Bytes of a block's top before its checksum, see `read_top`."""
-    return 4 * len(sheet.garment.lays) * (PLANES + 1)
+    """Return the bytes of a block's top, which precedes its checksum, see `read_top`."""
+    return 4 * len(sheet.garment.lays) * (MOMENTS + 1)
 
 
 def read_top(path: Path, sheet: Sheet) -> tuple[Floats, Floats]:
-    """(lays, PLANES) planes and (lays,) owned share of the texel that a block shrinks to."""
+    """Read the (lays, MOMENTS) moments and (lays,) owned shares of a block's coarsest texel."""
     lays = len(sheet.garment.lays)
     with path.open("rb") as stream:
         stream.seek(-DIGEST - top_bytes(sheet), 2)
         values = np.frombuffer(stream.read(top_bytes(sheet)), np.float32)
-    return values[: lays * PLANES].reshape(lays, PLANES), values[lays * PLANES :]
+    return values[: lays * MOMENTS].reshape(lays, MOMENTS), values[lays * MOMENTS :]

@@ -1,4 +1,4 @@
-"""Which prims of a scene wear which fabric, and how the textures' UVs lie on them."""
+"""Find the prims of a scene that baked materials are bound to, and their UVs."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from fabricusd.schema.access import applies_binding, targets, value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Wearer:
-    """A mesh or subset that gets a material.
+class BoundPrim:
+    """A mesh or subset that a baked material is bound to.
 
     path : of the prim in the scene
-    maps : its textures; lay : number of its fabric among theirs
-    worn : whether the scene itself binds the fabric there
-    forced : the binding must outdo those below, since `path` is an instance's root
+    maps : its textures; lay : index of its fabric in `maps.lays`
+    binds_fabric : whether the scene itself binds the fabric to the prim
+    forced : the binding must be stronger than those of descendants: `path` is an instance's root
     """
 
     path: str
     maps: MapSet
     lay: int
-    worn: bool
+    binds_fabric: bool
     forced: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NewUV:
-    """A mesh's UVs in the textures' layout: values and indices of primvar `st`."""
+    """A mesh's UVs in the layout of the textures: values and indices of primvar `st`."""
 
     path: str
     values: NDArray[np.float32]
@@ -48,49 +48,51 @@ class NewUV:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Dressed:
-    """A scene that a look goes over."""
+class BoundScene:
+    """A scene and the prims in it that a look binds materials to."""
 
     stage: Usd.Stage
-    wearers: tuple[Wearer, ...]
+    prims: tuple[BoundPrim, ...]
     uv: tuple[NewUV, ...]
     notes: tuple[str, ...]
 
 
-def find_wearers(scene: Path, sets: tuple[MapSet, ...]) -> Dressed:
-    """What of `scene` the textures belong to.
+def find_bound_prims(scene: Path, sets: tuple[MapSet, ...]) -> BoundScene:
+    """Find the prims of `scene` that the textures belong to.
 
-    Raises FabricError where it is no USD, has none of the prims, or was baked with `--unwrap`.
+    Raises FabricError if the scene is not a USD layer, has none of the baked prims, or was baked
+    with `--unwrap`.
     """
     if scene.suffix.lower() not in (".usd", ".usda", ".usdc"):
         raise FabricError(
-            str(scene), "is no USD layer; leave --scene out to write a look over the baked meshes"
+            str(scene),
+            "is not a USD layer; leave --scene out to bind the look to the baked meshes",
         )
     stage, _ = open_stage(scene)
     now = _garments(scene, sets)
-    wearers: list[Wearer] = []
+    bound: list[BoundPrim] = []
     uv: list[NewUV] = []
     notes: list[str] = []
     for maps in sets:
         for path in maps.prims:
-            # A garment of an .obj is named after its file, which may be no path of USD.
+            # A garment of an .obj is named after its file, which may not be a valid prim path.
             whole = Sdf.Path.IsValidPathString(path) and Sdf.Path(path).IsAbsolutePath()
             prim = stage.GetPrimAtPath(path) if whole else None
             if not prim:
-                notes.append(f"{path} is not in {scene.name} any more; it gets no look")
+                notes.append(f"{path} is no longer in {scene.name}; it gets no look")
                 continue
             _compare(maps, now.get(path), [now[k] for k in maps.prims if k in now], path, notes)
-            wearers += _of(prim, maps, notes)
+            bound += _of(prim, maps, notes)
             name = _uv_name(prim)
             if path in now and not (maps.own_uv and name == "st"):
                 uv.append(_moved(prim, name, maps, now[path]))
-    if not wearers:
-        raise FabricError(str(scene), "has none of the prims that were baked; bake it again")
-    return Dressed(stage=stage, wearers=tuple(wearers), uv=tuple(uv), notes=tuple(notes))
+    if not bound:
+        raise FabricError(str(scene), "has none of the prims that were baked; bake again")
+    return BoundScene(stage=stage, prims=tuple(bound), uv=tuple(uv), notes=tuple(notes))
 
 
 def _garments(scene: Path, sets: tuple[MapSet, ...]) -> dict[str, Garment]:
-    """The garments that were baked as they are in the scene now, by their prims' paths."""
+    """Return the baked garments as they are in the scene now, by prim path."""
     found = {}
     read: dict[str, Scene] = {}
     for maps in sets:
@@ -98,7 +100,7 @@ def _garments(scene: Path, sets: tuple[MapSet, ...]) -> dict[str, Garment]:
         if lay.name not in read:
             read[lay.name] = read_scene(scene, fabric=lay.fabric)
         for path in maps.prims:
-            # What is no garment any more is said about each prim.
+            # Prims that are no longer garments are reported by `_compare`.
             with suppress(FabricError):
                 found[path] = garments(read[lay.name], path)[0]
     return found
@@ -107,22 +109,27 @@ def _garments(scene: Path, sets: tuple[MapSet, ...]) -> dict[str, Garment]:
 def _compare(
     maps: MapSet, now: Garment | None, sharing: list[Garment], path: str, notes: list[str]
 ) -> None:
-    """Say what has changed; sharing : the garments of all prims that have these textures."""
+    """Append a note if a garment has changed since it was baked.
+
+    sharing : the garments of all prims that share these textures
+    """
     if now is None:
-        notes.append(f"{path} wears no fabric any more; its textures are bound all the same")
+        notes.append(f"{path} no longer wears a fabric; its textures are bound nevertheless")
         return
-    # The fingerprint is that of one of the copies, which lie in different places.
+    # The fingerprint is that of one of the copies, which differ in their positions.
     for one in sharing:
         same = one.fingerprint == maps.fingerprint or (
             not maps.own_uv and fitted(one).fingerprint == maps.fingerprint
         )
         if same and (one is now or are_alike(one, now)):
             return
-    notes.append(f"{path} has changed since it was baked; bake it again if its UVs or fabric did")
+    notes.append(
+        f"{path} has changed since it was baked; bake again if its UVs or fabric have changed"
+    )
 
 
-def _of(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
-    """The mesh itself, or those of its subsets that wear fabrics of their own."""
+def _of(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[BoundPrim]:
+    """Return the mesh itself, or those of its subsets that bind fabrics of their own."""
     if prim.IsInstanceProxy():
         return _instance(prim, maps, notes)
     found = []
@@ -132,43 +139,43 @@ def _of(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
             found_at = targets(one, "fabric:binding")
             name = found_at[0].name if found_at else ""
             lay = next((k for k, lay in enumerate(maps.lays) if lay.name == name), 0)
-            found.append(Wearer(path=str(one.GetPath()), maps=maps, lay=lay, worn=True))
-    return found or [Wearer(path=str(prim.GetPath()), maps=maps, lay=0, worn=False)]
+            found.append(BoundPrim(path=str(one.GetPath()), maps=maps, lay=lay, binds_fabric=True))
+    return found or [BoundPrim(path=str(prim.GetPath()), maps=maps, lay=0, binds_fabric=False)]
 
 
-def _instance(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[Wearer]:
+def _instance(prim: Usd.Prim, maps: MapSet, notes: list[str]) -> list[BoundPrim]:
     root = prim
     while root.IsInstanceProxy():
         root = root.GetParent()
     meshes = [p for p in Usd.PrimRange(root, Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
     if len(meshes) > 1:
         notes.append(
-            f"{prim.GetPath()} is in an instance with other meshes, which cannot be changed one by "
-            "one; it gets no look: bake and dress what the instance refers to"
+            f"{prim.GetPath()} gets no look: it shares an instance with other meshes, which cannot "
+            "be changed individually; bake the prim that the instance refers to"
         )
         return []
-    return [Wearer(path=str(root.GetPath()), maps=maps, lay=0, worn=False, forced=True)]
+    return [BoundPrim(path=str(root.GetPath()), maps=maps, lay=0, binds_fabric=False, forced=True)]
 
 
 def _uv_name(prim: Usd.Prim) -> str:
-    """The UV set that the fabric lies in."""
+    """Return the name of the UV set that the fabric uses."""
     return str(value(prim, "fabric:binding:uvSet") or "st")
 
 
 def _moved(prim: Usd.Prim, name: str, maps: MapSet, now: Garment) -> NewUV:
-    """UVs where `bake --fit` put them, old = span * new + low, as primvar `st`."""
+    """Return the UVs as `bake --fit` moved them: old = span * new + low."""
     old, new = now.lays[0], maps.lays[0]
     span = float(np.linalg.norm(new.matrix) / np.linalg.norm(old.matrix))
     low = np.linalg.solve(old.matrix, new.offset - old.offset)
     if not np.allclose(new.matrix, old.matrix * span, rtol=1e-6, atol=1e-9):
         raise FabricError(
             str(prim.GetPath()),
-            "was baked with --unwrap, so its UVs are only in the baked mesh; leave --scene out",
+            "was baked with --unwrap, so only the baked mesh has its UVs; leave --scene out",
         )
     primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
     if not primvar:
         raise FabricError(
-            str(prim.GetPath()), f"has no primvar '{name}'; the textures are in it, bake again"
+            str(prim.GetPath()), f"has no primvar '{name}', which the textures use; bake again"
         )
     values = (np.asarray(primvar.Get(), np.float64) - low) / span
     indices = np.asarray(primvar.GetIndices(), np.int32) if primvar.IsIndexed() else None
