@@ -1,4 +1,4 @@
-"""Light for a scene that has none: a soft sky and a key light from the viewer's left."""
+"""Default lights for a scene without lights: a soft sky and a key light from the viewer's left."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fabricusd.scene.scene import Light, Scene
 
 
 def default_lights(scene: Scene) -> list[Light]:
-    """A grey dome and a distant key light as wide as a softbox, together about one irradiance."""
+    """A grey dome and a distant key light as wide as a softbox; their irradiance is about 1."""
     up = np.array([0.0, 0.0, 1.0]) if scene.up_axis == "Z" else np.array([0.0, 1.0, 0.0])
     front = np.array([0.0, -1.0, 0.0]) if scene.up_axis == "Z" else np.array([0.0, 0.0, 1.0])
     towards = front - 0.7 * np.cross(up, front) + 1.1 * up

@@ -1,6 +1,7 @@
-"""The picture as it grows: sums per pixel, their spread, and the layers that are read off them.
+"""The film: accumulates samples per pixel, estimates their variance, and derives the layers.
 
-Every sample belongs to one pixel, so what a pixel's mean varies by is read off its own samples.
+Every sample belongs to exactly one pixel, so the variance of a pixel's mean is estimated from that
+pixel's own samples.
 """
 
 from __future__ import annotations
@@ -43,28 +44,30 @@ AOVS: dict[str, tuple[str, ...]] = {
     "variance": ("R", "G", "B"),
     "samples": ("N",),
 }
-"""Layers and their channels. `albedo` is the surface's directional albedo towards the camera,
-estimated; `shadow` the share of direct light that arrives. `level` (0 far, 1 weave, 2 thread),
-`normal` and `tangent`, of the frame that a normal map turned, are means over a pixel's samples.
-`depth`, `uv` and `thread` are those of one sample, the pixel's first that meets a surface, which
-lies anywhere in the pixel filter: they are not anti-aliased, and not of the pixel's centre. `depth`
-is planar: metres along the camera's axis, not along the ray. `thread` is the number that map
-`thread_id` of a bake has, see `weave.thread_number`; -1 where no thread is seen and at level far.
-`variance` is that of the pixel's mean, see `Film.variance`."""
+"""Layers and their channels. `albedo` is an estimate of the surface's directional albedo towards
+the camera; `shadow` is the share of direct light that arrives. `level` (0 far, 1 weave, 2 thread),
+`normal` and `tangent` are means over a pixel's samples; the last two describe the shading frame
+after normal mapping. `depth`, `uv` and `thread` come from a single sample, the first of the pixel
+that hits a surface. That sample may lie anywhere in the pixel filter, so these layers are neither
+anti-aliased nor taken at the pixel's centre. `depth` is planar: metres along the camera's axis, not
+along the ray. `thread` is the number that the map `thread_id` of a bake holds, see
+`weave.thread_number`; it is -1 at level far and where no thread is seen. `variance` is the variance
+of the pixel's mean, see `Film.variance`."""
 
 _ALWAYS = ("beauty", "direct", "indirect", "variance", "samples")
 _FIRST = (DEPTH_Z, UV, UV + 1, THREAD_ID)
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 GROUP = 4
-"""Samples whose mean is one value of the variance's first estimate, which overstates it: samples of
-a pixel avoid one another, and so do these means. At 64 samples of the draped cloth it is 3 times
-the squared error, where every sample by itself would make it 6 times."""
+"""Number of samples averaged into one group; the first estimate of the variance is that of the
+groups' means. It overstates the variance, because the samples of a pixel are stratified and so are
+these means: at 64 samples of the draped cloth it is 3 times the squared error. Groups of a single
+sample would give 6 times."""
 
 TILE = 16
-"""Pixels along the side of a square whose halves are compared, see `Film.compare_halves`."""
+"""Side, in pixels, of the square tiles in which halves are compared, see `Film.compare_halves`."""
 _FEWEST = TILE * TILE // 4
-"""Pixels that a square needs to have its share renewed."""
+"""Number of pixels that must be ready before a tile's share is updated."""
 _LEAST_SHARE, _LARGEST_SHARE = 1.0 / 64.0, 2.0
 _BRIGHTEST = 1e15
 
@@ -94,7 +97,7 @@ class Film:
         self._share = np.ones(tiles, np.float32)
 
     def add(self, pixels: NDArray[np.int32], samples: int, rows: NDArray[np.float32]) -> None:
-        """Add `samples` paths of each of `pixels`, as `Wave.film` holds them."""
+        """Add `samples` paths for each of `pixels`, laid out as in `Wave.film`."""
         group = max(1, min(GROUP, samples // GROUP))
         _add(pixels, samples, group, rows, self.sums, self.spread, self.samples, self.groups)
 
@@ -104,10 +107,11 @@ class Film:
         return np.asarray(total / np.maximum(self.samples, 1), np.float32)
 
     def variance(self) -> NDArray[np.float32]:
-        """(3, pixels) variance of each pixel's mean, estimated; infinite below two groups.
+        """(3, pixels) estimated variance of each pixel's mean; infinite below two groups.
 
-        That of the groups' means, times the share of it that the pixels of a square were seen to
-        have. Without that share samples would have to be independent.
+        The estimate is the variance of the groups' means times the tile's share: the fraction of
+        that variance that `compare_halves` measured in the tile. Without the share, the estimate
+        would hold for independent samples only.
         """
         freedom = np.maximum(self.groups - 1, 1) * np.maximum(self.samples, 1)
         value = self.spread / freedom.astype(np.float32)
@@ -116,12 +120,13 @@ class Film:
         return np.where(self.groups > 1, value, np.float32(np.inf))
 
     def compare_halves(self) -> None:
-        """Learn from how far a pixel's earlier samples and its later ones are apart; after a pass.
+        """Update the tiles' shares by comparing earlier samples with later ones; call after a pass.
 
-        Half the distance of two halves' means is, squared, an unbiased estimate of the variance of
-        the whole where halves are independent, and halves of a Sobol' sequence nearly are: 1.6
-        times the squared error at 32 samples of the draped cloth, 1.1 times at 128. One pixel's is
-        worth little; a square's, over what the groups say there, is a share for all its pixels.
+        If two halves of a pixel's samples are independent, the square of half the distance between
+        their means is an unbiased estimate of the variance of the whole mean. Halves of a Sobol'
+        sequence are nearly independent: the estimate is 1.6 times the squared error at 32 samples
+        of the draped cloth and 1.1 times at 128. For a single pixel it is too noisy to use. Summed
+        over a tile and divided by the groups' estimate there, it is a share for all its pixels.
         """
         for row, top in enumerate(range(0, self.height, TILE)):
             part = slice(top * self.width, min(top + TILE, self.height) * self.width)
@@ -133,14 +138,14 @@ class Film:
             self._half_samples[part] = np.where(grown, n, m)
 
     def _shares(self, part: slice, before: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Of one row of squares; as `before` where too few pixels have got a second half."""
+        """The shares of one row of tiles; `before` where too few pixels have a second half."""
         counts, halves = self.samples[part], self._half_samples[part]
         ready = (halves > 0) & (3 * halves <= 2 * counts) & (self.groups[part] > 1)
         n = np.maximum(counts, 1).astype(np.float32)
         m = np.where(ready, halves, 0).astype(np.float32)
         mean = _LUMINANCE @ self._total(part) / n
         deviation = _LUMINANCE @ np.sqrt(self.spread[:, part])
-        # Beyond that squares leave the range of 32-bit numbers.
+        # The squares of larger values overflow float32.
         ready &= (np.abs(mean) < _BRIGHTEST) & (deviation < _BRIGHTEST)
         mean, deviation = np.where(ready, mean, 0), np.where(ready, deviation, 0)
         apart = np.where(ready, mean - self._half[part] / np.maximum(m, 1), 0)
@@ -165,8 +170,9 @@ class Film:
     def relative_error(self) -> NDArray[np.float32]:
         """(pixels,) standard error of luminance over luminance, with a floor at 1 % of the mean.
 
-        The largest of a pixel and its eight neighbours: one lucky pixel must not stop early. As
-        channels vary together, their deviations add up, not their variances.
+        Each pixel takes the largest error among itself and its eight neighbours, so that one lucky
+        pixel does not stop early. The colour channels are correlated, so their standard deviations
+        are added rather than their variances.
         """
         luminance = _LUMINANCE @ self.beauty()
         deviation = _LUMINANCE @ np.sqrt(self.variance())
@@ -181,7 +187,7 @@ class Film:
         return np.asarray(worst.ravel())
 
     def layer(self, name: str) -> NDArray[np.float32]:
-        """One AOV, (height, width, channels) float32; 0 where nothing was sampled."""
+        """(height, width, channels) float32 the layer `name`; 0 where nothing was sampled."""
         n = np.maximum(self.samples, 1).astype(np.float32)
         met = np.maximum(self.sums[ALPHA], 1e-20)
         if name == "beauty":
@@ -212,7 +218,7 @@ class Film:
         return np.ascontiguousarray(picture, np.float32)
 
     def layers(self) -> dict[str, NDArray[np.float32]]:
-        """All layers that were asked for; beauty is always among them."""
+        """The requested layers by name; beauty is always among them."""
         names = ("beauty", *(name for name in self.aovs if name != "beauty"))
         return {name: self.layer(name) for name in names}
 
@@ -257,9 +263,9 @@ def _sum(rows, row, start, end):  # type: ignore[no-untyped-def]
 
 @njit(**INLINE)
 def _add_group(rows, c, start, end, done, total):  # type: ignore[no-untyped-def]
-    """Samples and their sum with the group's, and what it adds to the sum of squared deviations.
+    """Merge a group: (samples, sum, increase of the sum of squared deviations) after merging.
 
-    [Chan1983]: from means, which keep their digits in float32 where sums of squares would not.
+    [Chan1983], which works with means: sums of squares would lose their digits in float32.
     """
     size = end - start
     own = _sum(rows, DIRECT + c, start, end) + _sum(rows, INDIRECT + c, start, end)

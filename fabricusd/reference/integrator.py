@@ -1,7 +1,7 @@
-"""Paths in batches: trace, arrive, shade, depart, until none is left.
+"""The path integrator: batches of paths go through trace, arrive, shade and depart until they end.
 
-Each stage is one compiled loop over all rays of a batch, which releases the interpreter, so workers
-are plain Python threads and a batch is what the scheduler hands out.
+Each stage is one compiled loop over all rays of a batch and releases Python's global interpreter
+lock. Workers can therefore be plain Python threads, and the scheduler hands out batches.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from fabricusd.reference.rays.embree import (
     Accelerator,
 )
 from fabricusd.reference.rays.sobol import new_numbers
-from fabricusd.reference.rays.triangles import build_tables
+from fabricusd.reference.rays.triangles import Triangles, build_tables
 from fabricusd.reference.rays.wave import (
     BEAUTY_ROWS,
     FAR_LEVEL,
@@ -40,11 +40,11 @@ from fabricusd.reference.rays.wave import (
     Wave,
 )
 from fabricusd.reference.stages import arrivals
-from fabricusd.reference.stages.arrivals import AUTO_LEVEL, QUEUES, arrive, sort_lanes
+from fabricusd.reference.stages.arrivals import AUTO_LEVEL, QUEUES, Settings, arrive, sort_lanes
 from fabricusd.reference.stages.departures import depart, record_first
 from fabricusd.reference.stages.hits import add_emission, prepare
 from fabricusd.reference.stages.shadow_rays import settle, thin_out
-from fabricusd.reference.start.compile_ahead import FAR, NEAR, compile_ahead
+from fabricusd.reference.start.compile_ahead import CLOSE_UPS, EVERY_PICTURE, compile_ahead
 from fabricusd.reference.surfaces.fabric import FabricShader
 from fabricusd.reference.surfaces.normal_map import shade_mapped
 from fabricusd.reference.surfaces.preview import (
@@ -68,30 +68,32 @@ ESTIMATORS = {
     "uniform": arrivals.UNIFORM,
 }
 AIMED = 16
-"""Rays along each side of the picture that find what is to be lit."""
+"""Number of rays along each side of the picture that find the places to be lit."""
 MOST_LAYERS = 32
-"""See-through surfaces that one ray may pass before it is taken as blocked."""
+"""Number of see-through surfaces that a ray may pass before it counts as blocked."""
 
 
 def _shaders(scene: Scene, shadow: str) -> list[FabricShader | None]:
-    """Of every material, once the kernels that they need are ready."""
-    compile_ahead(FAR).wait()
+    """The shaders of all materials, made once the kernels that they need are ready."""
+    compile_ahead(EVERY_PICTURE).wait()
     return [_shader(surface, shadow) for surface in scene.materials] or [None]
 
 
 def _shader(surface: Material, shadow: str) -> FabricShader | None:
-    """What shades a cloth; None for a plain surface, which needs nothing of its own."""
+    """The shader of a cloth; None for a plain surface, which needs no shader of its own."""
     if not isinstance(surface, FabricSurface):
         return None
-    return FabricShader(surface.binding.fabric, shadow, lambda: compile_ahead(NEAR).wait())
+    return FabricShader(surface.binding.fabric, shadow, lambda: compile_ahead(CLOSE_UPS).wait())
 
 
 class Tracer:
-    """A scene made ready for rays.
+    """A scene prepared for path tracing.
 
-    limits : where level "auto" goes from one level to the next
-    estimator : "mis", or for tests one of "light", "surface", "uniform"; all have the same mean.
-    sampler : "sobol", or for tests "random".
+    limits : where level "auto" changes from one level to the next
+    estimator : "mis", or for tests "light", "surface" or "uniform"; all have the same mean
+    sampler : "sobol", or for tests "random"
+
+    Raises `FabricError` for an unknown level and for a negative `max_bounces`.
     """
 
     def __init__(
@@ -110,22 +112,23 @@ class Tracer:
             raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
         if max_bounces < 0:
             raise FabricError("max bounces", f"is {max_bounces}; it must be at least 0")
-        # The triangles, while kernels are made ready and, by those, the laws of the cloths. In this
-        # order: what triangles take by the way, another thread's heap would not give back.
+        # Load the kernels and build the cloths' laws on a worker thread while the triangles are
+        # built. Build the triangles on the main thread: temporary memory that is freed on a worker
+        # thread's heap is not returned to the system.
         beside = ThreadPoolExecutor(1)
         shaders = beside.submit(_shaders, scene, shadow)
         beside.shutdown(wait=False)
         self.tables = build_tables(scene)
         self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
         self.shaders = shaders.result()
-        self.lights, self.dome = build_lights(scene.lights, self.tables.centre)
+        self.triangles = Triangles(self.tables.records, self.tables.material)
+        self.lights = build_lights(scene.lights, self.tables.centre)
         self.surfaces = build_surfaces(scene)
         shining = self.surfaces.table[:, [EMISSIVE, EMISSIVE + 1, EMISSIVE + 2]].any(axis=1)
         self.shines = bool((shining | (self.surfaces.table[:, EMISSIVE_MAP] >= 0)).any())
         self.mapped = self.surfaces.table[:, NORMAL_MAP] >= 0
         self.max_bounces = max_bounces
-        self.level = LEVELS[level]
-        self.estimator = ESTIMATORS[estimator]
+        self.settings = Settings(ESTIMATORS[estimator], LEVELS[level], max_bounces)
         self.numbers = new_numbers(seed, independent=sampler == "random")
         self.epsilon = np.float32(1e-7 * self.tables.radius + 1e-12)
         self._limits = np.zeros((len(self.shaders), 4), np.float32)
@@ -139,21 +142,22 @@ class Tracer:
         self.see_through = bool((self.opacity < 1).any())
 
     def aim(self, lens: Lens, width: int, height: int) -> None:
-        """Choose among lights by what they do to the places that the camera sees."""
-        if len(self.lights) < 2:
+        """Set the chance of choosing each light by how brightly it lights what the camera sees."""
+        if len(self.lights.table) < 2:
             return
         x, y = (np.arange(AIMED) * size // AIMED for size in (width, height))
         pixels = (y[:, None] * width + x).ravel().astype(np.int32)
         wave = Wave(len(pixels), aovs=False)
+        rays = wave.lanes.rays
         camera_rays(
-            lens, width, pixels, 0, 1, self.numbers, wave.rays.reshape(len(wave.rays), -1),
-            wave.lanes[LANE_WIDTH : LANE_SPREAD + 1], wave.path_pixel, wave.path_sample,
+            lens, width, pixels, 0, 1, self.numbers, rays.reshape(len(rays), -1),
+            wave.lanes.rows[LANE_WIDTH : LANE_SPREAD + 1], wave.paths,
         )  # fmt: skip
-        self.accelerator.intersect(wave.rays, len(wave.rays))
-        rows = wave.rays.transpose(1, 0, 2).reshape(ROWS, -1)
+        self.accelerator.intersect(rays, len(rays))
+        rows = rays.transpose(1, 0, 2).reshape(ROWS, -1)
         ends = rows[OX : OZ + 1] + rows[DX : DZ + 1] * rows[TFAR]
         met = rows.view(np.uint32)[GEOMETRY] != MISS
-        share_out(self.lights, self.dome, ends[:, met].T)
+        share_out(self.lights, ends[:, met].T)
 
     def trace(
         self,
@@ -165,56 +169,51 @@ class Tracer:
         samples: int,
         counters: NDArray[np.int64],
     ) -> None:
-        """Follow `samples` paths of each pixel to their end; `wave.film` holds what they saw.
+        """Trace `samples` paths of each pixel to their end and write the results to `wave.film`.
 
-        counters : (3,) int64 - rays, shadow rays and values that were not finite, added up.
+        first : number of the first sample
+        counters : (3,) int64 - numbers of rays, shadow rays and non-finite values, added to
         """
         count = len(pixels) * samples
         aovs = len(wave.film) > BEAUTY_ROWS
         wave.film[:, :count] = 0.0
+        rays, rows, tags = wave.lanes
         camera_rays(
-            lens, width, pixels, first, samples, self.numbers,
-            wave.rays.reshape(len(wave.rays), -1), wave.lanes[LANE_WIDTH : LANE_SPREAD + 1],
-            wave.path_pixel, wave.path_sample,
+            lens, width, pixels, first, samples, self.numbers, rays.reshape(len(rays), -1),
+            rows[LANE_WIDTH : LANE_SPREAD + 1], wave.paths,
         )  # fmt: skip
-        wave.lanes[LANE_BETA : LANE_BETA + 3, :count] = 1.0
-        wave.lanes[LANE_PDF, :count] = -1.0
-        wave.lane_tags[0, :count] = np.arange(count)
-        wave.lane_tags[1, :count] = 0
+        rows[LANE_BETA : LANE_BETA + 3, :count] = 1.0
+        rows[LANE_PDF, :count] = -1.0
+        tags[0, :count] = np.arange(count)
+        tags[1, :count] = 0
         counts = np.zeros(QUEUES * len(self.shaders), np.int64)
         result = np.zeros(3, np.int64)
         for step in range(self.max_bounces + 2 + MOST_LAYERS):
-            self.accelerator.intersect(wave.rays, (count + 15) // 16, coherent=step == 0)
+            self.accelerator.intersect(wave.lanes.rays, (count + 15) // 16, coherent=step == 0)
             counters[0] += count
             arrive(
-                step, self.max_bounces, self.estimator, count, wave.rays, wave.lanes,
-                wave.lane_tags, self.lights, self.dome, wave.film, wave.keys,
-                self.tables.material, self._limits, self.tables.records, self.level,
-                wave.path_pixel, wave.path_sample, self.numbers, counts,
+                step, self.settings, count, wave.lanes, wave.paths, self.numbers, self.lights,
+                self.triangles, self._limits, wave.film, wave.queues, counts,
             )  # fmt: skip
             ends = np.cumsum(counts)
             hits = int(ends[-1])
             if hits == 0:
                 break
-            sort_lanes(count, wave.keys, ends - counts, wave.order)
+            sort_lanes(count, wave.queues, ends - counts)
             prepare(
-                step, self.estimator, ends, wave.rays, wave.lanes, wave.lane_tags, wave.keys,
-                wave.order, self.tables.records, self.lights, self.dome, self.epsilon,
-                wave.path_pixel, wave.path_sample, self.numbers, wave.hits, wave.tags,
+                step, self.settings, ends, wave.lanes, wave.queues, wave.paths, self.numbers,
+                self.triangles, self.lights, self.epsilon, wave.hits,
             )  # fmt: skip
             if self.shines:
-                add_emission(hits, self.surfaces, wave.hits, wave.tags, wave.film)
+                add_emission(hits, self.surfaces, wave.hits, wave.film)
             for queue in np.flatnonzero(counts):
                 start, end = int(ends[queue] - counts[queue]), int(ends[queue])
                 self._shade(wave, int(queue), start, end)
             if aovs and step <= MOST_LAYERS:
-                record_first(
-                    hits, lens.eye, lens.axis, wave.hits, wave.tags, self.tables.uv, wave.film
-                )
+                record_first(hits, lens.eye, lens.axis, wave.hits, self.tables.uv, wave.film)
             depart(
-                step, self.estimator, hits, self.max_bounces, wave.hits, wave.tags, wave.film,
-                wave.shadow_rays, wave.shadow, wave.shadow_path, wave.next_rays, wave.next_lanes,
-                wave.next_tags, result,
+                step, self.settings, hits, wave.hits, wave.film, wave.shadows, wave.next_lanes,
+                result,
             )  # fmt: skip
             counters[1] += result[0]
             counters[2] += result[2]
@@ -225,28 +224,27 @@ class Tracer:
                 break
 
     def _shade(self, wave: Wave, queue: int, start: int, end: int) -> None:
-        """Fill the surface's rows of hits `start` to `end`."""
+        """Shade the hits from `start` to before `end`, all of one queue, by their material."""
         shader = self.shaders[queue // QUEUES]
         if shader is None:
             shade = shade_mapped if self.mapped[queue // QUEUES] else shade_preview
-            shade(self.surfaces, wave.hits, wave.tags, start, end)
+            shade(self.surfaces, wave.hits.rows, wave.hits.tags, start, end)
         else:
             shader(queue // 2 % 3, queue % 2, wave, start, end)
 
     def _settle(self, wave: Wave, count: int, aovs: bool) -> None:
-        """Trace the shadow rays and add what they bring."""
+        """Trace the shadow rays and add the light that they bring."""
         if count == 0:
             return
         if not self.see_through:
-            self.accelerator.occluded(wave.shadow_rays, (count + 15) // 16)
-            settle(count, wave.shadow_rays, wave.shadow, wave.shadow_path, wave.film, aovs)
+            self.accelerator.occluded(wave.shadows.rays, (count + 15) // 16)
+            settle(count, wave.shadows, wave.film, aovs)
             return
         for _ in range(MOST_LAYERS):
-            self.accelerator.intersect(wave.shadow_rays, (count + 15) // 16)
+            self.accelerator.intersect(wave.shadows.rays, (count + 15) // 16)
             count = thin_out(
-                count, wave.shadow_rays, wave.shadow, wave.shadow_path, self.opacity,
-                self.surfaces, self.tables.material, self.tables.records, self.epsilon, aovs,
-                wave.film,
+                count, wave.shadows, self.opacity, self.surfaces, self.triangles, self.epsilon,
+                aovs, wave.film,
             )  # fmt: skip
             if count == 0:
                 break

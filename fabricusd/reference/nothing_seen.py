@@ -1,40 +1,44 @@
-"""Why a picture is empty: whether the camera's clipping planes cut all that it would see."""
+"""Explaining an empty picture: tests whether the camera's clipping planes cut everything away."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fabricusd.reference.integrator import Tracer
-from fabricusd.reference.rays.camera import FAR, Lens
+from fabricusd.reference.rays.camera import Lens
+from fabricusd.reference.rays.embree import INFINITE_DISTANCE
 from fabricusd.reference.rays.wave import ALPHA, Wave
 
 LOOKED = 1 << 14
-"""Pixels that are looked through again, evenly over the picture."""
+"""Largest number of pixels that are traced again, spread evenly over the picture."""
 
 
 def reason_for_nothing(tracer: Tracer, lens: Lens, width: int, height: int) -> str:
-    """What is said of a picture in which no camera ray met anything.
+    """The note for a picture in which no camera ray hit anything.
 
-    Rays of the same camera are followed again without its near plane, then without its far one.
+    Traces rays of the same camera again without its near plane, then without its far plane, then
+    without either.
     """
     near, far = float(lens.near), float(lens.far)
     if near > 0 and _meets(tracer, lens._replace(near=np.float32(0)), width, height):
         return f"shows nothing: the near clipping plane, at {near:.4g} m, cuts everything away"
-    if lens.far < FAR and _meets(tracer, lens._replace(far=FAR), width, height):
+    if lens.far < INFINITE_DISTANCE and _meets(
+        tracer, lens._replace(far=INFINITE_DISTANCE), width, height
+    ):
         return f"shows nothing: the far clipping plane, at {far:.4g} m, cuts everything away"
-    open_lens = lens._replace(near=np.float32(0), far=FAR)
-    if near > 0 and lens.far < FAR and _meets(tracer, open_lens, width, height):
+    open_lens = lens._replace(near=np.float32(0), far=INFINITE_DISTANCE)
+    if near > 0 and lens.far < INFINITE_DISTANCE and _meets(tracer, open_lens, width, height):
         return (
-            f"shows nothing: all that the camera would see is outside of its clipping range, "
+            f"shows nothing: everything the camera would see is outside its clipping range, "
             f"{near:.4g} to {far:.4g} m"
         )
-    return "shows nothing: no camera ray meets anything; turn the camera to the scene"
+    return "shows nothing: no camera ray hits anything; point the camera at the scene"
 
 
 def _meets(tracer: Tracer, lens: Lens, width: int, height: int) -> bool:
-    """Whether one sample of some pixels meets a surface."""
+    """Whether one sample in any of the tested pixels hits a surface."""
     count = width * height
-    # Steps of the golden ratio fall into all rows and all columns.
+    # Multiples of the golden ratio reach every part of the rows and of the columns.
     steps = np.arange(min(count, LOOKED)) * 0.6180339887498949 % 1.0
     pixels = (steps * count).astype(np.int32)
     wave = Wave(len(pixels), aovs=False)

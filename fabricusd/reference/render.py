@@ -1,4 +1,4 @@
-"""Rendering a scene to a picture: the one public entrance of the path tracer."""
+"""Rendering a scene to a picture: the path tracer's public entry point."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from fabricusd.reference.integrator import Tracer
 from fabricusd.reference.nothing_seen import reason_for_nothing
 from fabricusd.reference.rays.camera import build_lens, default_camera
 from fabricusd.reference.rays.wave import ALPHA, Wave
-from fabricusd.reference.start.compile_ahead import FAR, compile_ahead
+from fabricusd.reference.start.compile_ahead import EVERY_PICTURE, compile_ahead
 from fabricusd.reference.view_transform import view
 from fabricusd.run.workers import Batches, pixels_along_z_curve, worker_count
 from fabricusd.scene.read import read_scene
@@ -36,35 +36,38 @@ from fabricusd.scene.scene import Camera, Scene
 from fabricusd.stop import Stop
 
 BATCH = 1 << 13
-"""Paths in a batch: enough that starting a stage costs little, few enough to stay in cache."""
+"""Number of paths in a batch: large enough to amortise the start of a stage, small enough for the
+cache."""
 
 MOST_TRIED = 100
-"""Frames whose files are tried before the work."""
+"""Number of frames whose output files are checked before rendering starts."""
 
 PASS = 16
-"""Samples of every pixel before any pixel gets more."""
+"""Samples per pixel in one pass over the picture; no pixel gets more before all have had these."""
 
 MOST_SAMPLES = 4096
-"""Where adaptive sampling ends if no number is given."""
+"""Most samples per pixel of adaptive sampling if no number is given."""
 
 Progress = Callable[[float, float], None]
-"""Called with the share done, 0 to 1, and the seconds since the start."""
+"""A callback that takes the fraction done, 0 to 1, and the seconds since the start."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RenderResult:
-    """What was rendered.
+    """A rendered picture with its statistics.
 
-    Of several frames sums, all notes, mean samples and the worst noise, but the last one's layers.
+    For several frames, the result holds the sums of the counts and times, all notes, the mean
+    number of samples and the worst noise, but only the last frame's layers.
 
     layers : AOV name -> (h, w, c) float32
     paths : the files written; notes : what was left out or assumed, one line each
-    rays : rays traced, shadow rays included; seconds : of sampling, without reading the scene;
-        processor_seconds : of this process, all workers together, meanwhile
-    not_finite : values that were left out because they were not finite
-    noise : the relative error that 99 % of the pixels' means stay below, estimated
+    rays : number of rays traced, including shadow rays; seconds : sampling time, without reading
+        the scene; processor_seconds : processor time of this process, all workers together, over
+        the same span
+    not_finite : number of values that were left out because they were not finite
+    noise : estimated relative error that 99 % of the pixels' means stay below
     complete : False after Ctrl-C
-    met : whether a camera ray met a surface, in every picture
+    met : whether in every picture some camera ray hit a surface
     """
 
     layers: dict[str, NDArray[np.float32]]
@@ -108,20 +111,20 @@ def render(
 ) -> RenderResult:
     """Path-trace `scene` (a USD, OBJ, GLB or PLY file, or a `Scene`) and write `out`.
 
-    out : `.exr` with all layers and a `.png` beside it, `.png` alone, or None to write nothing;
-        of several frames, each gets its number before the suffix
-    fabric : on what every surface without a material of its own, and every mesh file, is made of
-    spp : samples per pixel; with `noise` the most a pixel gets. Without either, 64
-    limits : where level "auto" goes from one level to the next
-    noise : stop a pixel when its relative error is below this
+    out : `.exr` for all layers with a `.png` beside it, `.png` alone, or None to write nothing; for
+        several frames, each file's name gets the frame's number before the suffix
+    fabric : the fabric of every mesh file and of every surface without a material of its own
+    spp : samples per pixel; with `noise`, the most that a pixel gets. 64 if neither is given
+    limits : where level "auto" changes from one level to the next
+    noise : stop sampling a pixel when its relative error is below this
     frames : time codes; None for the stage's default time
     exposure : of the PNG, in stops, added to the camera's own
     complexity : how finely subdivision surfaces are refined: "low" (their cages), "medium", "high"
-        or "veryhigh", as usdrecord and usdview have it, or "auto", as far as the picture shows
+        or "veryhigh" as in usdrecord and usdview, or "auto" for what the picture can show
     units : of an .obj or .ply, see `read_scene`
 
-    Raises `FabricError` for what cannot be rendered at all; what had to be left out is in the
-    result's `notes`. On Ctrl-C what is done is written, and `complete` is False.
+    Raises `FabricError` if the scene cannot be rendered at all. Whatever had to be left out is in
+    the result's `notes`. On Ctrl-C, the samples taken so far are written, and `complete` is False.
     """
     _require_settings(width, height, spp, noise, max_bounces, seed, workers)
     require_ranges(exposure=exposure)
@@ -132,7 +135,7 @@ def render(
     for code in frames or ():
         RANGES["frame"].require("frames", code)
     targets = _targets(out, frames)
-    compile_ahead(FAR)
+    compile_ahead(EVERY_PICTURE)
     begun = time.perf_counter()
     frame_results: list[RenderResult] = []
     paths: tuple[str, ...] = ()
@@ -152,7 +155,7 @@ def render(
             result.metadata.update(_asked_for(scene, time_code, stops))
             if target is not None:
                 paths += _write(target, result, stops)
-            # Layers are those of the last frame; the others would fill the memory.
+            # Keep only the last frame's layers: those of all frames would fill the memory.
             frame_results = [replace(r, layers={}) for r in frame_results] + [result]
             stop.release()
             if stop.asked or not result.complete:
@@ -161,7 +164,7 @@ def render(
 
 
 def _of_frame(progress: Progress, number: int, frames: int, begun: float) -> Progress:
-    """What frame `number` of several has done, as a share of them all."""
+    """A callback that reports the progress of frame `number` as a fraction of all frames."""
 
     def report(share: float, _seconds: float) -> None:
         progress((number + share) / frames, time.perf_counter() - begun)
@@ -172,7 +175,7 @@ def _of_frame(progress: Progress, number: int, frames: int, begun: float) -> Pro
 def _together(
     results: list[RenderResult], paths: tuple[str, ...], *, complete: bool
 ) -> RenderResult:
-    """What several frames took and lacked, with the last one's layers."""
+    """Combine the results of several frames, keeping the last frame's layers."""
     return replace(
         results[-1],
         paths=paths,
@@ -206,12 +209,12 @@ def _require_settings(
 def _targets(
     out: str | os.PathLike[str] | None, frames: tuple[float, ...] | None
 ) -> list[tuple[float | None, Path | None]]:
-    """(time code, file) of each picture; refuses what could not be written in the end."""
+    """(time code, file) of each picture. Raises FabricError for a file that cannot be written."""
     if out is None:
         return [(code, None) for code in frames or (None,)]
     path = Path(out)
     if path.suffix.lower() not in (".exr", ".png"):
-        raise FabricError(str(path), "is no picture format; it must end in .exr or .png")
+        raise FabricError(str(path), "is not a picture format; it must end in .exr or .png")
     targets = frame_files(path, frames)
     for _, target in targets[:MOST_TRIED]:
         for file in written_files(target):
@@ -232,12 +235,12 @@ def frame_files(path: Path, frames: tuple[float, ...] | None) -> list[tuple[floa
 
 
 def written_files(target: Path) -> list[Path]:
-    """All that is written for one picture: an EXR has a PNG beside it."""
+    """All files that are written for one picture: an EXR has a PNG beside it."""
     return list(dict.fromkeys([target, target.with_suffix(".png")]))
 
 
 def _asked_for(source: Any, time_code: float | None, stops: float) -> dict[str, Any]:
-    """What a picture's metadata say of where it comes from and how its PNG was made."""
+    """The metadata that tell a picture's source and how its PNG was made."""
     known: dict[str, Any] = {"fabricusd:exposure": stops}
     if not isinstance(source, Scene):
         known["fabricusd:scene"] = os.fspath(source)
@@ -247,7 +250,7 @@ def _asked_for(source: Any, time_code: float | None, stops: float) -> dict[str, 
 
 
 def _write(target: Path, result: RenderResult, exposure: float) -> tuple[str, ...]:
-    """The picture's files; returns their names."""
+    """Write the picture's files and return their names."""
     picture = view(result.layers["beauty"][..., :3], exposure)
     files = written_files(target)
     if target.suffix.lower() == ".exr":
@@ -276,9 +279,10 @@ def render_scene(
     progress: Progress | None = None,
     stop: Stop | None = None,
 ) -> RenderResult:
-    """As `render`, for a `Scene` in memory, without files.
+    """As `render`, for a `Scene` in memory and without writing files.
 
-    stop : what asks for an end; it holds from the first sample on, and is the caller's to release
+    stop : the handler that asks rendering to stop; it is installed when sampling starts, and the
+        caller must release it
     """
     _require_settings(width, height, spp, noise, max_bounces, seed, workers)
     begun = time.perf_counter()
@@ -307,7 +311,7 @@ def render_scene(
     if not met and len(tracer.tables.triangles):
         scene.note("the picture", reason_for_nothing(tracer, lens, width, height))
     embree, triangles = tracer.accelerator.version, len(tracer.tables.triangles)
-    # Triangles and their hierarchy make room for the layers.
+    # Free the triangles and their acceleration structure before the layers are made.
     del tracer
     error = film.relative_error()
     metadata = {
@@ -339,17 +343,17 @@ def render_scene(
 
 
 def _furnished(scene: Scene, width: int, height: int) -> Camera:
-    """The scene's camera, or one that sees all of it; a scene without lights gets some."""
+    """The scene's camera, or one that sees the whole scene. Adds lights to a scene without any."""
     if not scene.lights:
         scene.lights = default_lights(scene)
         scene.note("the scene", "has no light; a sky and a key light are added")
     if scene.camera is None:
-        scene.note("the scene", "has no camera; one that sees all of it from the front is taken")
+        scene.note("the scene", "has no camera; one that sees all of it from the front is used")
     return scene.camera or default_camera(scene, width, height)
 
 
 def _versions() -> dict[str, Any]:
-    """What a picture's metadata say of the programs that made it."""
+    """The metadata that name the programs and versions that made a picture."""
     return {
         "Software": f"fabricusd {fabricusd.__version__}",
         "fabricusd:python": platform.python_version(),
@@ -359,7 +363,7 @@ def _versions() -> dict[str, Any]:
 
 
 def _typical_worst(error: NDArray[np.float32]) -> float:
-    """The relative error that 99 % of the pixels stay below; infinite where none is known."""
+    """The relative error that 99 % of the pixels stay below; infinite if no error is known."""
     known = error[np.isfinite(error)]
     return float(np.quantile(known, 0.99)) if known.size else float("inf")
 
@@ -376,11 +380,15 @@ def _sample(
     begun: float,
     stop: Stop,
 ) -> bool:
-    """Passes over the picture until every pixel has `most` samples or is quiet enough."""
+    """Run passes over the picture until every pixel has `most` samples or is below the noise bound.
+
+    Returns False if sampling was interrupted.
+    """
     order = pixels_along_z_curve(film.width, film.height)
     size = BATCH
-    # A small picture still makes work for many workers. Their number must not matter here: rounding
-    # depends on which lane of a vector a ray falls into, and that on the batch.
+    # Use smaller batches for a small picture, so that many workers have something to do. The batch
+    # size must not depend on the number of workers: rounding depends on a ray's lane in a vector,
+    # and the lane depends on the batch.
     while size > 1024 and len(order) * min(PASS, most) < 16 * size:
         size //= 2
     waves = [Wave(size, aovs=film.extra) for _ in range(workers)]
@@ -413,7 +421,7 @@ def _sample(
         if not Batches(workers, task, stop).run(len(starts), report):
             return False
         done += samples
-        # A picture of one pass has nothing to compare.
+        # A picture of one pass has no halves to compare.
         if done > samples or done < most:
             film.compare_halves()
         if noise is not None:

@@ -1,1 +1,1 @@
-"""Running work: workers, and stopping them."""
+"""Running work in batches: workers, and how they are stopped."""

@@ -1,4 +1,4 @@
-"""Handing batches of pixels to workers, so that all stay busy and stopping loses nothing."""
+"""Hands batches of work to worker threads, keeps all of them busy, and stops them without loss."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fabricusd.stop import Stop
 
 
 def worker_count(workers: int | None) -> int:
-    """`workers`, or as many as this process may use."""
+    """`workers`, or if None the number of processors that this process may use."""
     if workers is None:
         try:
             return len(os.sched_getaffinity(0))
@@ -26,25 +26,25 @@ def worker_count(workers: int | None) -> int:
 
 
 def pixels_along_z_curve(width: int, height: int) -> NDArray[np.int32]:
-    """(pixels,) int32 all pixels, neighbours close to one another, so that batches are compact."""
+    """(pixels,) int32 all pixels in Z-order, so that each batch covers a compact region."""
     x, y = np.arange(width, dtype=np.uint64), np.arange(height, dtype=np.uint64)
     key = _spread(x)[None, :] | (_spread(y)[:, None] << np.uint64(1))
     return np.argsort(key.ravel(), kind="stable").astype(np.int32)
 
 
 def _spread(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """A zero bit after each of the lower 16 bits."""
+    """Insert a zero bit after each of the lower 16 bits."""
     for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
         x = (x | (x << np.uint64(shift))) & np.uint64(mask)
     return x
 
 
 class Batches:
-    """Work on numbered batches by several workers, in any order.
+    """Runs numbered batches on several workers, in any order.
 
-    The calling thread waits; on Ctrl-C, or when `stop` is asked, no further batch is begun, those
-    begun are finished, and `run` returns False. An error in a worker stops the others likewise and
-    is raised here.
+    The calling thread waits. On Ctrl-C, or when `stop` is triggered, no further batch is started,
+    the running batches are finished, and `run` returns False. An error in a worker stops the others
+    in the same way and is raised in the calling thread.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Batches:
         self.stop = stop or Stop()
 
     def run(self, count: int, progress: Callable[[int], Any] | None = None) -> bool:
-        """Call `task(worker, batch)` for every batch below `count`; False where interrupted."""
+        """Call `task(worker, batch)` for every batch below `count`; False if interrupted."""
         lock = threading.Lock()
         state: dict[str, Any] = {"next": 0, "done": 0, "error": None}
 

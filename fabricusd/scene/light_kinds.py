@@ -1,7 +1,7 @@
-"""The kinds of light: what UsdLux calls them, what lengths they have, and how large they are.
+"""The kinds of light: their names in UsdLux, the lengths that define them, and their sizes.
 
-How a kind is sampled, and how rays meet it, is a module of its own in `reference.lights.kinds`; a
-kind without one is an error when that is imported.
+Each kind has a module in `reference.lights.kinds` that samples the light and intersects rays with
+it. Importing that package fails if a kind has no module.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 
 class Size(NamedTuple):
-    """What the size of a light may depend on.
+    """The quantities on which the size of a light may depend.
 
-    x, y, z : lengths of its frame's axes; flat : area of the parallelogram of x and y
-    lengths : its own [scene unit]; angle : diameter of a distant light [rad]
+    x, y, z : lengths of the axes of the light's frame; flat : area of the parallelogram of x and y
+    lengths : the light's own lengths [scene unit]; angle : diameter of a distant light [rad]
     """
 
     x: float
@@ -31,10 +31,11 @@ class Size(NamedTuple):
 class LightKind:
     """One kind of light.
 
-    usd : names of its types in USD
-    lengths : those that it has, and what they are where nothing is said [scene unit]
-    size : what `normalize` divides by: its area in square scene units, say
-    round : first of the axes that must be scaled alike for it to stay round; None for flat lights
+    usd : names of the light's types in USD
+    lengths : the light's lengths with their defaults [scene unit]
+    size : the divisor of `normalize`, for example the area in square scene units
+    round : first of the axes that must be scaled equally for the light to stay round; None for flat
+        lights
     """
 
     name: str
@@ -45,7 +46,7 @@ class LightKind:
 
 
 def _projected(s: Size) -> float:
-    """Projected solid angle of a distant light, beyond half a sphere as UsdLux continues it."""
+    """Projected solid angle of a distant light, continued beyond a hemisphere as in UsdLux."""
     sine2 = math.sin(0.5 * s.angle) ** 2
     return math.pi * (sine2 if s.angle <= math.pi else 2 - sine2) if s.angle > 0 else 1.0
 

@@ -1,4 +1,4 @@
-"""A scene from any file that can be rendered, by its suffix."""
+"""Reading a scene from a USD or mesh file; the file's suffix selects the reader."""
 
 from __future__ import annotations
 
@@ -26,20 +26,25 @@ def read_scene(
     width: int = 960,
     units: str | None = None,
 ) -> Scene:
-    """The scene of a USD or mesh file, in metres. Raises `FabricError` where it has none.
+    """Read the scene of a USD or mesh file, in metres.
 
-    complexity : how finely subdivision surfaces are refined, "low" to "veryhigh", or "auto", as a
-        picture of `width` pixels shows; by default not at all, since textures are baked and
-        materials bound on the faces that their UVs were laid on
-    units : what the lengths of an .obj or .ply are in, "m", "cm", "mm" or "in"; None takes metres,
-        and a note tells the size
+    fabric : for every mesh file and every surface without a material of its own
+    camera : path of a camera in a USD file
+    complexity : how finely subdivision surfaces are refined: "low" to "veryhigh", or "auto" for
+        what a picture of `width` pixels can show. By default they are not refined, because textures
+        are baked and materials are bound on the faces for which the UVs were laid out
+    units : unit of length of an .obj or .ply: "m", "cm", "mm" or "in"; None assumes metres and adds
+        a note with the resulting size
+
+    Raises `FabricError` if the file cannot be read as a scene.
     """
     fineness = Fineness(complexity=complexity, width=width)
     path = Path(source)
     suffix = path.suffix.lower()
     if suffix not in USD_SUFFIXES + MESH_SUFFIXES:
         raise FabricError(
-            str(path), f"is no scene; it must end in {', '.join(USD_SUFFIXES + MESH_SUFFIXES)}"
+            str(path),
+            f"is not a scene file; it must end in {', '.join(USD_SUFFIXES + MESH_SUFFIXES)}",
         )
     readable_file(path)
     binding = as_binding(fabric)
@@ -47,7 +52,7 @@ def read_scene(
         from fabricusd.scene.files.mesh_file import read_mesh_file
 
         if camera is not None:
-            raise FabricError(f"{path}:{camera}", f"is no camera; {suffix} files have none")
+            raise FabricError(f"{path}:{camera}", f"is not a camera; {suffix} files have none")
         return read_mesh_file(path, binding, units)
     if units is not None:
         from fabricusd.scene.size import unit_length
@@ -61,7 +66,7 @@ def read_scene(
 
 
 def as_binding(fabric: str | Fabric | Binding | None) -> Binding | None:
-    """A binding of a fabric, or of a fabric's file or preset name, at its measured scale."""
+    """A binding, at measured scale, of a fabric that is given as such, as a file or as a preset."""
     if fabric is None or isinstance(fabric, Binding):
         return fabric
     if isinstance(fabric, Fabric):

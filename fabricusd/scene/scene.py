@@ -1,7 +1,8 @@
-"""What the path tracer renders: triangles in metres, what they are made of, lights, a camera.
+"""The description of a scene: triangles in metres, their materials, lights and a camera.
 
-Plain values without USD. `usd_scene` and `mesh_file` make them, `render` compiles them into the
-arrays that kernels read. World space is right-handed; lengths are metres.
+The classes hold plain values and do not depend on USD. `scene.usd` and `scene.files` create them;
+the path tracer compiles them into the arrays that kernels read. World space is right-handed, and
+lengths are metres.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ from fabricusd.fabric import Binding
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Texture:
-    """An image looked up by UV.
+    """An image that is looked up by UV.
 
     pixels : (h, w, c) float32, linear, row 0 at the top; c is 1 or 3
     wrap : (2,) str - `repeat`, `clamp`, `mirror` or `black`, along u and v
-    place : a, b, c, d, e, f - the picture lies at (a u + b v + c, d u + e v + f)
+    place : a, b, c, d, e, f - the picture is looked up at (a u + b v + c, d u + e v + f)
     """
 
     pixels: NDArray[np.float32]
@@ -31,13 +32,13 @@ class Texture:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PreviewSurface:
-    """A material of the UsdPreviewSurface kind: Lambert below GGX, metallic workflow.
+    """A UsdPreviewSurface material: a Lambertian base under GGX, in the metallic workflow.
 
     diffuse, emissive : (3,) float - linear Rec. 709
-    ior 1 removes the specular layer.
-    textures : of diffuse, emissive, metallic, roughness, opacity, normal. Each multiplies nothing:
-        it replaces its constant. Of `normal` the texels are normals in tangent space, see
-        `normal_map`; of any length, where 0 is the surface's own.
+    ior : index of refraction; 1 removes the specular layer
+    textures : for diffuse, emissive, metallic, roughness, opacity and normal. A texture replaces
+        its constant instead of multiplying it. The texels of `normal` are normals of any length in
+        tangent space, see `normal_map`; a texel of length 0 stands for the surface's own normal.
     """
 
     name: str = ""
@@ -53,7 +54,7 @@ class PreviewSurface:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FabricSurface:
-    """A woven fabric laid on a mesh by its UVs."""
+    """A woven fabric that is laid on a mesh by the mesh's UVs."""
 
     name: str = ""
     binding: Binding
@@ -64,15 +65,17 @@ Material = PreviewSurface | FabricSurface
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mesh:
-    """Triangles of one prim, in world space, counter-clockwise seen from the front.
+    """The triangles of one prim in world space, counter-clockwise seen from the front.
 
     points : (n, 3) float64 [m]
     triangles : (m, 3) int
-    normals : (m, 3, 3) float or None - at each corner; None to smooth over shared points
-    smooth : bool - False to render facets where `normals` is None
+    normals : (m, 3, 3) float or None - at each corner; None to compute them
+    smooth : bool - if `normals` is None: True for smooth normals over shared points, False for
+        facets
     uv : (m, 3, 2) float64 or None - at each corner
     material : (m,) int - index into `Scene.materials`
-    origin : str - what the mesh may be a copy of: only meshes of one origin are baked as one
+    origin : str - identifies the mesh of which this may be a copy; only meshes of the same origin
+        are baked as one
     """
 
     path: str
@@ -87,16 +90,16 @@ class Mesh:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Light:
-    """One light. Radiance is constant over its surface and over the directions it emits to.
+    """One light. Its radiance is constant over its surface and over the directions it emits to.
 
-    radiance : (3,) float [W/m2/sr]; for a distant light without angle, irradiance [W/m2]
+    radiance : (3,) float [W/m2/sr]; for a distant light without an angle, the irradiance [W/m2]
     frame : (4, 4) float64 - columns: x, y, z axes (their lengths scale the light) and position [m];
         rect, disk and distant lights shine along -z, a cylinder lies along x, a dome's pole is +y
-    width, height : float - of a rect; height is a cylinder's length
-    radius : float - of a disk, sphere or cylinder
+    width, height : float [m] - of a rect; height is a cylinder's length
+    radius : float [m] - of a disk, sphere or cylinder
     angle : float - diameter of a distant light [rad]
-    image : (h, w, 3) float32 or None - a dome's latitude-longitude picture, times `radiance`
-    camera_visible : bool - whether the camera sees it; indirect rays always do
+    image : (h, w, 3) float32 or None - a dome's latitude-longitude picture, which `radiance` scales
+    camera_visible : bool - whether the camera sees the light; indirect rays always do
     """
 
     path: str
@@ -113,13 +116,14 @@ class Light:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Camera:
-    """A thin-lens camera that looks along its frame's -z, +y up.
+    """A thin-lens camera that looks along its frame's -z, with +y up.
 
     frame : (4, 4) float64 - orthonormal columns x, y, z and position [m]
-    focal_length, aperture (width, height), aperture_offset : float [m]; for an orthographic camera
-        the aperture is the width of what it sees
+    focal_length, aperture (width, height), aperture_offset : float [m]; for an orthographic camera,
+        the aperture is the extent of the visible region
     f_stop : float - 0 for a pinhole; focus_distance : float [m]
     clipping : (2,) float [m]
+    exposure : float - in stops
     """
 
     path: str = ""
@@ -136,9 +140,9 @@ class Camera:
 
 @dataclass(kw_only=True, eq=False)
 class Scene:
-    """Everything to render, and what had to be left out or assumed on the way (`notes`).
+    """Everything to render, with `notes` about what had to be left out or assumed.
 
-    refined : triangles that subdivision surfaces were refined to
+    refined : number of triangles that subdivision surfaces were refined to
     """
 
     meshes: list[Mesh] = field(default_factory=list)
@@ -151,16 +155,16 @@ class Scene:
     _told: set[str] = field(default_factory=set, repr=False)
 
     def note(self, where: str, problem: str) -> None:
-        """Keep one clear line about `where`, once."""
+        """Add one line about `where`, unless it has been added before."""
         line = f"{where} {problem}"
-        # A list is slow to search where each of many prims has a line of its own.
+        # Look lines up in a set: a list is slow to search if each of many prims has its own line.
         if line not in self._told:
             self._told.add(line)
             self.notes.append(line)
 
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The box around all triangles whose corners are finite, (low, high) [m]; zeros where there
-        are none."""
+        """The bounding box (low, high) [m] of all triangles with finite corners; zeros if there are
+        none."""
         used = [p for p in map(_corners, self.meshes) if len(p)]
         if not used:
             return np.zeros(3), np.zeros(3)
@@ -169,7 +173,7 @@ class Scene:
 
 
 def _corners(mesh: Mesh) -> NDArray[np.float64]:
-    """(n, 3) points of a mesh that are corners of triangles without any that is not finite."""
+    """(n, 3) points of a mesh that belong to triangles whose corners are all finite."""
     finite = np.asarray(np.isfinite(mesh.points).all(axis=1))
     triangles = np.asarray(mesh.triangles)
     if not finite.all():

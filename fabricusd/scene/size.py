@@ -1,4 +1,4 @@
-"""How large meshes are, in words: metres, threads across, and whether a size is likely."""
+"""Describes the size of meshes in words: in metres, in threads across, and whether it is likely."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from fabricusd.scene.scene import FabricSurface, Mesh, Scene
 from fabricusd.scene.surface.normals import measured_scale
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-"""Metres in a unit of length that a file may be in."""
+"""Metres per unit, for the units of length that a file may use."""
 
 WORDS = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches"}
 
 LARGEST, SMALLEST = 10.0, 0.005
-"""Metres of the longest side beyond which a size is told as unlikely.
+"""Bounds on the longest side [m]; a note calls a size outside of them unlikely.
 
-A wedding train, a curtain or a sail is within 10 m, and a swatch under a microscope above 5 mm. A
-shirt of 70 cm whose centimetres were taken for metres is 70 m, whose metres were taken for
-centimetres 7 mm, for millimetres 0.7 mm."""
+A wedding train, a curtain or a sail is smaller than 10 m, and a swatch under a microscope is larger
+than 5 mm. A shirt of 70 cm becomes 70 m if its centimetres are taken for metres, 7 mm if its metres
+are taken for centimetres, and 0.7 mm if they are taken for millimetres."""
 
 UNITLESS = (".obj", ".ply")
-"""Mesh files that do not say their unit; glTF is in metres."""
+"""Suffixes of mesh files that do not state their unit; glTF files are in metres."""
 
 
 def unit_length(units: str | None, suffix: str) -> float:
-    """Metres in one unit of a file with that suffix. Raises FabricError for others than UNITS."""
+    """Metres per unit of a file with that suffix. Raises FabricError for a unit not in UNITS."""
     if units is None:
         return 1.0
     if units not in UNITS:
@@ -41,14 +41,14 @@ def unit_length(units: str | None, suffix: str) -> float:
 
 
 def size_words(low: NDArray[np.float64], high: NDArray[np.float64]) -> str:
-    """'0.6 m wide, 0.8 m high and 0.1 m deep', without the sides that have no length."""
+    """The size in words, as '0.6 m wide, 0.8 m high and 0.1 m deep'; omits sides of length 0."""
     sides = zip(high - low, ("wide", "high", "deep"), strict=True)
     parts = [f"{side:.3g} m {word}" for side, word in sides if side > 0]
     return " and ".join([", ".join(parts[:-1])] * (len(parts) > 1) + parts[-1:]) or "a point"
 
 
 def note_size(scene: Scene, path: Path, units: str | None) -> None:
-    """Tell the size of a mesh file where its unit was assumed, or where it is not likely."""
+    """Add a note about a mesh file's size if its unit was assumed, or if the size is unlikely."""
     low, high = scene.bounds()
     longest = float((high - low).max())
     if not np.isfinite(longest) or not longest > 0:
@@ -58,7 +58,7 @@ def note_size(scene: Scene, path: Path, units: str | None) -> None:
     if units is not None:
         words += f" with --units {units}"
     elif suffix in UNITLESS:
-        words += f"; {suffix} has no unit and metres were taken"
+        words += f"; {suffix} files have no unit, and metres were assumed"
     else:
         words += "; lengths in glTF are metres"
     if SMALLEST <= longest <= LARGEST:
@@ -67,15 +67,15 @@ def note_size(scene: Scene, path: Path, units: str | None) -> None:
         return
     unit = next((u for u in ("cm", "mm") if longest * UNITS[u] <= 3.0), "mm")
     if suffix not in UNITLESS or longest < SMALLEST:
-        scene.note(path.name, f"{words}; no cloth is likely to be that size, scale it")
+        scene.note(path.name, f"{words}; cloth is unlikely to be that size; scale the file")
     elif units is None:
         scene.note(path.name, f"{words}; if it is in {WORDS[unit]}, add --units {unit}")
     else:
-        scene.note(path.name, f"{words}; no cloth is likely to be that size")
+        scene.note(path.name, f"{words}; cloth is unlikely to be that size")
 
 
 def mesh_words(scene: Scene, mesh: Mesh) -> str:
-    """A mesh's size, and how many threads of each of its fabrics run across it."""
+    """The size of a mesh in words, with the number of threads of each of its fabrics across it."""
     one = Scene(meshes=[mesh])
     words = size_words(*one.bounds())
     if mesh.uv is None:
@@ -97,6 +97,6 @@ def mesh_words(scene: Scene, mesh: Mesh) -> str:
 
 
 def threads_words(threads: NDArray[np.float64]) -> str:
-    """'1200 warp and 1400 weft threads', from (n, 2) weave coordinates."""
+    """Words such as '1200 warp and 1400 weft threads', from (n, 2) weave coordinates."""
     warp, weft = np.ptp(threads, axis=0)
     return f"{warp:.0f} warp and {weft:.0f} weft threads"

@@ -27,7 +27,7 @@ def test_the_cheapest_within_the_bound_is_taken_and_else_the_nearest(bound, meth
 
 def test_the_reason_names_what_was_cheaper_and_what_is_missed():
     assert "none 0.5" in cheapest(FRONT, 0.2).why
-    assert "none is within 0.001" in cheapest(FRONT, 0.001).why
+    assert "no method is within 0.001" in cheapest(FRONT, 0.001).why
 
 
 def test_cloth_that_is_no_preset_is_as_hard_as_the_hardest():
@@ -53,7 +53,7 @@ def test_a_bound_or_a_table_that_is_none_is_refused(tmp_path):
     with pytest.raises(FabricError, match="above 0"):
         choose_shadow(["velvet"], 0.0)
     (tmp_path / "a.json").write_text(json.dumps({"shadows": [1]}))
-    with pytest.raises(FabricError, match="no table"):
+    with pytest.raises(FabricError, match="not a table"):
         read_table(tmp_path / "a.json")
 
 

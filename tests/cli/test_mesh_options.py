@@ -16,7 +16,7 @@ FILES = {
     # file: (status of render, words on stderr)
     "obj_centimetres/panel_cm.obj": (0, "is 60 m wide and 80 m high"),
     "obj_concave_polygon/ell.obj": (0, "is 0.3 m wide and 0.2 m high"),
-    "obj_face_without_vt/mixed.obj": (0, "lacks UVs on 2 of 4 triangles, rendered grey"),
+    "obj_face_without_vt/mixed.obj": (0, "has no UVs on 2 of 4 triangles; they are rendered grey"),
     "obj_face_without_vt/outofrange.obj": (2, "outofrange.obj:12 has the corner '9/9'"),
     "hostile/obj_novert.obj": (0, "is 1 m wide and 1 m high"),
     "hostile/obj_uv1.obj": (0, "is 1 m wide and 1 m high"),

@@ -305,7 +305,7 @@ def test_a_file_that_is_no_scene_is_an_error(tmp_path, name):
 
 
 def test_a_suffix_that_is_no_scene_is_an_error(tmp_path):
-    with pytest.raises(FabricError, match=r"is no scene"):
+    with pytest.raises(FabricError, match=r"is not a scene file"):
         read_scene(tmp_path / "x.jpg")
 
 

@@ -23,7 +23,7 @@ def test_every_kind_of_a_scene_has_its_module():
         ("import fabricusd.kernels; sys.modules['fabricusd.reference.lights.kinds.rect'] = "
          "types.SimpleNamespace(__name__='rect', KIND=2, fill=1)", "rect has no irradiance"),
         ("sys.modules['fabricusd.reference.lights.kinds.rect'] = types.SimpleNamespace("
-         "__name__='rect', KIND=3, fill=1, irradiance=1, sample=1, meet=1)", "are one kind"),
+         "__name__='rect', KIND=3, fill=1, irradiance=1, sample=1, meet=1)", "have the same KIND"),
     ],
 )  # fmt: skip
 def test_a_kind_that_is_forgotten_or_half_made_is_an_error_at_import(change, words):

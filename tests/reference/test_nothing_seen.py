@@ -32,9 +32,9 @@ CAMERAS = {
     "sees to the plane itself": (IN_FRONT, (2.9, 3.1), None),
     "near plane": (IN_FRONT, (10, 1e6), "the near clipping plane, at 10 m, cuts everything away"),
     "far plane": (IN_FRONT, (0.1, 2), "the far clipping plane, at 2 m, cuts everything away"),
-    "both planes": (IN_FRONT, (5, 2), "outside of its clipping range, 5 to 2 m"),
-    "turned away": (BEHIND, (0.1, 100), "no camera ray meets anything; turn the camera"),
-    "turned away, behind its planes": (BEHIND, (10, 20), "no camera ray meets anything"),
+    "both planes": (IN_FRONT, (5, 2), "outside its clipping range, 5 to 2 m"),
+    "turned away": (BEHIND, (0.1, 100), "no camera ray hits anything; point the camera"),
+    "turned away, behind its planes": (BEHIND, (10, 20), "no camera ray hits anything"),
 }
 
 

@@ -1,1 +1,1 @@
-"""Lights: their table, how they are sampled, how rays meet them."""
+"""Lights: their table, sampling directions to them, and finding the lights that rays pass."""

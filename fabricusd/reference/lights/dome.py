@@ -1,8 +1,9 @@
-"""A dome's picture: looked up by direction, and sampled in proportion to its brightness.
+"""A dome light's picture: looked up by direction, and sampled in proportion to its brightness.
 
-Latitude-longitude as OpenEXR and USD lay it out: +y is the top row, +z the middle column, +x a
-quarter of the width to its left. As light a picture is constant in each texel, so that sampling is
-exactly as bright as the picture; what a camera sees of it is interpolated.
+The layout is latitude-longitude as in OpenEXR and USD: +y is the top row, +z the middle column, and
++x lies a quarter of the width to its left. For illumination, the picture is constant over each
+texel, so that the sampling density is exactly proportional to it. For camera rays, the picture is
+interpolated.
 """
 
 from __future__ import annotations
@@ -20,15 +21,19 @@ from fabricusd.reference.lights.row import LUMINANCE
 R = np.float32
 _PI = R(math.pi)
 DENSITY, UPTO, GUIDE, CELL = 3, 4, 5, 8
-"""Columns of `Dome.cells` after the radiance, and how many there are: two to a cache line."""
+"""Columns of `Dome.cells` after the radiance, and their number; two cells share a cache line."""
 
 
 class Dome(NamedTuple):
-    """cells : (h w, CELL) float32 - all that is known of a texel in one place of memory: radiance
-    r, g, b, density [1/sr], the share of its row's brightness up to its end, and the first texel
-    of the row to look at for numbers from k/w on, where k is its own place in the row
-    rows : (h, 2) float32 - the same share and guide for rows
-    size : (2,) int64 - h, w; rotation : (3, 3) float32, world to dome."""
+    """The tables of a dome's picture.
+
+    cells : (h w, CELL) float32 - the data of each texel, contiguous in memory: radiance r, g, b;
+        density [1/sr]; cumulative share of the row's brightness, up to and including this texel;
+        guide: the texel at which the search of the row starts for numbers from k/w on, where k is
+        this texel's column
+    rows : (h, 2) float32 - cumulative share and guide of the rows
+    size : (2,) int64 - h, w; rotation : (3, 3) float32 - world to dome
+    """
 
     cells: NDArray[np.float32]
     rows: NDArray[np.float32]
@@ -37,7 +42,7 @@ class Dome(NamedTuple):
 
 
 def build_dome(image: NDArray[Any], rotation: NDArray[Any]) -> Dome:
-    """Tables for a picture (h, w, 3) of radiance; `rotation` (3, 3) goes from world to dome."""
+    """Build the tables of an (h, w, 3) picture of radiance; `rotation` (3, 3) is world to dome."""
     picture = np.ascontiguousarray(image, np.float32)
     h, w = picture.shape[:2]
     brightness = np.maximum(picture.astype(np.float64) @ LUMINANCE, 0.0)
@@ -46,7 +51,7 @@ def build_dome(image: NDArray[Any], rotation: NDArray[Any]) -> Dome:
     if not brightness.sum() > 0:
         brightness[:] = 1.0
     of_rows = brightness.sum(axis=1) * solid
-    # A black row is never chosen; its shares only have to be numbers.
+    # A black row is never chosen; its shares only have to be finite.
     inside = np.where(of_rows[:, None] > 0, brightness, 1.0)
     cells = np.zeros((h, w, CELL), np.float32)
     cells[..., :3] = picture
@@ -62,14 +67,14 @@ def build_dome(image: NDArray[Any], rotation: NDArray[Any]) -> Dome:
 def shares_and_guides(
     weight: NDArray[np.float64],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """For rows (m, n) of weights: cumulative shares, and where a search for k/n may begin.
+    """For (m, n) rows of weights: cumulative shares, and guides where a search for k/n may begin.
 
-    [Chen1974]: from its guide a number finds its place in less than two steps on average.
+    [Chen1974] A search that starts at the guide takes fewer than two steps on average.
     """
     n = weight.shape[1]
     upto = np.cumsum(weight, axis=1)
     shares = np.asarray(upto / upto[:, -1:], np.float32)
-    # Numbers are below 1, and a search may not run over the end.
+    # Uniform numbers are below 1, so a share of 2 stops every search before the end of the row.
     last = n - np.argmax(weight[:, ::-1] > 0, axis=1)
     shares[np.arange(n) >= last[:, None] - 1] = 2.0
     starts = (np.arange(n) / n).astype(np.float32)
@@ -79,7 +84,7 @@ def shares_and_guides(
 
 @njit(**INLINE)
 def place_of(dome, x, y, z):
-    """World direction to picture coordinates (column, row) in texels."""
+    """Map a world direction to picture coordinates (column, row) [texels]."""
     m = dome.rotation
     a = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z
     b = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z
@@ -93,14 +98,14 @@ def place_of(dome, x, y, z):
 
 @njit(**INLINE)
 def cell_at(dome, column, row):
-    """Index of the texel at a place."""
+    """Index of the texel at (column, row)."""
     h, w = dome.size[0], dome.size[1]
     return min(int(row), h - 1) * w + min(int(column), w - 1)
 
 
 @njit(**INLINE)
 def smooth_radiance(dome, column, row):
-    """Bilinear lookup, for the eye: (r, g, b)."""
+    """Bilinear lookup of (r, g, b), for camera rays."""
     h, w = dome.size[0], dome.size[1]
     x, y = column - R(0.5), min(max(row - R(0.5), R(0)), R(h - 1))
     i, j = math.floor(x), math.floor(y)
@@ -118,7 +123,7 @@ def smooth_radiance(dome, column, row):
 
 @njit(**INLINE)
 def _find(table, start, count, upto, guide, u):
-    """(place of u among `count` cumulative shares, how far into it) [0, 1)."""
+    """Find u among `count` cumulative shares: (index, fractional position there in [0, 1))."""
     k = min(int(u * R(count)), count - 1)
     k = int(table[start + k, guide])
     while u >= table[start + k, upto]:
@@ -130,8 +135,8 @@ def _find(table, start, count, upto, guide, u):
 
 @njit(**INLINE)
 def choose_cell(dome, u0, u1):
-    """A texel by its brightness from two uniform numbers: (row, how far down in it, column, how far
-    along in it)."""
+    """Choose a texel in proportion to its brightness: (row, position down the row, column, position
+    along the texel), both positions in [0, 1)."""
     h, w = dome.size[0], dome.size[1]
     if h * w == 1:
         return 0, u0, 0, u1
@@ -142,7 +147,10 @@ def choose_cell(dome, u0, u1):
 
 @njit(**INLINE)
 def direction_in(dome, row, down, column):
-    """World direction of a place `down` and `column` in texels; even by solid angle down a row."""
+    """World direction of a point in the picture: `column` in texels, and `down` within `row`.
+
+    `down` is linear in solid angle.
+    """
     top = cos(R, row * (_PI / R(dome.size[0])))
     bottom = cos(R, (row + R(1)) * (_PI / R(dome.size[0])))
     b = top + down * (bottom - top)

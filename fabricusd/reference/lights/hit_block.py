@@ -1,9 +1,10 @@
-"""Rows of a block of hits that light sampling reads and fills, and how a kind fills them.
+"""The block of hits that light samplers read and fill, and functions that kinds share to fill it.
 
-A sampler is given the hits `begin` to `end` of a block. It reads two uniform numbers and the place
-of each, and keeps the direction to the light, the distance, and the density of the direction per
-solid angle, which holds the chance of choosing the light: 0 where the light does not shine on the
-hit, *minus* the chance for a light without extent, which no ray hits.
+A sampler is given the hits from `begin` to before `end` of a block. It reads two uniform numbers
+and the position of each hit, and stores the direction to the light, the distance, and the pdf of
+the direction per solid angle, which includes the chance of choosing the light. The pdf is 0 if the
+light does not shine on the hit, and *minus* the chance for a light without extent, which no ray can
+hit.
 """
 
 from __future__ import annotations
@@ -15,14 +16,13 @@ from numba import njit
 
 from fabricusd.kernels.real import INLINE, cos, sin
 from fabricusd.reference.lights.row import AREA, CHANCE, P, X, Y, Z
-from fabricusd.reference.rays.hit_frames import BLOCK, CHOSEN, MADE, NUMBERS
-from fabricusd.reference.rays.wave import FRONT
+from fabricusd.reference.rays.hit_frames import CHOSEN, MADE, NUMBERS
+from fabricusd.reference.rays.wave import BLOCK, FRONT
 
 R = np.float32
 _PI = R(math.pi)
-FAR = R(1e30)
 
-# Rows from CHOSEN on, in the order of `Wave.hits` from WI on.
+# Rows from CHOSEN on, in the order of the rows of `Hits.rows` from WI on.
 WI, TO, DISTANCE, LIGHT, PDF = (CHOSEN + row * BLOCK for row in (0, 3, 6, 7, 10))
 
 DX, DY, DZ = (TO + row * BLOCK for row in range(3))
@@ -33,14 +33,14 @@ U0, U1 = NUMBERS + 5 * BLOCK, NUMBERS + 6 * BLOCK
 
 @njit(**INLINE)
 def keep(block, y, dx, dy, dz, distance, pdf):
-    """Keep a direction, the distance of the light along it, and its density."""
+    """Store a direction, the distance to the light along it, and its pdf."""
     block[DX + y], block[DY + y], block[DZ + y] = dx, dy, dz
     block[DISTANCE + y], block[PDF + y] = distance, pdf
 
 
 @njit(**INLINE)
 def in_cone(ax, ay, az, one_minus_cos, u0, u1):
-    """A direction in the cone around the unit axis a, uniform by solid angle."""
+    """Sample a direction in the cone around the unit axis a, uniform by solid angle."""
     down = u0 * one_minus_cos
     sine = math.sqrt(max(down * (R(2) - down), R(0)))
     phi = R(2) * _PI * u1
@@ -55,7 +55,7 @@ def in_cone(ax, ay, az, one_minus_cos, u0, u1):
 
 @njit(**INLINE)
 def keep_point(light, block, y, qx, qy, qz, nx, ny, nz):
-    """Towards the point q of the light, where its normal is n."""
+    """Store the direction towards the point q on the light, where the light's normal is n."""
     dx, dy, dz = qx - block[PX + y], qy - block[PY + y], qz - block[PZ + y]
     square = max(dx * dx + dy * dy + dz * dz, R(1e-20))
     distance = math.sqrt(square)
@@ -68,7 +68,7 @@ def keep_point(light, block, y, qx, qy, qz, nx, ny, nz):
 
 @njit(**INLINE)
 def keep_flat(light, block, y, a, b):
-    """Towards the point of a flat light at a of its x and b of its y axis."""
+    """Store the direction towards the point of a flat light at a along its x and b along its y."""
     keep_point(
         light, block, y,
         light[P] + a * light[X] + b * light[Y],

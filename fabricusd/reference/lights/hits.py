@@ -1,6 +1,6 @@
-"""What rays see of the lights before their first triangle, a block of rays at a time.
+"""Finding the lights that rays pass before their first triangle, one block of rays at a time.
 
-A light's kind is a constant of each loop, and LLVM vectorises the loops.
+Within each loop the light's kind is constant, so LLVM vectorises the loops.
 """
 
 from __future__ import annotations
@@ -9,12 +9,13 @@ from numba import njit
 
 from fabricusd.kernels.real import PART
 from fabricusd.reference.lights.kinds import KINDS
-from fabricusd.reference.lights.ray_block import BLOCK, SEEN_B, SEEN_R, R
+from fabricusd.reference.lights.ray_block import SEEN_B, SEEN_R, R
 from fabricusd.reference.lights.row import KIND, VISIBLE
+from fabricusd.reference.rays.wave import BLOCK
 
 
 def _first_of(kinds):
-    """A kernel that adds a light as its kind does, see `sampling`."""
+    """Make a kernel that calls `meet` of a light's kind, as in `sampling._first_of`."""
     if not kinds:
         return _none
     (number, module), *others = kinds
@@ -32,7 +33,7 @@ def _first_of(kinds):
 
 @njit(**PART)
 def _none(kind, light, dome, size, block):
-    """No kind is unknown: `kinds` has seen to that."""
+    """The end of the chain, never reached: `kinds` makes sure that every kind has a module."""
 
 
 _meet_of_kind = _first_of(list(KINDS.items()))
@@ -40,10 +41,11 @@ _meet_of_kind = _first_of(list(KINDS.items()))
 
 @njit(**PART)
 def meet_lights(lights, dome, all_first, size, block):
-    """Rows SEEN_R to SEEN_B of `size` rays: radiance of all lights that they pass, each weighted
-    by the power heuristic against light sampling.
+    """Fill rows SEEN_R to SEEN_B of `size` rays with the radiance of all lights that they pass.
 
-    all_first : whether every ray comes from the camera, so that lights it does not see are skipped
+    Each light is weighted against light sampling by the power heuristic.
+
+    all_first : whether all rays come from the camera; lights that it does not see are then skipped
     """
     for row in range(SEEN_R, SEEN_B + 1, BLOCK):
         for x in range(size):

@@ -1,6 +1,6 @@
-"""Rows of a block of rays that meets lights, and how a kind adds what a ray sees of it.
+"""The block of rays that `meet` of a light's kind works on, and functions that kinds share.
 
-Lights are no obstacles: a ray goes on behind them, so what it sees is the sum over all that it
+Lights do not block rays: a ray goes on behind a light, so it sees the sum of all lights that it
 passes before its first triangle.
 """
 
@@ -11,24 +11,22 @@ from numba import njit
 
 from fabricusd.kernels.real import INLINE
 from fabricusd.reference.lights.row import AREA, CHANCE, RED, VISIBLE, P, X, Y, Z
+from fabricusd.reference.rays.wave import BLOCK
 
 R = np.float32
-BLOCK = 128
 
-# Rows of a block of rays: origin and direction, length up to the first triangle, pdf of the
-# direction (below 0: nothing else samples it), 1 for a ray from the camera and 0 for others, what
-# the ray sees, and scratch.
+# Rows of a block of rays: origin and direction, distance to the first triangle, pdf of the
+# direction (negative if light sampling does not compete with it), 1 for a ray from the camera and 0
+# for others, the radiance that the ray sees, and scratch.
 (O_X, O_Y, O_Z, D_X, D_Y, D_Z, REACH, BEFORE, FIRST, SEEN_R, SEEN_G, SEEN_B, COLUMN, ROW) = (
     row * BLOCK for row in range(14)
 )
 LIGHT_ROWS = 14
-ENDLESS = R(1e29)
-"""Length from which on a ray has met nothing."""
 
 
 @njit(**INLINE)
 def weight_of(block, x, pdf):
-    """[Veach1997], of a direction that light sampling finds with the density `pdf`."""
+    """Power heuristic [Veach1997] of a ray's direction, which light sampling finds with `pdf`."""
     before = block[BEFORE + x]
     ratio = pdf / max(before, R(1e-30))
     return R(1) / (R(1) + ratio * ratio) if before > R(0) else R(1)
@@ -36,7 +34,7 @@ def weight_of(block, x, pdf):
 
 @njit(**INLINE)
 def add(light, block, x, pdf):
-    """Add a light of constant radiance, unless its pdf is 0 or it hides from the camera."""
+    """Add a light of constant radiance, unless its pdf is 0 or the camera does not see it."""
     hidden = block[FIRST + x] > light[VISIBLE]
     weight = R(0) if hidden or pdf <= R(0) else weight_of(block, x, pdf)
     block[SEEN_R + x] += weight * light[RED]
@@ -46,13 +44,13 @@ def add(light, block, x, pdf):
 
 @njit(**INLINE)
 def towards(light, block, x):
-    """From the ray's origin to the light's position."""
+    """The vector from the ray's origin to the light's position."""
     return light[P] - block[O_X + x], light[P + 1] - block[O_Y + x], light[P + 2] - block[O_Z + x]
 
 
 @njit(**INLINE)
 def add_area(light, block, x, met, t, cosine):
-    """Add a light of an area at the distance t, where its normal makes the cosine with the ray."""
+    """Add an area light at distance t; `cosine` is that of its normal with the reversed ray."""
     seen = met and t > R(0) and t < block[REACH + x] and cosine > R(1e-6)
     pdf = light[CHANCE] * t * t / (max(cosine, R(1e-6)) * light[AREA])
     add(light, block, x, pdf if seen else R(0))
@@ -60,7 +58,7 @@ def add_area(light, block, x, met, t, cosine):
 
 @njit(**INLINE)
 def meet_flat(light, disk, size, block):
-    """Add a flat light, an ellipse if `disk`, else a parallelogram."""
+    """Add a flat light: an ellipse if `disk`, else a parallelogram."""
     zx, zy, zz = light[Z], light[Z + 1], light[Z + 2]
     xx, xy, xz = light[X], light[X + 1], light[X + 2]
     yx, yy, yz = light[Y], light[Y + 1], light[Y + 2]

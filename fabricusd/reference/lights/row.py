@@ -1,4 +1,4 @@
-"""A light as one row of a table: what its columns mean, and what most kinds put there."""
+"""A light's row in the table of lights: its columns, and functions that kinds share to fill it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from fabricusd.scene.scene import Light
 
-# X and Y are half the extent of a rect, the radii of a disk, X half the axis of a cylinder; Z is
-# the unit direction that a flat light shines to, and the one that a distant light comes from.
+# X and Y are the half extents of a rect and the radii of a disk; X is half the axis of a cylinder.
+# Z is the unit direction in which a flat light shines, or from which a distant light comes.
 KIND, CHANCE, RED, P, X, Y, Z, SIZE, AREA, VISIBLE = 0, 1, 2, 5, 8, 11, 14, 17, 18, 19
 COLUMNS = 20
 
@@ -19,12 +19,12 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 class Axes(NamedTuple):
-    """The frame of a light as its row needs it.
+    """The axes of a light's frame, as its row needs them.
 
     x, y, z : (3,) float64 - the frame's own axes, with the light's scale
-    lengths : (3,) float64 - of these, above 0
-    normal : (3,) float64 - unit, square to x and y, also where the frame is sheared or flat;
-        on the side to which flat lights shine
+    lengths : (3,) float64 - the lengths of these axes, above 0
+    normal : (3,) float64 - unit vector perpendicular to x and y, even if the frame is sheared or
+        flat; it points to the side on which flat lights shine
     """
 
     x: NDArray[np.float64]
@@ -44,28 +44,28 @@ def axes_of(light: Light) -> Axes:
 
 
 def put_axes(row: NDArray[np.float64], x: Any, y: Any, z: Any) -> None:
-    """Fill the columns of three axes."""
+    """Fill the columns X, Y and Z."""
     row[X : X + 3], row[Y : Y + 3], row[Z : Z + 3] = x, y, z
 
 
 def brightness(row: NDArray[np.float32]) -> float:
-    """Luminance of the light's radiance."""
+    """The luminance of the light's radiance."""
     return float(row[RED : RED + 3] @ LUMINANCE)
 
 
 def mean_irradiance(
     row: NDArray[np.float32], places: NDArray[np.float32], *, one_sided: bool
 ) -> float:
-    """Mean over `places` of the irradiance of surfaces that face any way that a light of an area
-    reaches.
+    """Mean irradiance that an area light gives at `places`, averaged over all orientations of a
+    surface.
 
     places : (n, 3) [m]
-    one_sided : whether the light shines to the side of its axis Z alone
+    one_sided : whether the light shines only to the side of its axis Z
     """
     away = np.asarray(places, np.float64) - row[P : P + 3]
-    # Nearer than its size a light is no brighter.
+    # A light does not get brighter at distances below its own size.
     distance2 = np.maximum(np.einsum("ij,ij->i", away, away), max(float(row[AREA]), 1e-12))
-    # The share of its surface that is seen, foreshortened.
+    # The projected share of the light's surface that is visible.
     seen = np.full(len(away), 0.25)
     if one_sided:
         seen = np.maximum(away @ row[Z : Z + 3], 0.0) / np.sqrt(distance2)

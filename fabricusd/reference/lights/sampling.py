@@ -1,6 +1,6 @@
-"""A light for each hit of a block, and a direction to it, drawn as the light's kind does.
+"""Light sampling: chooses a light for each hit of a block and samples a direction to it.
 
-Hits that chose the same light lie together, so that its kind and numbers are constants of a loop
+Hits that chose the same light lie together. The light's kind and row are then constants of a loop
 that LLVM vectorises.
 """
 
@@ -14,7 +14,6 @@ from numba import njit
 from fabricusd.kernels.real import INLINE, PART, cos, sin, whole
 from fabricusd.reference.lights.hit_block import (
     DISTANCE,
-    FAR,
     LIGHT,
     LIGHT_B,
     LIGHT_G,
@@ -25,8 +24,9 @@ from fabricusd.reference.lights.hit_block import (
 )
 from fabricusd.reference.lights.kinds import KINDS
 from fabricusd.reference.lights.row import CHANCE, KIND, RED
-from fabricusd.reference.rays.hit_frames import BLOCK, CHOSEN, MADE, NUMBERS
-from fabricusd.reference.rays.wave import N, U, V
+from fabricusd.reference.rays.embree import INFINITE_DISTANCE
+from fabricusd.reference.rays.hit_frames import CHOSEN, MADE, NUMBERS
+from fabricusd.reference.rays.wave import BLOCK, N, U, V
 
 R = np.float32
 _PI = R(math.pi)
@@ -34,7 +34,10 @@ _PI = R(math.pi)
 
 @njit(**PART)
 def choose_lights(lights, count, left, choice):
-    """Index of the light that each of `count` uniform numbers `left` chooses, which it uses up."""
+    """Write to `choice` the index of the light that each of `count` uniform numbers chooses.
+
+    left : (count,) float32 - the uniform numbers; on return, what is left of them
+    """
     for x in range(count):
         choice[x] = 0
     for j in range(lights.shape[0] - 1):
@@ -45,10 +48,10 @@ def choose_lights(lights, count, left, choice):
 
 
 def _first_of(kinds):
-    """A kernel that calls the sampler of a light's kind.
+    """Make a kernel that calls the sampler of a light's kind.
 
-    One that is a chain of questions, made from the list of kinds: numba calls no function out of a
-    table without losing what it knows of the arrays.
+    The kernel is a chain of comparisons built from the list of kinds: if numba called a function
+    out of a table, it would lose what it knows about the arrays.
     """
     if not kinds:
         return _none
@@ -67,7 +70,7 @@ def _first_of(kinds):
 
 @njit(**PART)
 def _none(kind, light, dome, begin, end, block):
-    """No kind is unknown: `kinds` has seen to that."""
+    """The end of the chain, never reached: `kinds` makes sure that every kind has a module."""
 
 
 _sample_of_kind = _first_of(list(KINDS.items()))
@@ -75,7 +78,7 @@ _sample_of_kind = _first_of(list(KINDS.items()))
 
 @njit(**PART)
 def _sample(light, dome, begin, end, block):
-    """Directions to one light."""
+    """Sample directions to one light for the hits from `begin` to before `end`."""
     for y in range(whole(begin), whole(end)):
         block[LIGHT_R + y], block[LIGHT_G + y] = light[RED], light[RED + 1]
         block[LIGHT_B + y] = light[RED + 2]
@@ -84,9 +87,9 @@ def _sample(light, dome, begin, end, block):
 
 @njit(**PART)
 def sample_lights(lights, dome, ends, count, block):
-    """Rows WI to LIGHT_PDF of `count` hits, by two of their numbers.
+    """Fill rows WI to LIGHT_PDF of `count` hits, using two of their random numbers.
 
-    ends : (lights,) int32 - where the hits of each light end; they lie one light after the other
+    ends : (lights,) int32 - where the hits of each light end; they are sorted by light
     """
     begin = np.int64(0)
     for j in range(lights.shape[0]):
@@ -99,7 +102,7 @@ def sample_lights(lights, dome, ends, count, block):
 
 @njit(**INLINE)
 def _turn(count, block):
-    """Directions to the light in the surface frame, and what arrives from there over its pdf."""
+    """Compute directions to the light in the surface frame, and the light's radiance over pdf."""
     for x in range(count):
         dx, dy, dz = block[TO + x], block[TO + BLOCK + x], block[TO + 2 * BLOCK + x]
         at = MADE + U * BLOCK + x
@@ -119,17 +122,17 @@ def _turn(count, block):
 
 @njit(**PART)
 def no_lights(count, block):
-    """The same rows where no light is sampled."""
+    """Fill the same rows for hits that sample no light."""
     for row in range(11):
         for x in range(count):
             block[CHOSEN + row * BLOCK + x] = R(0)
     for x in range(count):
-        block[WI + 2 * BLOCK + x], block[DISTANCE + x] = R(1), FAR
+        block[WI + 2 * BLOCK + x], block[DISTANCE + x] = R(1), INFINITE_DISTANCE
 
 
 @njit(**PART)
 def sample_evenly(count, block):
-    """Directions uniform over the sphere instead, for the estimator that knows no lights."""
+    """Fill WI with directions uniform over the sphere, for the estimator without light sampling."""
     no_lights(count, block)
     for x in range(count):
         z = R(1) - R(2) * block[NUMBERS + 5 * BLOCK + x]

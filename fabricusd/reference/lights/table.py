@@ -1,13 +1,14 @@
-"""Lights as rows of one table, chosen by power; `sampling` draws from them, `hits` meets them.
+"""Builds the table of lights and the chances of choosing each; `sampling` and `hits` read it.
 
-Lights are no obstacles: a ray goes on behind them, so what a ray sees is the sum over all that it
-passes before its first triangle. That keeps sampling and hitting two estimators of one integral.
-Each `pdf` is per solid angle and holds the chance of choosing the light.
+Lights do not block rays: a ray goes on behind a light, so it sees the sum of all lights that it
+passes before its first triangle. Sampling lights and hitting them therefore estimate the same
+integral. Every `pdf` is per solid angle and includes the chance of choosing the light.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -24,36 +25,42 @@ R = np.float32
 _PI = R(math.pi)
 
 
-def build_lights(
-    lights: list[Light], centre: NDArray[np.float64]
-) -> tuple[NDArray[np.float32], Dome]:
-    """The table (n, COLUMNS) float32 and the dome's picture, all domes added into one.
+class Lights(NamedTuple):
+    """All lights of a scene: table : (n, COLUMNS) float32; dome : the picture of all domes."""
 
-    `share_out` gives the lights other chances than equal ones.
+    table: NDArray[np.float32]
+    dome: Dome
+
+
+def build_lights(lights: list[Light], centre: NDArray[np.float64]) -> Lights:
+    """Build the table of the lights, and the picture of all domes together.
+
+    All lights get the same chance; `share_out` changes the chances.
     """
     table = np.zeros((0, COLUMNS), np.float32)
     rows = [_row(light, centre) for light in lights if light.kind != DOME]
     domes = [light for light in lights if light.kind == DOME]
     dome = _merge_domes(domes)
     if domes:
-        # Its picture is all of them.
+        # One row stands for all domes: their pictures are merged.
         rows.append(_row(Light(path="", kind=DOME, radiance=(0.0, 0.0, 0.0)), centre))
     if rows:
         table = np.ascontiguousarray(rows, np.float32)
         table[:, CHANCE] = 1 / len(rows)
-    return table, dome
+    return Lights(table, dome)
 
 
-def share_out(table: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]) -> None:
+def share_out(lights: Lights, places: NDArray[np.float32]) -> None:
     """Make the chance of choosing a light proportional to how brightly it lights `places`.
 
-    places : (n, 3) [m] around the scene's centre - what the camera sees, say
+    places : (n, 3) [m], relative to the scene's centre - for example, what the camera sees
     """
     if not len(places):
         return
+    table, dome = lights
     power = np.array([KINDS[int(row[KIND])].irradiance(row, dome, places) for row in table])
     if power.sum() > 0:
-        # No light is forgotten altogether: shadows and surfaces' directions are not known.
+        # Keep a chance for every light: the estimate ignores shadows and the surfaces' orientation.
         table[:, CHANCE] = 0.8 * power / power.sum() + 0.2 / len(table)
 
 
@@ -67,7 +74,7 @@ def _row(light: Light, centre: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _merge_domes(domes: list[Light]) -> Dome:
-    """One picture of all domes; kept as it is where there is only one."""
+    """Merge the pictures of all domes; a single picture is kept as it is."""
     if not domes:
         return build_dome(np.zeros((1, 1, 3)), np.eye(3))
     pictures = []
@@ -102,7 +109,7 @@ def _add_dome(total, dome):
 
 
 def _rotation(frame: NDArray[np.float64]) -> NDArray[np.float64]:
-    """World to local, from the frame's axes made orthonormal."""
+    """The rotation from world to local space, from the frame's axes made orthonormal."""
     x = frame[:3, 0] / max(float(np.linalg.norm(frame[:3, 0])), 1e-30)
     y = frame[:3, 1] - x * (x @ frame[:3, 1])
     y = y / max(float(np.linalg.norm(y)), 1e-30)

@@ -1,1 +1,1 @@
-"""Rays: cameras, packets, random numbers, Embree, the triangles they meet."""
+"""Rays: cameras, packets, random numbers, Embree, and the triangles that rays hit."""

@@ -1,7 +1,7 @@
-"""Camera rays: a thin lens, a pixel filter, and the cone that a pixel is.
+"""Camera rays: a thin lens, a pixel filter, and the cone that a pixel subtends.
 
-The filter is importance-sampled: each sample belongs to one pixel and has the weight 1, so pixels
-are independent of one another and their variance is the variance of the mean.
+The filter is importance-sampled: each sample belongs to one pixel with weight 1. Pixels are
+therefore independent of one another, and the variance of a pixel is the variance of a mean.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from fabricusd.reference.rays.embree import (
     DX,
     DY,
     DZ,
+    ENDLESS,
     GEOMETRY,
+    INFINITE_DISTANCE,
     LANES,
     MISS,
     OX,
@@ -33,20 +35,17 @@ from fabricusd.scene.scene import Camera, Scene
 
 R = np.float32
 FILTERS = ("box", "tent", "spline")
-"""Half a pixel wide, one pixel (the default), one and a half (quadratic B-spline)."""
-
-FAR = R(1e30)
-"""Length of a ray without end."""
+"""Radius half a pixel, one pixel (the default), one and a half pixels (quadratic B-spline)."""
 
 
 class Lens(NamedTuple):
-    """A camera for one picture size, in float32 around the scene's centre.
+    """A camera for one picture size, in float32 and relative to the scene's centre.
 
-    eye, across, down, forward : (3,) - position; steps of one pixel at distance 1; towards pixel
-        corner (0, 0) at distance 1
+    eye : (3,) - position; across, down : (3,) - steps of one pixel at distance 1; forward : (3,) -
+        from the eye to pixel corner (0, 0) at distance 1
     right, up : (3,) - unit axes of the lens; axis : (3,) - unit viewing direction
     aperture_radius, focus : [m]; near, far : [m], along the viewing direction
-    spread : angle of a pixel [rad]; pixel : width of a pixel [m], 0 unless orthographic
+    spread : angle of a pixel [rad]; for an orthographic camera the width of a pixel [m]
     """
 
     eye: NDArray[np.float32]
@@ -68,7 +67,10 @@ class Lens(NamedTuple):
 def build_lens(
     camera: Camera, width: int, height: int, centre: NDArray[np.float64], pixel_filter: str
 ) -> Lens:
-    """The lens of `camera` for a picture of `width` by `height`, the aperture's width kept."""
+    """The lens of `camera` for a picture of `width` by `height`; the aperture keeps its width.
+
+    Raises FabricError for an unknown `pixel_filter`.
+    """
     if pixel_filter not in FILTERS:
         raise FabricError(
             "pixel filter", f"is '{pixel_filter}'; it must be one of {', '.join(FILTERS)}"
@@ -92,25 +94,25 @@ def build_lens(
     return Lens(
         real(eye - centre), real(across), real(down), real(corner), real(right), real(up),
         real(-back), R(radius), R(camera.focus_distance or 1.0), R(camera.clipping[0]),
-        R(min(camera.clipping[1], 1e30)), R(pixel), camera.orthographic,
+        R(min(camera.clipping[1], float(INFINITE_DISTANCE))), R(pixel), camera.orthographic,
         FILTERS.index(pixel_filter),
     )  # fmt: skip
 
 
 @njit(**INLINE)
 def _nearer(x, u):
-    """One of Newton's steps towards where the middle of the spline's integral is u."""
+    """One step of Newton's method for the place where the spline's integral (middle part) is u."""
     return x - (x * (R(0.75) - x * x * R(1 / 3)) - (u - R(0.5))) / (R(0.75) - x * x)
 
 
 @njit(**INLINE)
 def filter_offset(kind, u):
-    """Place in a pixel's filter, its centre at 0: the inverse of the filter's integral."""
+    """Offset [pixels] from the filter's centre: the inverse of the filter's integral at u."""
     upper = u >= R(0.5)
     half = R(1) - u if upper else u
     tent = math.sqrt(R(2) * half) - R(1)
-    # The spline's tail is a cube; its middle, x (3/4 - x^2/3) = half - 1/2, takes three of Newton's
-    # steps from the line that joins its ends.
+    # The integral of the spline's tail is a cube. Its middle part, x (3/4 - x^2/3) = half - 1/2, is
+    # inverted by three Newton steps that start from the line that joins its ends.
     tail = exp(R, log(R, max(R(6) * half, R(1e-30))) * R(1 / 3)) - R(1.5)
     x = R(1.5) * (half - R(0.5))
     x = _nearer(_nearer(_nearer(x, half), half), half)
@@ -121,20 +123,21 @@ def filter_offset(kind, u):
     return place if kind == 0 else smooth
 
 
-# Rows of what a packet of camera rays is made from: column and row of the pixel, and the spread of
-# its cone.
+# Rows of the inputs of a packet of camera rays: column and row of the pixel, and the spread of the
+# ray's cone.
 _COLUMN, _ROW, _SPREAD = (row * LANES for row in range(3))
 
 
 @njit(**KERNEL)
-def camera_rays(lens, width, pixels, first, samples, numbers, packets, cone, path_pixel,
-                path_sample):  # fmt: skip
-    """Write the rays of `samples` samples of each of `pixels`, from sample `first` on.
+def camera_rays(lens, width, pixels, first, samples, numbers, packets, cone, paths):
+    """Write the camera rays of `samples` samples for each of `pixels`, starting at sample `first`.
 
     pixels : (n,) int32 - row times `width` plus column; path `k` is sample `k % samples` of pixel
-    `k // samples`. packets : (packets, ROWS 16); cone : (2, n samples) - width and spread of each
-    ray. path_pixel, path_sample : (n samples,) uint32 - which numbers each path gets.
+        number `k // samples` in this array
+    packets : (packets, ROWS 16) float32; cone : (2, n samples) - width and spread of each ray
+    paths : `Paths` of n samples entries
     """
+    path_pixel, path_sample = paths.pixel, paths.sample
     count = pixels.shape[0] * samples
     places = np.empty(3 * LANES, np.float32)
     counters = np.empty(2 * LANES, np.uint32)
@@ -164,7 +167,7 @@ def camera_rays(lens, width, pixels, first, samples, numbers, packets, cone, pat
 
 @njit(**INLINE)
 def _packet(lens, numbers, size, counters, places, packet):
-    """One packet of rays, by a loop that LLVM vectorises: what it needs is read before it."""
+    """Write one packet of rays. All inputs are read before the loop, so that LLVM vectorises it."""
     flat = R(0) if lens.orthographic else R(1)
     round_ = R(1) - flat
     radius, focus, spread, kind = lens.aperture_radius, lens.focus, lens.spread, lens.filter
@@ -182,7 +185,7 @@ def _packet(lens, numbers, size, counters, places, packet):
         y = places[_ROW + lane] + R(0.5) + filter_offset(kind, u1)
         ax, ay = fx + x * cx + y * hx, fy + x * cy + y * hy
         az = fz + x * cz + y * hz
-        # Where on the lens: a pinhole's radius is 0, and so is an orthographic camera's.
+        # The point on the lens. The radius is 0 for a pinhole and for an orthographic camera.
         r, phi = radius * math.sqrt(u2), R(2 * math.pi) * u3
         a, b = r * cos(R, phi), r * sin(R, phi)
         sx, sy = a * rx + b * vx + round_ * ax, a * ry + b * vy + round_ * ay
@@ -197,12 +200,12 @@ def _packet(lens, numbers, size, counters, places, packet):
         packet[DZ * LANES + lane] = az
         cosine = max(ax * zx + ay * zy + az * zz, R(1e-3))
         packet[TNEAR * LANES + lane] = near / cosine
-        packet[TFAR * LANES + lane] = far / cosine if far < R(1e29) else FAR
+        packet[TFAR * LANES + lane] = far / cosine if far < ENDLESS else INFINITE_DISTANCE
         places[_SPREAD + lane] = flat * spread * cosine
 
 
 def default_camera(scene: Scene, width: int, height: int) -> Camera:
-    """A 50 mm camera that sees the whole scene from the front, a little from above and the side."""
+    """A 50 mm camera that sees the whole scene from the front, slightly from above and the side."""
     low, high = scene.bounds()
     centre, radius = 0.5 * (low + high), max(float(np.linalg.norm(high - low)) / 2, 1e-6)
     up = np.array([0.0, 0.0, 1.0]) if scene.up_axis == "Z" else np.array([0.0, 1.0, 0.0])

@@ -1,4 +1,4 @@
-"""A hash of four counters, and what makes a uniform number of it."""
+"""A counter-based generator: hashes four counters and maps the hash to a uniform number."""
 
 from __future__ import annotations
 
@@ -37,5 +37,5 @@ def pcg4d(a, b, c, d):
 
 @njit(**INLINE)
 def unit_float(x):
-    """A uint32 as a float32 in [0, 1), by its upper 24 bits."""
+    """Map a uint32 to a float32 in [0, 1) by its upper 24 bits."""
     return R(np.int32(x >> _U(8))) * R(5.9604645e-08)

@@ -1,13 +1,12 @@
 """Nearest hits and occlusion through Embree 4, in packets of 16 rays.
 
-The C library that the embreex wheel ships is called by name from compiled kernels, without the
-interpreter in between. Where that library is not found, embreex's own Python interface answers the
-same two questions, slower. The library is found by `scene.surface.embree_library`, which
-limit surfaces ask too.
+Compiled kernels call the C library of the embreex wheel by name, without the Python interpreter in
+between. If the library is not found, embreex's own Python interface traces the same rays, more
+slowly. `scene.surface.embree_library` finds the library; limit surfaces use it as well.
 
-Rays travel as Embree's own `RTCRayHit16`: an array (packets, ROWS, 16) float32 whose rows are named
-below; rows 9, 10, 11, 17, 18, ... hold unsigned integers. A lane whose `TFAR` is below its `TNEAR`
-is not traced, which is how a packet that is not full is padded.
+Rays are stored as Embree's `RTCRayHit16`: an array (packets, ROWS, 16) float32 whose rows are named
+below; rows 9, 10, 11, 17, 18, ... hold unsigned integers. Embree skips a lane whose `TFAR` is below
+its `TNEAR`, so packets that are not full are padded with such lanes.
 """
 
 from __future__ import annotations
@@ -27,13 +26,18 @@ from fabricusd.scene.surface.embree_library import PATH, library
 
 LANES = 16
 ROWS = 24
-"""Rows of a packet: 21 in Embree 4.4 with instance arrays, padded for what a later one adds."""
+"""Rows of a packet: 21 in Embree 4.4 with instance arrays; the rest is room for later versions."""
 
 OX, OY, OZ, TNEAR, DX, DY, DZ, TIME, TFAR, MASK, ID, FLAGS = range(12)
 NGX, NGY, NGZ, HIT_U, HIT_V, PRIMITIVE, GEOMETRY, INSTANCE = range(12, 20)
 
 MISS = np.uint32(0xFFFFFFFF)
 """`PRIMITIVE` and `GEOMETRY` of a ray that hit nothing."""
+
+INFINITE_DISTANCE = np.float32(1e30)
+"""`TFAR` of a ray without end, and the distance to a light at infinity."""
+ENDLESS = np.float32(1e29)
+"""Distance from which on a ray counts as having hit nothing."""
 
 _FLOAT3, _UINT3 = 0x9003, 0x5003
 _ROBUST = 4
@@ -45,7 +49,7 @@ _ALL_FEATURES = 0xFFFFFFFF
 
 
 class _Arguments(ctypes.Structure):
-    """`RTCIntersectArguments` and `RTCOccludedArguments`, which are laid out alike."""
+    """`RTCIntersectArguments` and `RTCOccludedArguments`, which have the same layout."""
 
     _fields_ = (
         ("flags", ctypes.c_uint32),
@@ -58,13 +62,14 @@ class _Arguments(ctypes.Structure):
 
 
 _TOGETHER = _Arguments(flags=_COHERENT, feature_mask=_ALL_FEATURES)
-"""Rays of a packet go through the hierarchy together, not one after the other."""
+"""Arguments that make Embree traverse the hierarchy with all rays of a packet together instead of
+one ray after the other."""
 
 
 _LIBRARY = library()
 if _LIBRARY is not None:
     try:
-        # Kernels find the functions by name, also those that come out of numba's disk cache.
+        # Kernels find these functions by name, including kernels loaded from numba's disk cache.
         binding.load_library_permanently(PATH)
     except RuntimeError:
         _LIBRARY = None
@@ -92,7 +97,7 @@ def _occluded_packets(scene, valid, arguments, rays, count):
 
 
 def aligned_empty(shape: tuple[int, ...], dtype: Any = np.float32) -> NDArray[Any]:
-    """An uninitialised C-contiguous array that starts on a 64-byte line."""
+    """An uninitialised C-contiguous array, aligned to 64 bytes."""
     wanted = np.dtype(dtype)
     size = int(np.prod(shape)) * wanted.itemsize
     raw = np.empty(size + 64, np.uint8)
@@ -101,7 +106,7 @@ def aligned_empty(shape: tuple[int, ...], dtype: Any = np.float32) -> NDArray[An
 
 
 def new_packets(rays: int) -> NDArray[np.float32]:
-    """Room for `rays` rays: (ceil(rays / 16), ROWS, 16) float32, every lane inactive."""
+    """Packets for `rays` rays: (ceil(rays / 16), ROWS, 16) float32, with every lane inactive."""
     packets = aligned_empty(((rays + LANES - 1) // LANES, ROWS, LANES))
     packets[:] = 0.0
     packets[:, TFAR] = -1.0
@@ -110,14 +115,13 @@ def new_packets(rays: int) -> NDArray[np.float32]:
 
 
 class Accelerator:
-    """Triangles that rays can be asked about.
+    """An acceleration structure over triangles; several workers may trace rays at once.
 
-    points : (n, 3) float, triangles : (m, 3) int. Raises `FabricError` where Embree refuses them.
-    Safe to ask from several workers at once.
+    points : (n, 3) float, triangles : (m, 3) int. Raises `FabricError` if Embree refuses them.
     """
 
     def __init__(self, points: NDArray[Any], triangles: NDArray[Any]) -> None:
-        # Embree reads 16 bytes for the last vertex.
+        # Embree reads 16 bytes per vertex, also for the last one.
         self._points = np.zeros((len(points) + 1, 3), np.float32)
         self._points[:-1] = points
         self._triangles = np.ascontiguousarray(triangles, np.uint32)
@@ -151,7 +155,7 @@ class Accelerator:
 
     @property
     def version(self) -> str:
-        """Which Embree answers, and whether it has packets of 16 in hardware."""
+        """The version of Embree, and whether the processor supports packets of 16 natively."""
         if _LIBRARY is None:
             return f"embreex {importlib.metadata.version('embreex')}"
         number = _LIBRARY.rtcGetDeviceProperty(self._device, _VERSION)
@@ -160,11 +164,12 @@ class Accelerator:
         return f"Embree {words}, packets of 16 {'native' if native else 'emulated'}"
 
     def intersect(self, rays: NDArray[np.float32], count: int, *, coherent: bool = False) -> None:
-        """Find the nearest hit of the first `count` packets: TFAR and the hit rows are written.
+        """Find the nearest hits of the first `count` packets and write TFAR and the hit rows.
 
-        The caller sets GEOMETRY to MISS beforehand. A miss leaves TFAR and GEOMETRY as they are.
-        coherent : the rays of each packet run side by side, as a camera's do: a fifth of the time
-        then, and twice the time where they do not
+        The caller sets GEOMETRY to MISS beforehand. A miss leaves TFAR and GEOMETRY unchanged.
+
+        coherent : whether the rays of each packet run side by side, as a camera's do; tracing then
+            takes a fifth of the time, but twice the time if they do not
         """
         if self._python is not None:
             _python_trace(self._python, rays, count, occlusion=False)
@@ -173,7 +178,7 @@ class Accelerator:
         _intersect_packets(self._scene, self._valid.ctypes.data, arguments, rays, count)
 
     def occluded(self, rays: NDArray[np.float32], count: int) -> None:
-        """Set TFAR to -inf for each ray of the first `count` packets that something blocks."""
+        """Set TFAR to -inf for each blocked ray of the first `count` packets."""
         if self._python is not None:
             _python_trace(self._python, rays, count, occlusion=True)
             return
@@ -186,7 +191,7 @@ class Accelerator:
 
 
 def _python_scene(points: NDArray[np.float32], triangles: NDArray[np.uint32]) -> Any:
-    """The same triangles in a scene of embreex."""
+    """The triangles as a scene of embreex's Python interface."""
     try:
         from embreex import rtcore_scene
         from embreex.mesh_construction import TriangleMesh
@@ -198,7 +203,7 @@ def _python_scene(points: NDArray[np.float32], triangles: NDArray[np.uint32]) ->
 
 
 def _python_trace(scene: Any, rays: NDArray[np.float32], count: int, *, occlusion: bool) -> None:
-    """`intersect` or `occluded` through embreex, which takes rays that start at their origin."""
+    """`intersect` or `occluded` through embreex, whose rays always start at their origin."""
     block = rays[:count]
     near, far = block[:, TNEAR], block[:, TFAR]
     active = near <= far
@@ -209,7 +214,7 @@ def _python_trace(scene: Any, rays: NDArray[np.float32], count: int, *, occlusio
     reach = (far[active] - start).astype(np.float32)
     if not len(origin):
         return
-    hit = scene.run(origin, direction, np.minimum(reach, np.float32(1e30)), output=True)
+    hit = scene.run(origin, direction, np.minimum(reach, INFINITE_DISTANCE), output=True)
     found = (hit["primID"] != -1) & (hit["tfar"] <= reach)
     if occlusion:
         far[active] = np.where(found, np.float32(-np.inf), far[active])

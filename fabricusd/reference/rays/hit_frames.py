@@ -1,7 +1,7 @@
-"""Blocks of hits: place, frame and origins of new rays, and their random numbers.
+"""Preparing blocks of hits: positions, surface frames, origins of new rays and random numbers.
 
-The loops run over hits and LLVM vectorises them; all rows lie in one array, their distances known
-to the compiler, which therefore need not check them for overlap.
+The loops run over hits, and LLVM vectorises them. All rows lie in one array at distances that are
+known to the compiler, so the compiler need not check them for overlap.
 """
 
 from __future__ import annotations
@@ -16,34 +16,34 @@ from fabricusd.reference.rays.sobol import four_numbers
 from fabricusd.reference.rays.triangles import D1, D2, E1, E2, HAND, P0, RATE, RECORD, ST
 from fabricusd.reference.rays.triangles import N as NORMALS
 from fabricusd.reference.rays.triangles import T as TANGENTS
-from fabricusd.reference.rays.wave import BACK, FOOTPRINT, FRONT, PLACE, SIDE, WO, N, U, V
+from fabricusd.reference.rays.wave import BACK, BLOCK, FOOTPRINT, FRONT, PLACE, SIDE, WO, N, U, V
 
 R = np.float32
 
-BLOCK = 128
-"""Hits in a block: all its rows stay near the first-level cache."""
-
 TAKEN, RAY = 0, RECORD * BLOCK
-"""Where the triangle's record starts, and the ray: direction and barycentric coordinates."""
+"""Where the rows of the triangle's record start, and those of the ray: its direction and the hit's
+barycentric coordinates."""
 
 MADE = (RECORD + 5) * BLOCK
-"""Where what is made starts: the rows of `Wave.hits` from FRONT to SIDE, in their order."""
+"""Where the computed rows start: those of `Hits.rows` from FRONT to SIDE, in their order."""
 
 NUMBERS = MADE + (SIDE + 1) * BLOCK
-"""Where eight rows of random numbers start."""
+"""Where the eight rows of random numbers start."""
 
 CHOSEN = NUMBERS + 8 * BLOCK
-"""Where the light starts: the rows of `Wave.hits` from WI to LIGHT_PDF, in their order."""
+"""Where the rows of the chosen light start: those of `Hits.rows` from WI to LIGHT_PDF, in their
+order."""
 
 BLOCK_ROWS = RECORD + 5 + SIDE + 1 + 8 + 11
 
 
 @njit(**PART)
 def make_numbers(numbers, count, place, counters, block):
-    """Eight uniform numbers a hit, by its path's pixel and sample.
+    """Write eight uniform numbers per hit, selected by its path's pixel and sample.
 
-    The first two of a set of four are the most even together. They become its second and third,
-    which say where, while the first chooses among lobes or lights.
+    The first two dimensions of a set of four are the best stratified pair. They are stored as the
+    set's second and third numbers, which choose a point or direction; the stored first number
+    chooses among lobes or lights.
     """
     for x in range(count):
         a, b, c, d = four_numbers(numbers, counters[x], counters[BLOCK + x], place)
@@ -56,10 +56,10 @@ def make_numbers(numbers, count, place, counters, block):
         block[NUMBERS + 6 * BLOCK + x], block[NUMBERS + 7 * BLOCK + x] = b, d
 
 
-# A place and not a row and a column: numba compiles a function anew for each constant it is given.
+# Takes one index instead of a row and a column: numba recompiles a function for every constant.
 @njit(**INLINE)
 def _taken(block, at):
-    """Three numbers of the triangle's record."""
+    """Three consecutive numbers of the triangle's record."""
     return block[at], block[at + BLOCK], block[at + 2 * BLOCK]
 
 
@@ -70,14 +70,14 @@ def _make(block, at, a, b, c):
 
 @njit(**PART)
 def make_frames(count, epsilon, block):
-    """Rows FRONT to SIDE of `count` hits; FOOTPRINT comes in as the cone's width [m]."""
+    """Compute rows FRONT to SIDE of `count` hits; on input, FOOTPRINT is the cone's width [m]."""
     for x in range(count):
         dx, dy, dz = block[RAY + x], block[RAY + BLOCK + x], block[RAY + 2 * BLOCK + x]
         u, v = block[RAY + 3 * BLOCK + x], block[RAY + 4 * BLOCK + x]
         w = R(1) - u - v
         ax, ay, az = _taken(block, TAKEN + E1 * BLOCK + x)
         bx, by, bz = _taken(block, TAKEN + E2 * BLOCK + x)
-        # From the first corner; the corners' own offsets below are exact differences.
+        # The hit relative to the first corner; the offsets of the corners below are exact.
         rx, ry, rz = u * ax + v * bx, u * ay + v * by, u * az + v * bz
         px, py, pz = _taken(block, TAKEN + P0 * BLOCK + x)
         px, py, pz = px + rx, py + ry, pz + rz
@@ -88,12 +88,12 @@ def make_frames(count, epsilon, block):
         n0x, n0y, n0z = _taken(block, TAKEN + NORMALS * BLOCK + x)
         n1x, n1y, n1z = _taken(block, TAKEN + (NORMALS + 3) * BLOCK + x)
         n2x, n2y, n2z = _taken(block, TAKEN + (NORMALS + 6) * BLOCK + x)
-        # [Hanika2021]: the point lifted to the corners' tangent planes, so that the smooth
-        # surface's terminator is not cut into the triangles. One lift for each side of the cloth.
+        # [Hanika2021] Lift the point to the tangent planes of the corners, so that the shadow
+        # terminator does not show the triangles. Each side of the cloth has its own lift.
         e0 = side * (rx * n0x + ry * n0y + rz * n0z)
         e1 = side * ((rx - ax) * n1x + (ry - ay) * n1y + (rz - az) * n1z)
         e2 = side * ((rx - bx) * n2x + (ry - by) * n2y + (rz - bz) * n2z)
-        # As much as rounding may move the point, along the true normal.
+        # Offset the point along the true normal by as much as rounding may move it.
         offset = side * (epsilon + R(1e-6) * max(abs(px), max(abs(py), abs(pz))))
         a, b, c = w * side * min(e0, R(0)), u * side * min(e1, R(0)), v * side * min(e2, R(0))
         _make(block, MADE + FRONT * BLOCK + x,
@@ -111,7 +111,7 @@ def make_frames(count, epsilon, block):
         nz = w * n0z + u * n1z + v * n2z
         inverse = side / math.sqrt(max(nx * nx + ny * ny + nz * nz, R(1e-38)))
         nx, ny, nz = nx * inverse, ny * inverse, nz * inverse
-        # Where the smooth normal looks away although the triangle does not.
+        # Whether the smooth normal faces away from the viewer although the triangle does not.
         away = nx * dx + ny * dy + nz * dz >= R(-1e-4)
         nx, ny = (side * gx if away else nx), (side * gy if away else ny)
         nz = side * gz if away else nz
@@ -122,7 +122,7 @@ def make_frames(count, epsilon, block):
         tz = w * t0z + u * t1z + v * t2z
         d = tx * nx + ty * ny + tz * nz
         tx, ty, tz = tx - d * nx, ty - d * ny, tz - d * nz
-        # Without a grain, any direction across the normal.
+        # Without a grain, use any direction perpendicular to the normal.
         none = tx * tx + ty * ty + tz * tz < R(1e-12)
         steep = abs(nx) >= R(0.7)
         sx, sy, sz = (-nz if steep else R(0)), (R(0) if steep else nz), (nx if steep else -ny)

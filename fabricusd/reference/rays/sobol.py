@@ -1,10 +1,10 @@
-"""Low-discrepancy numbers that are a function of pixel, sample, place and seed, of nothing else.
+"""The sampler: low-discrepancy numbers as a function of pixel, sample, place and seed alone.
 
-Four dimensions of the Sobol' sequence with the directions of [Joe2008], shuffled and scrambled by
-Owen's nested permutations, which [Burley2020] replaces by a hash; the hash is that of [Pharr2023].
-Each set of four numbers of each pixel is scrambled and ordered on its own, so sets and pixels are
-independent and any higher dimension is padded by sets. No state: a picture does not depend on how
-many workers made it or in which order.
+Uses four dimensions of the Sobol' sequence with the direction numbers of [Joe2008], shuffled and
+scrambled by Owen's nested permutations. As in [Burley2020], a hash stands in for the permutations;
+the hash is that of [Pharr2023]. Each set of four numbers of each pixel is scrambled and shuffled
+independently, so sets and pixels are independent and higher dimensions are padded with further
+sets. There is no state: a picture does not depend on the number of workers or on their order.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ from fabricusd.reference.rays.counter import pcg4d, unit_float
 _U = np.uint32
 
 INDEX_BITS = 16
-"""Samples of a pixel that are stratified against one another: 65 536, the most that it may get."""
+"""Bits of a sample's index. All of a pixel's 65 536 samples, the most that it may get, are
+stratified together."""
 
 
 class Numbers(NamedTuple):
-    """Which numbers a picture is made with.
+    """The settings of the sampler.
 
     seed : uint32
-    independent : uint32 - 0, or all ones for numbers that know nothing of other samples
+    independent : uint32 - 0, or all ones for independent random numbers without stratification
     """
 
     seed: np.uint32
@@ -36,15 +37,16 @@ class Numbers(NamedTuple):
 
 
 def new_numbers(seed: int, *, independent: bool = False) -> Numbers:
-    """Numbers chosen by the lower 32 bits of `seed`."""
+    """A sampler seeded by the lower 32 bits of `seed`."""
     return Numbers(np.uint32(seed & 0xFFFFFFFF), np.uint32(0xFFFFFFFF if independent else 0))
 
 
 def directions(degree: int, coefficients: int, first: tuple[int, ...]) -> tuple[np.uint32, ...]:
-    """What each bit of an index adds (xor) to one coordinate, lowest bit first, bits reversed.
+    """Direction numbers of one dimension, bit-reversed: what each bit of an index, lowest first,
+    adds (xor) to the coordinate.
 
-    degree, coefficients, first : the primitive polynomial and start of [Joe2008]; degree 0 is the
-    van der Corput sequence.
+    degree, coefficients, first : primitive polynomial and initial numbers of [Joe2008]; degree 0 is
+        the van der Corput sequence
     """
     m = list(first) if degree else [1] * INDEX_BITS
     while len(m) < INDEX_BITS:
@@ -64,7 +66,7 @@ _FOURTH = directions(3, 1, (1, 3, 1))
 
 @intrinsic  # type: ignore[untyped-decorator]
 def reverse_bits(_, x):
-    """The uint32 with its bits in the other order, by the one instruction where there is one."""
+    """Reverse the bits of a uint32, by a single instruction on processors that have one."""
     return types.uint32(
         types.uint32
     ), lambda context, builder, signature, arguments: builder.bitreverse(arguments[0])
@@ -72,7 +74,7 @@ def reverse_bits(_, x):
 
 @njit(**INLINE)
 def scrambled(x, seed):
-    """Owen's permutation chosen by `seed`, in reversed bits: each bit is flipped by those below."""
+    """Owen-scramble the bit-reversed `x`: the bits below each bit, and `seed`, decide its flip."""
     x = _U(x ^ _U(x * _U(0x3D20ADEA)))
     x = _U(x + seed)
     x = _U(x * ((seed >> _U(16)) | _U(1)))
@@ -88,7 +90,7 @@ def _add_bit(index, k, b, c, d):
 
 @njit(**INLINE)
 def _add_four_bits(index, k, b, c, d):
-    # Written out: a loop here would keep the loop over paths around it scalar.
+    # Unrolled by hand: a loop here would keep LLVM from vectorising the loop over paths around it.
     b, c, d = _add_bit(index, k, b, c, d)
     b, c, d = _add_bit(index, k + 1, b, c, d)
     b, c, d = _add_bit(index, k + 2, b, c, d)
@@ -97,7 +99,7 @@ def _add_four_bits(index, k, b, c, d):
 
 @njit(**INLINE)
 def sobol_reversed(index):
-    """Four coordinates of the plain sequence as 32 bits each, lowest bit first."""
+    """The four coordinates of a point of the unscrambled sequence, each as 32 reversed bits."""
     b, c, d = _add_four_bits(index, 0, _U(0), _U(0), _U(0))
     b, c, d = _add_four_bits(index, 4, b, c, d)
     b, c, d = _add_four_bits(index, 8, b, c, d)
@@ -107,17 +109,17 @@ def sobol_reversed(index):
 
 @njit(**INLINE)
 def _place_in_sequence(numbers, pixel, sample, place):
-    """Which point of the sequence, and the four coordinates' scramblings."""
+    """The index of the point in the sequence, and the scrambling seeds of the four coordinates."""
     s0, s1, s2, s3 = pcg4d(pixel, place, numbers.seed, sample & numbers.independent)
     order = _U((s0 ^ (s2 >> _U(7))) * _U(0x9E3779B9) + s3)
-    # What is above INDEX_BITS would be one constant more in the scrambling.
+    # Bits above INDEX_BITS would only add one more constant to the scrambling.
     index = reverse_bits(scrambled(reverse_bits(sample), order)) & _U((1 << INDEX_BITS) - 1)
     return index, s0, s1, s2, s3
 
 
 @njit(**INLINE)
 def third_number(numbers, pixel, sample, place):
-    """The third of `four_numbers` alone."""
+    """The third number of `four_numbers` alone."""
     index, _, _, seed, _ = _place_in_sequence(numbers, pixel, sample, place)
     _, _, c, _ = sobol_reversed(index)
     return unit_float(reverse_bits(scrambled(c, seed)))
@@ -125,7 +127,7 @@ def third_number(numbers, pixel, sample, place):
 
 @njit(**INLINE)
 def four_numbers(numbers, pixel, sample, place):
-    """Four float32 in [0, 1), even over the samples of a pixel at one `place` of its paths."""
+    """Four float32 in [0, 1), stratified over a pixel's samples for one `place` in its paths."""
     index, s0, s1, s2, s3 = _place_in_sequence(numbers, pixel, sample, place)
     a, b, c, d = sobol_reversed(index)
     return (

@@ -1,14 +1,14 @@
-"""Triangles as one record each: what a hit needs, gathered from two or three cache lines.
+"""The scene's triangles as one record each, so that a hit reads two or three cache lines.
 
-Smooth normals and smooth grain directions at the corners, as [Bisker2011] section 5.3 asks; weave
-coordinates kept as a base inside one repeat plus differences, so that float32 does not lose the
-place inside a thread however large the UVs are.
+A record holds smooth normals and smooth grain directions at the corners, as [Bisker2011] section
+5.3 requires. Weave coordinates are stored as a base inside one repeat plus differences, so that
+float32 resolves the position inside a thread however large the UVs are.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,19 +26,27 @@ from fabricusd.scene.surface.normals import (
     smooth_normals,
 )
 
-# Columns of a record. P0 is a corner, E1 and E2 go from it to the others, N and T are the normals
-# and the directions of growing u at the three corners, ST the coordinates at the first corner and
-# D1, D2 their differences along E1 and E2. RATE is both coordinates' steepness [1/m].
+# Columns of a record. P0 is a corner; E1 and E2 are the edges from it to the other corners. N and T
+# are the normals and the directions of increasing u at the three corners. ST holds the coordinates
+# at the first corner, D1 and D2 their differences along E1 and E2. HAND is the handedness of
+# (u, v, N), and RATE the length of each coordinate's gradient [1/m].
 P0, E1, E2, N, T, ST, D1, D2, HAND, RATE = 0, 3, 6, 9, 18, 27, 29, 31, 33, 34
 RECORD = 36
 
 
+class Triangles(NamedTuple):
+    """What kernels read of the triangles: records : (m, RECORD) float32; material : (m,) int32."""
+
+    records: NDArray[np.float32]
+    material: NDArray[np.int32]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TriangleTables:
-    """All triangles of a scene, around `centre`.
+    """All triangles of a scene, relative to `centre`.
 
-    centre : (3,) float64 [m] - subtracted from every point, so that float32 is spent on the shape
-    points : (n, 3) float32 [m], triangles : (m, 3) uint32 - what rays are traced against
+    centre : (3,) float64 [m] - subtracted from every point, so that float32 resolves the shape
+    points : (n, 3) float32 [m], triangles : (m, 3) uint32 - the geometry for ray tracing
     records : (m, RECORD) float32
     uv : (m, 6) float32 - the mesh's own UV at the corners
     material : (m,) int32
@@ -55,7 +63,8 @@ class TriangleTables:
 
 
 def build_tables(scene: Scene) -> TriangleTables:
-    """Gather the scene's meshes; triangles that cannot be traced are dropped and noted."""
+    """Build the tables of the scene's meshes; triangles that cannot be traced are left out with a
+    note."""
     low, high = scene.bounds()
     if not (np.isfinite(low).all() and np.isfinite(high).all()):
         finite = [m.points[np.isfinite(m.points).all(axis=1)] for m in scene.meshes]
@@ -87,10 +96,10 @@ def _stack(parts: list[NDArray[Any]], empty: tuple[int, ...], kind: Any) -> NDAr
 def _mesh_tables(
     scene: Scene, mesh: Mesh, keep: NDArray[np.bool_], centre: NDArray[np.float64]
 ) -> tuple[Any, ...]:
-    """Points, triangles, records, UV and materials of one mesh's triangles to keep.
+    """Points, triangles, records, UVs and materials of the mesh's triangles that are kept.
 
-    Written column by column, in float32 once the points are centred: a million triangles are
-    meant to fit into a gigabyte with all that is done to them.
+    Fills the records column by column, in float32 once the points are centred, so that a million
+    triangles fit into a gigabyte together with all temporary arrays.
     """
     tri = np.asarray(mesh.triangles, np.int32)[keep]
     material = np.asarray(mesh.material, np.int32)[keep]
@@ -118,7 +127,7 @@ def _mesh_tables(
     records[:, ST : ST + 2] = _inside_repeat(scene, st[:, 0], material)
     records[:, D1 : D1 + 2] = d1 = st[:, 1] - st[:, 0]
     records[:, D2 : D2 + 2] = d2 = st[:, 2] - st[:, 0]
-    # Gradients of both coordinates over the surface: coordinates per metre.
+    # Gradients of both coordinates over the surface [1/m].
     square = np.maximum(np.einsum("ij,ij->i", area2, area2), np.float32(1e-36))[:, None]
     along, up = np.cross(e2, area2) / square, np.cross(area2, e1) / square
     for axis in range(2):
@@ -128,7 +137,7 @@ def _mesh_tables(
 
 
 def _sound_triangles(scene: Scene, mesh: Mesh) -> NDArray[np.bool_]:
-    """Which triangles have finite corners and an area; the others are noted."""
+    """(m,) which triangles have finite corners and an area; adds notes about the others."""
     tri = np.asarray(mesh.triangles)
     if not len(tri):
         return np.zeros(0, bool)
@@ -159,7 +168,7 @@ def weave_coordinates(
     area2: NDArray[Any],
     material: NDArray[np.int32],
 ) -> NDArray[np.float64]:
-    """(m, 3, 2) coordinates for the surface: threads where it is a fabric, UV elsewhere.
+    """(m, 3, 2) surface coordinates: threads on a fabric, UV elsewhere.
 
     area2 : (m, 3) - cross products of two edges [m2]
     """
@@ -171,7 +180,7 @@ def weave_coordinates(
         mine = material == index
         metres = measured_scale(uv[mine], area2[mine])
         if not metres > 0:
-            scene.note(mesh.path, "has no UVs with an area; its fabric lies without a grain")
+            scene.note(mesh.path, "has no UVs with an area; its fabric has no grain direction")
         st[mine] = surface.binding.weave_coordinates(uv[mine], metres or 1.0)
     return st
 
@@ -197,10 +206,11 @@ def _grain(
     st: NDArray[np.float64],
     normals: NDArray[Any],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """(m, 3, 3) unit directions of growing u at the corners, and (m,) handedness of (u, v, N).
+    """(m, 3, 3) unit directions of increasing u at the corners, and (m,) handedness of (u, v, N).
 
-    Averaged over the triangles that share a point, its u direction and its handedness; a seam of
-    the UVs with another grain stays a seam. Any direction where the coordinates have no area.
+    Directions are averaged over the triangles that share a point, its coordinates and its
+    handedness, so a UV seam across which the grain changes stays a seam. The direction is arbitrary
+    where the coordinates have no area.
     """
     along = np.empty((len(tri), 3), np.float32)
     hand = np.empty(len(tri), np.float32)

@@ -1,1 +1,1 @@
-"""The stages that a batch of paths goes through."""
+"""The stages that a batch of paths goes through, one compiled loop each."""

@@ -1,11 +1,13 @@
-"""Where traced rays arrived: at lights, and at surfaces, put in the order they are shaded in.
+"""The stage after tracing: adds the light that rays hit, and sorts surface hits into queues.
 
-Rays that met a light add it, weighted against light sampling by the power heuristic [Veach1997].
-Rays that met a surface get the key of the queue in which that is shaded: one for each material,
-level and side.
+The light that a ray passes is added to its path, weighted against light sampling by the power
+heuristic [Veach1997]. A ray that hit a surface gets the key of the queue in which the hit is
+shaded. There is one queue for each material, level and side.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -15,11 +17,9 @@ from fabricusd.kernels.real import INLINE, KERNEL, LEAN, PART, whole
 from fabricusd.reference.lights.hits import meet_lights
 from fabricusd.reference.lights.ray_block import (
     BEFORE,
-    BLOCK,
     D_X,
     D_Y,
     D_Z,
-    ENDLESS,
     FIRST,
     LIGHT_ROWS,
     O_X,
@@ -30,7 +30,9 @@ from fabricusd.reference.lights.ray_block import (
 )
 from fabricusd.reference.rays.embree import (
     DX,
+    ENDLESS,
     GEOMETRY,
+    INFINITE_DISTANCE,
     LANES,
     MISS,
     NGX,
@@ -42,6 +44,7 @@ from fabricusd.reference.rays.sobol import four_numbers
 from fabricusd.reference.rays.triangles import RATE
 from fabricusd.reference.rays.triangles import T as TANGENTS
 from fabricusd.reference.rays.wave import (
+    BLOCK,
     DIRECT,
     FAR_LEVEL,
     INDIRECT,
@@ -52,21 +55,34 @@ from fabricusd.reference.rays.wave import (
 )
 
 R = np.float32
-FAR = R(1e30)
 
 MIS, LIGHT_ONLY, SURFACE_ONLY, UNIFORM = range(4)
-"""Estimators of the same integral: both samplings, either, or uniform over all directions."""
+"""Estimators of the same integral: light and surface sampling combined, either one alone, or
+uniform directions over the sphere."""
 
 AUTO_LEVEL = 3
+
+
+class Settings(NamedTuple):
+    """What holds for all paths of a picture.
+
+    estimator : MIS to UNIFORM; level : a level or AUTO_LEVEL; max_depth : most bounces of a path
+    """
+
+    estimator: int
+    level: int
+    max_depth: int
+
+
 NUMBERS_PER_STEP = 4
-"""Places that a step of a path may use, see `sobol.four_numbers`."""
+"""Number of places that a step of a path may use, see `sobol.four_numbers`."""
 
 QUEUES = 6
-"""Queues of a material: three levels, two sides."""
+"""Queues per material: three levels times two sides."""
 
-# Rows of a block after those of `ray_block`: the geometric normal, its cosine with the ray; for
-# level `auto` the steepness of both coordinates, the direction of growing u, the limits, the cone's
-# width and a uniform number, and the level they lead to.
+# Rows of a block after those of `ray_block`: the geometric normal and its cosine with the ray; for
+# level `auto`, the gradients of both coordinates, the direction of increasing u, the limits, the
+# cone's width, a uniform number, and the resulting level.
 _NORMAL, _COSINE, _STEEP, _GRAIN, _LIMITS, _WIDTH, _NUMBER, _LEVEL = (
     (LIGHT_ROWS + row) * BLOCK for row in (0, 3, 4, 6, 9, 13, 14, 15)
 )
@@ -74,36 +90,36 @@ _ROWS = LIGHT_ROWS + 16
 
 
 @njit(**KERNEL)
-def arrive(step, max_depth, estimator, count, rays, lanes, lane_tags, lights, dome, film, keys,
-           triangle_material, limits, records, level, path_pixel, path_sample,
-           numbers, counts):  # fmt: skip
-    """Add the light that rays met, and give each lane that goes on the key of its queue, else -1.
+def arrive(step, settings, count, lanes, paths, numbers, lights, triangles, limits, film, queues,
+           counts):  # fmt: skip
+    """Add the light that rays hit, and write each lane's queue key; -1 for a lane that ends.
 
-    limits : (materials, 4) float32 - `footprint.Limits.row` of a fabric, 0 where the surface has
-    no levels. counts : (QUEUES materials,) int64, filled with the length of each queue, which is
-    keyed by `(3 material + level) 2 + back`.
+    limits : (materials, 4) float32 - `footprint.Limits.row` of a fabric, 0 for a surface without
+        levels
+    counts : (QUEUES materials,) int64 - filled with the length of each queue; the key of a queue is
+        `(3 material + level) 2 + back`
     """
     counts[:] = 0
     count = whole(count)
+    table, dome = lights.table, lights.dome
     block = np.empty(_ROWS * BLOCK, np.float32)
     counters = np.empty(2 * BLOCK, np.uint32)
     for start in range(0, count, BLOCK):
         size = min(BLOCK, count - start)
-        _load(start, size, rays, lanes, lane_tags, block)
-        meet_lights(lights, dome, step == 0, size, block)
-        _add_seen(start, size, estimator, lane_tags, lanes, film, block)
+        _load(start, size, lanes, block)
+        meet_lights(table, dome, step == 0, size, block)
+        _add_seen(start, size, settings.estimator, lanes, film, block)
         _turn(size, block)
-        if level == AUTO_LEVEL:
-            _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
-                         path_pixel, path_sample, counters, block)  # fmt: skip
+        if settings.level == AUTO_LEVEL:
+            _load_levels(start, size, lanes, paths, triangles, limits, counters, block)
             place = np.uint32(2 + NUMBERS_PER_STEP * step + 2)
             _choose_levels(numbers, place, size, counters, block)
-        _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, limits,
-                   keys, counts, block)  # fmt: skip
+        _give_keys(start, size, settings, lanes, triangles, limits, queues, counts, block)
 
 
 @njit(**PART)
-def _load(start, size, rays, lanes, lane_tags, block):
+def _load(start, size, lanes, block):
+    rays = lanes.rays
     bits = rays.view(np.uint32)
     for x in range(0, size, LANES):
         packet, names = rays[(start + x) >> 4], bits[(start + x) >> 4]
@@ -116,8 +132,8 @@ def _load(start, size, rays, lanes, lane_tags, block):
                 block[_NORMAL + row * BLOCK + x + lane] = packet[NGX + row, lane]
         for lane in range(LANES):
             missed = names[GEOMETRY, lane] == MISS
-            block[REACH + x + lane] = FAR if missed else packet[TFAR, lane]
-    before, depth = lanes[LANE_PDF][start:], lane_tags[1][start:]
+            block[REACH + x + lane] = INFINITE_DISTANCE if missed else packet[TFAR, lane]
+    before, depth = lanes.rows[LANE_PDF][start:], lanes.tags[1][start:]
     for x in range(size):
         block[BEFORE + x] = before[x]
     for x in range(size):
@@ -125,24 +141,25 @@ def _load(start, size, rays, lanes, lane_tags, block):
 
 
 @njit(**PART)
-def _add_seen(start, size, estimator, lane_tags, lanes, film, block):
-    """Add what the rays saw of lights to their paths."""
+def _add_seen(start, size, estimator, lanes, film, block):
+    """Add the radiance of lights that the rays passed to their paths."""
+    rows, tags = lanes.rows, lanes.tags
     for x in range(size):
         red, green, blue = block[SEEN_R + x], block[SEEN_G + x], block[SEEN_B + x]
         k = start + x
-        depth = lane_tags[1, k]
+        depth = tags[1, k]
         if red + green + blue <= R(0) or (depth > 0 and estimator == LIGHT_ONLY):
             continue
-        path = whole(lane_tags[0, k])
+        path = whole(tags[0, k])
         row = DIRECT if depth <= 1 else INDIRECT
-        film[row, path] += red * lanes[LANE_BETA, k]
-        film[row + 1, path] += green * lanes[LANE_BETA + 1, k]
-        film[row + 2, path] += blue * lanes[LANE_BETA + 2, k]
+        film[row, path] += red * rows[LANE_BETA, k]
+        film[row + 1, path] += green * rows[LANE_BETA + 1, k]
+        film[row + 2, path] += blue * rows[LANE_BETA + 2, k]
 
 
 @njit(**PART)
 def _turn(size, block):
-    """Cosine of each ray with the normal of what it met, which is not a unit vector."""
+    """Dot product of each ray's direction with the geometric normal, which is not normalized."""
     for x in range(size):
         block[_COSINE + x] = (
             block[D_X + x] * block[_NORMAL + x]
@@ -152,13 +169,14 @@ def _turn(size, block):
 
 
 @njit(**PART)
-def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits, records,
-                 path_pixel, path_sample, counters, block):  # fmt: skip
-    """What `auto` needs of each ray that met a fabric; zeros for the others."""
-    bits = rays.view(np.uint32)
+def _load_levels(start, size, lanes, paths, triangles, limits, counters, block):
+    """Load what level `auto` needs for each ray that hit a fabric; zeros for the other rays."""
+    bits, rows, tags = lanes.rays.view(np.uint32), lanes.rows, lanes.tags
+    path_pixel, path_sample = paths.pixel, paths.sample
+    records, triangle_material = triangles.records, triangles.material
     for x in range(size):
         k = start + x
-        path = whole(lane_tags[0, k])
+        path = whole(tags[0, k])
         counters[x], counters[BLOCK + x] = path_pixel[path], path_sample[path]
         for row in range(4):
             block[_LIMITS + row * BLOCK + x] = R(0)
@@ -177,12 +195,12 @@ def _load_levels(start, size, rays, lanes, lane_tags, triangle_material, limits,
             block[_STEEP + row * BLOCK + x] = record[RATE + row]
         for row in range(3):
             block[_GRAIN + row * BLOCK + x] = record[TANGENTS + row]
-        block[_WIDTH + x] = lanes[LANE_WIDTH, k] + block[REACH + x] * lanes[LANE_SPREAD, k]
+        block[_WIDTH + x] = rows[LANE_WIDTH, k] + block[REACH + x] * rows[LANE_SPREAD, k]
 
 
 @njit(**PART)
 def _choose_levels(numbers, place, size, counters, block):
-    """A level for each ray's cone, by a uniform number."""
+    """Choose a level for each ray from the footprint of its cone and a uniform number."""
     for x in range(size):
         block[_NUMBER + x], _, _, _ = four_numbers(numbers, counters[x], counters[BLOCK + x], place)
     for x in range(size):
@@ -191,7 +209,7 @@ def _choose_levels(numbers, place, size, counters, block):
         )  # fmt: skip
         square = block[_COSINE + x] * block[_COSINE + x]
         inverse = (nx * nx + ny * ny + nz * nz) / max(square, R(1e-30))
-        # A cone's cut with the surface is longer along the ray than across it.
+        # The cone's footprint on the surface is longer along the ray than across it.
         a = (
             block[D_X + x] * block[_GRAIN + x]
             + block[D_Y + x] * block[_GRAIN + BLOCK + x]
@@ -210,13 +228,13 @@ def _choose_levels(numbers, place, size, counters, block):
 
 
 @njit(**PART)
-def _give_keys(start, size, max_depth, level, rays, lane_tags, triangle_material, limits, keys,
-               counts, block):  # fmt: skip
-    bits = rays.view(np.uint32)
+def _give_keys(start, size, settings, lanes, triangles, limits, queues, counts, block):
+    bits, tags, keys = lanes.rays.view(np.uint32), lanes.tags, queues.keys
+    level, max_depth, triangle_material = settings.level, settings.max_depth, triangles.material
     for x in range(size):
         k = start + x
-        # A path at its last depth still sees lights; emission of surfaces is left to `prepare`.
-        if block[REACH + x] >= ENDLESS or lane_tags[1, k] > max_depth:
+        # The ray beyond the last surface only sees lights; it is not shaded.
+        if block[REACH + x] >= ENDLESS or tags[1, k] > max_depth:
             keys[k] = -1
             continue
         material = whole(triangle_material[bits[k >> 4, PRIMITIVE, k & 15]])
@@ -236,12 +254,12 @@ def _advance(offsets, key):
 
 
 @njit(**LEAN)
-def sort_lanes(count, keys, offsets, order):
-    """The lanes that go on, in the order of their queues.
+def sort_lanes(count, queues, offsets):
+    """Write the numbers of the lanes that go on to `queues.order`, sorted by queue.
 
-    offsets : (queues,) int64 - where each queue starts; advanced to where it ends.
-    order : (count,) int32
+    offsets : (queues,) int64 - where each queue starts; on return, where it ends
     """
+    keys, order = queues.keys, queues.order
     for k in range(whole(count)):
         if keys[k] >= 0:
             order[_advance(offsets, whole(keys[k]))] = k

@@ -1,7 +1,7 @@
-"""From shaded hits to new rays: shadow rays towards lights, and the paths' next rays.
+"""The stage after shading: turns hits into shadow rays towards lights and the paths' next rays.
 
-Hits go through in blocks: rows are copied side by side, what they send out is computed by loops
-that LLVM vectorises, and only what carries light is then written out, packed.
+Hits are processed in blocks. Their rows are copied into one array, loops that LLVM vectorises
+compute the new rays, and only the rays that carry light are written out, packed.
 """
 
 from __future__ import annotations
@@ -12,7 +12,15 @@ import numpy as np
 from numba import njit
 
 from fabricusd.kernels.real import INLINE, KERNEL, LEAN, PART, whole
-from fabricusd.reference.rays.embree import DX, GEOMETRY, MISS, OX, TFAR, TNEAR
+from fabricusd.reference.rays.embree import (
+    DX,
+    GEOMETRY,
+    INFINITE_DISTANCE,
+    MISS,
+    OX,
+    TFAR,
+    TNEAR,
+)
 from fabricusd.reference.rays.wave import (
     ALBEDO,
     ALPHA,
@@ -21,6 +29,7 @@ from fabricusd.reference.rays.wave import (
     BEAUTY_ROWS,
     BEFORE,
     BETA,
+    BLOCK,
     CHANCE,
     CORNERS,
     DEPTH,
@@ -61,20 +70,18 @@ from fabricusd.reference.rays.wave import PRIMITIVE as TRIANGLE
 from fabricusd.reference.stages.arrivals import LIGHT_ONLY, MIS, UNIFORM
 
 R = np.float32
-FAR = R(1e30)
 UNSEEN = R(-1)
-"""A ray's pdf where no light sampling competes with it."""
+"""The pdf stored for a ray with which light sampling does not compete."""
 CARRIES_ON = R(8)
-"""A path that carries the inverse of this or more is not ended by chance: rays times relative MSE
-is least from 6 to 12 on the samples, a sixth below what it is at 2."""
+"""Russian roulette spares a path whose throughput is at least the inverse of this. On the sample
+scenes, rays times relative MSE is smallest from 6 to 12, a sixth lower than at 2."""
 MOST = R(3e38)
-"""What is not below it is not finite."""
+"""Values that are not below this count as not finite."""
 
-BLOCK = 128
-
-# Rows of a block after those of `Wave.hits`: a shadow ray's origin, length and what it brings; the
-# next ray's origin, direction, throughput, pdf and spread. A negative sum of what it brings, or
-# throughput, means no ray; below -1, one that was not finite.
+# Rows of a block after those of `Hits.rows`: the shadow ray's origin and length, the light that it
+# brings, and the sum of that over the channels; the next ray's origin, direction, throughput, pdf
+# and spread, and whether it is alive. In the sum and in the last row, a value of 0 or less means
+# that there is no ray, and _BROKEN that the ray was dropped because a value was not finite.
 _SHADOW, _REACH, _BRINGS, _SUM, _START, _ALONG, _BETA, _PDF, _SPREAD, _ALIVE = (
     HIT_ROWS + row for row in (0, 3, 4, 7, 8, 11, 14, 17, 18, 19)
 )
@@ -83,13 +90,13 @@ _NONE, _BROKEN = R(-1), R(-2)
 
 
 @njit(**KERNEL)
-def depart(step, estimator, count, max_depth, hits, tags, film, shadow_rays, shadow, shadow_path,
-           next_rays, next_lanes, next_tags, result):  # fmt: skip
-    """Write the shadow rays and next rays of all hits, each packed.
+def depart(step, settings, count, hits, film, shadows, lanes, result):
+    """Write the shadow rays and the next rays of all hits, both packed.
 
-    shadow : (4, n) - what a shadow ray adds where nothing is in its way, and its length.
-    result : (3,) int64 - shadow rays, next rays, values that were not finite.
+    lanes : `Lanes` of the next step
+    result : (3,) int64 - numbers of shadow rays, next rays and non-finite values
     """
+    estimator, max_depth = settings.estimator, settings.max_depth
     block = np.empty(_ROWS * BLOCK, np.float32)
     result[:] = 0
     count = whole(count)
@@ -100,23 +107,23 @@ def depart(step, estimator, count, max_depth, hits, tags, film, shadow_rays, sha
         if estimator == UNIFORM:
             _go_uniformly(size, block)
         _onwards(step, estimator == MIS, size, block)
-        _write_shadows(start, size, tags, film, shadow_rays, shadow, shadow_path, result, block)
-        # One ray beyond the last surface: what it sees of lights belongs to that surface.
+        _write_shadows(start, size, hits, film, shadows, result, block)
+        # Trace one ray beyond the last surface: the lights that it sees illuminate that surface.
         deepest = max_depth if estimator == LIGHT_ONLY else max_depth + 1
-        _write_next(start, size, deepest, tags, next_rays, next_lanes, next_tags, result, block)
-    _fill_up(result[0], shadow_rays)
-    _fill_up(result[1], next_rays)
+        _write_next(start, size, deepest, hits, lanes, result, block)
+    _fill_up(result[0], shadows.rays)
+    _fill_up(result[1], lanes.rays)
 
 
 @njit(**PART)
 def _load(start, size, hits, block):
     for row in range(CORNERS):
-        source = hits[row][start:]
+        source = hits.rows[row][start:]
         for x in range(size):
             block[row * BLOCK + x] = source[x]
 
 
-# A place and not a row and a column: numba compiles a function anew for each constant it is given.
+# Takes one index instead of a row and a column: numba recompiles a function for every constant.
 @njit(**INLINE)
 def _three(block, at):
     return block[at], block[at + BLOCK], block[at + 2 * BLOCK]
@@ -129,7 +136,7 @@ def _put(block, at, a, b, c):
 
 @njit(**PART)
 def _towards_lights(mis, size, block):
-    """Shadow rays, and what they bring where nothing is in their way."""
+    """Compute the shadow rays, and the light that they bring if they are not blocked."""
     for x in range(size):
         pdf = block[LIGHT_PDF * BLOCK + x]
         ratio = block[F_PDF * BLOCK + x] / max(pdf, R(1e-30))
@@ -152,15 +159,15 @@ def _towards_lights(mis, size, block):
             ay if front else by,
             az if front else bz,
         )
-        # Lights may lie on a surface: what is in the last ten-thousandth is the lamp, not an
-        # obstacle.
+        # A light may lie on a surface: geometry in the last ten-thousandth of the distance belongs
+        # to the lamp and does not block it.
         reach = block[DISTANCE * BLOCK + x]
-        block[_REACH * BLOCK + x] = reach if reach >= FAR else reach * R(0.9999)
+        block[_REACH * BLOCK + x] = reach if reach >= INFINITE_DISTANCE else reach * R(0.9999)
 
 
 @njit(**PART)
 def _go_uniformly(size, block):
-    """The estimator that knows no sampler goes where its light was drawn, over the sphere."""
+    """Continue in the light sample's direction, which estimator UNIFORM draws over the sphere."""
     for x in range(size):
         pdf = block[KEEP * BLOCK + x] * R(0.25 / math.pi)
         straight = block[GO_PDF * BLOCK + x] < R(0)
@@ -175,9 +182,9 @@ def _go_uniformly(size, block):
 
 @njit(**PART)
 def _onwards(step, mis, size, block):
-    """The paths' next rays: as the surface drew them, or straight on behind it."""
-    # The first ray from a surface is half of its direct light: to end it costs more noise than it
-    # saves time, fourfold on a grey floor under a sky.
+    """Compute the paths' next rays: as the surface sampled them, or straight on behind it."""
+    # The first ray from a surface carries half of its direct light. Ending it costs more in noise
+    # than it saves in time: four times as much on a grey floor under a sky.
     least = R(1) if step == 0 else R(0)
     for x in range(size):
         pdf = block[GO_PDF * BLOCK + x]
@@ -202,7 +209,7 @@ def _onwards(step, mis, size, block):
         wr, wg, wb = _three(block, WEIGHT * BLOCK + x)
         red, green, blue = wr * br, wg * bg, wb * bb
         most = max(red, max(green, blue))
-        # Russian roulette on what the path can still carry.
+        # Russian roulette on the largest channel of the throughput.
         chance = max(min(R(1), CARRIES_ON * most), least if most > R(0) else R(0))
         inverse = R(1) / max(chance, R(1e-30))
         red, green, blue = red * inverse, green * inverse, blue * inverse
@@ -215,7 +222,7 @@ def _onwards(step, mis, size, block):
         alive = _NONE if pdf == R(0) else alive
         block[_ALIVE * BLOCK + x] = R(1) if straight else alive
         spread = block[SPREAD * BLOCK + x]
-        # A scattered ray stands for the share of directions that its pdf leaves to it.
+        # A scattered ray represents a solid angle of one over its pdf.
         wide = R(0.25) * math.sqrt(min(R(1) / max(pdf, R(1e-30)), R(4)))
         block[_SPREAD * BLOCK + x] = spread if straight else max(spread, wide)
         seen = pdf if mis else UNSEEN
@@ -224,7 +231,8 @@ def _onwards(step, mis, size, block):
 
 @njit(**INLINE)
 def _write_ray(k, start, along, reach, rays, block):
-    """Ray `k` of the packets: origin and direction from where they lie in the block."""
+    """Write ray `k` of the packets; `start` and `along` are places of its origin and direction in
+    the block."""
     p, lane = k >> 4, k & 15
     for row in range(3):
         rays[p, OX + row, lane] = block[start + row * BLOCK]
@@ -234,7 +242,8 @@ def _write_ray(k, start, along, reach, rays, block):
 
 
 @njit(**PART)
-def _write_shadows(start, size, tags, film, rays, shadow, shadow_path, result, block):
+def _write_shadows(start, size, hits, film, shadows, result, block):
+    tags, (rays, light, shadow_path) = hits.tags, shadows
     k = whole(result[0])
     for x in range(size):
         h = start + x
@@ -246,8 +255,8 @@ def _write_shadows(start, size, tags, film, rays, shadow, shadow_path, result, b
             reach = block[_REACH * BLOCK + x]
             _write_ray(k, _SHADOW * BLOCK + x, TO_LIGHT * BLOCK + x, reach, rays, block)
             for row in range(3):
-                shadow[row, k] = block[(_BRINGS + row) * BLOCK + x]
-            shadow[3, k] = reach
+                light[row, k] = block[(_BRINGS + row) * BLOCK + x]
+            light[3, k] = reach
             shadow_path[k] = path if depth == 0 else -path - 1
             if depth == 0 and film.shape[0] > BEAUTY_ROWS:
                 film[UNLIT, path] += total
@@ -258,7 +267,8 @@ def _write_shadows(start, size, tags, film, rays, shadow, shadow_path, result, b
 
 
 @njit(**PART)
-def _write_next(start, size, deepest, tags, rays, lanes, lane_tags, result, block):
+def _write_next(start, size, deepest, hits, lanes, result, block):
+    tags, (rays, rows, lane_tags) = hits.tags, lanes
     k = whole(result[1])
     for x in range(size):
         h = start + x
@@ -268,12 +278,12 @@ def _write_next(start, size, deepest, tags, rays, lanes, lane_tags, result, bloc
             result[2] += 1
         if alive < R(0) or (depth >= deepest and not straight):
             continue
-        _write_ray(k, _START * BLOCK + x, _ALONG * BLOCK + x, FAR, rays, block)
+        _write_ray(k, _START * BLOCK + x, _ALONG * BLOCK + x, INFINITE_DISTANCE, rays, block)
         for row in range(3):
-            lanes[LANE_BETA + row, k] = block[(_BETA + row) * BLOCK + x]
-        lanes[LANE_PDF, k] = block[_PDF * BLOCK + x]
-        lanes[LANE_WIDTH, k] = block[WIDTH * BLOCK + x]
-        lanes[LANE_SPREAD, k] = block[_SPREAD * BLOCK + x]
+            rows[LANE_BETA + row, k] = block[(_BETA + row) * BLOCK + x]
+        rows[LANE_PDF, k] = block[_PDF * BLOCK + x]
+        rows[LANE_WIDTH, k] = block[WIDTH * BLOCK + x]
+        rows[LANE_SPREAD, k] = block[_SPREAD * BLOCK + x]
         lane_tags[0, k], lane_tags[1, k] = tags[PATH, h], depth if straight else depth + 1
         k += 1
     result[1] = k
@@ -281,7 +291,7 @@ def _write_next(start, size, deepest, tags, rays, lanes, lane_tags, result, bloc
 
 @njit(**INLINE)
 def _fill_up(count, rays):
-    """Lanes after the last ray of its packet are not traced."""
+    """Deactivate the lanes of the last packet that hold no ray."""
     count = whole(count)
     for k in range(count, ((count + 15) >> 4) << 4):
         rays[k >> 4, TNEAR, k & 15] = R(0)
@@ -289,23 +299,24 @@ def _fill_up(count, rays):
 
 
 @njit(**LEAN)
-def record_first(count, eye, view, hits, tags, uv, film):
-    """Write the properties of first surfaces, for the AOVs."""
+def record_first(count, eye, view, hits, uv, film):
+    """Write the properties of each path's first surface to the rows of the AOVs."""
+    rows, tags = hits.rows, hits.tags
     for h in range(count):
-        if tags[DEPTH, h] != 0 or hits[GO_PDF, h] < R(0):
+        if tags[DEPTH, h] != 0 or rows[GO_PDF, h] < R(0):
             continue
         path = whole(tags[PATH, h])
         distance = R(0)
         for row in range(3):
-            film[ALBEDO + row, path] = hits[WEIGHT + row, h] if hits[GO_PDF, h] > R(0) else R(0)
-            film[NORMAL + row, path] = hits[N + row, h]
-            film[TANGENT + row, path] = hits[U + row, h]
-            distance += (hits[FRONT + row, h] - eye[row]) * view[row]
+            film[ALBEDO + row, path] = rows[WEIGHT + row, h] if rows[GO_PDF, h] > R(0) else R(0)
+            film[NORMAL + row, path] = rows[N + row, h]
+            film[TANGENT + row, path] = rows[U + row, h]
+            distance += (rows[FRONT + row, h] - eye[row]) * view[row]
         film[DEPTH_Z, path] = distance
-        film[THREAD_ID, path] = hits[THREAD, h]
+        film[THREAD_ID, path] = rows[THREAD, h]
         film[AT_LEVEL, path] = R(tags[LEVEL, h])
         corner = uv[tags[TRIANGLE, h]]
-        b, c = hits[CORNERS, h], hits[CORNERS + 1, h]
+        b, c = rows[CORNERS, h], rows[CORNERS + 1, h]
         for row in range(2):
             film[UV + row, path] = (
                 (R(1) - b - c) * corner[row] + b * corner[row + 2] + c * corner[row + 4]

@@ -1,4 +1,4 @@
-"""From rays that met a surface to hits ready for shading: frames, numbers, a light for each."""
+"""The stage before shading: gives each hit its surface frame, random numbers and a light sample."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from fabricusd.reference.lights.sampling import (
 )
 from fabricusd.reference.rays.embree import DX, HIT_U, HIT_V, PRIMITIVE, TFAR
 from fabricusd.reference.rays.hit_frames import (
-    BLOCK,
     BLOCK_ROWS,
     CHOSEN,
     MADE,
@@ -29,6 +28,7 @@ from fabricusd.reference.rays.triangles import RECORD
 from fabricusd.reference.rays.wave import (
     BEFORE,
     BETA,
+    BLOCK,
     CHANCE,
     CORNERS,
     DEPTH,
@@ -57,33 +57,33 @@ R = np.float32
 
 
 @njit(**KERNEL)
-def prepare(step, estimator, queue_ends, rays, lanes, lane_tags, keys, order, records, lights, dome,
-            epsilon, path_pixel, path_sample, numbers, hits, tags):  # fmt: skip
-    """Turn the lanes of `order` into hits; within a block those of one light lie together.
+def prepare(step, settings, queue_ends, lanes, queues, paths, numbers, triangles, lights, epsilon,
+            hits):  # fmt: skip
+    """Turn the lanes of `queues` into hits; within a block, hits of the same light lie together.
 
-    queue_ends : (queues,) int64 - no block holds hits of two queues
+    queue_ends : (queues,) int64 - where each queue ends; no block holds hits of two queues
     """
+    estimator, (table, dome) = settings.estimator, lights
     block = np.empty(BLOCK_ROWS * BLOCK, np.float32)
     lane_of, choice = np.empty(2 * BLOCK, np.int32), np.empty(BLOCK, np.int32)
     counters, uniform = np.empty(4 * BLOCK, np.uint32), np.empty(BLOCK, np.float32)
-    light_ends = np.empty(max(lights.shape[0], 1), np.int32)
-    sampled = estimator != UNIFORM and estimator != SURFACE_ONLY and lights.shape[0] > 0
+    light_ends = np.empty(max(table.shape[0], 1), np.int32)
+    sampled = estimator != UNIFORM and estimator != SURFACE_ONLY and table.shape[0] > 0
     place = np.uint32(2 + NUMBERS_PER_STEP * step)
     start = np.int64(0)
     for queue in range(queue_ends.shape[0]):
         queue_end = whole(queue_ends[queue])
         while start < queue_end:
             size = min(BLOCK, queue_end - start)
-            _begin(start, size, order, lane_tags, path_pixel, path_sample, lane_of, counters)
-            _choose(lights, numbers, place, size, counters, uniform, choice)
+            _begin(start, size, queues, lanes, paths, lane_of, counters)
+            _choose(table, numbers, place, size, counters, uniform, choice)
             _group(size, choice, light_ends, lane_of, counters)
             for x in range(size):
-                _take(whole(lane_of[x]), start + x, x, rays, lanes, lane_tags, keys, records,
-                      block, hits, tags)  # fmt: skip
+                _take(whole(lane_of[x]), start + x, x, lanes, queues, triangles, block, hits)
             make_frames(size, epsilon, block)
             make_numbers(numbers, size, place, counters, block)
             if sampled:
-                sample_lights(lights, dome, light_ends, size, block)
+                sample_lights(table, dome, light_ends, size, block)
             elif estimator == UNIFORM:
                 sample_evenly(size, block)
             else:
@@ -93,18 +93,19 @@ def prepare(step, estimator, queue_ends, rays, lanes, lane_tags, keys, order, re
 
 
 @njit(**PART)
-def _begin(start, size, order, lane_tags, path_pixel, path_sample, lane_of, counters):
-    """A block's lanes and their paths' counters, in the upper halves of both."""
+def _begin(start, size, queues, lanes, paths, lane_of, counters):
+    """Load a block's lanes and their paths' counters into the upper halves of both arrays."""
+    order, tags, path_pixel, path_sample = queues.order, lanes.tags, paths.pixel, paths.sample
     for x in range(size):
         lane = whole(order[start + x])
-        path = whole(lane_tags[0, lane])
+        path = whole(tags[0, lane])
         lane_of[BLOCK + x] = lane
         counters[2 * BLOCK + x], counters[3 * BLOCK + x] = path_pixel[path], path_sample[path]
 
 
 @njit(**PART)
 def _choose(lights, numbers, place, size, counters, uniform, choice):
-    """A light for each lane, by the number that `make_numbers` makes once more for the hit."""
+    """Choose a light for each lane by the number that `make_numbers` later computes again."""
     if lights.shape[0] > 1:
         following = np.uint32(place + np.uint32(1))
         for x in range(size):
@@ -116,7 +117,7 @@ def _choose(lights, numbers, place, size, counters, uniform, choice):
 
 @njit(**PART)
 def _group(size, choice, ends, lane_of, counters):
-    """Bring the lanes of each light together, in the lower halves; `ends` is where they end."""
+    """Sort the lanes by light into the lower halves; `ends` is where each light's lanes end."""
     for j in range(ends.shape[0]):
         ends[j] = 0
     for x in range(size):
@@ -135,19 +136,21 @@ def _group(size, choice, ends, lane_of, counters):
 
 
 @njit(**INLINE)
-def _take(k, h, x, rays, lanes, lane_tags, keys, records, block, hits, tags):
-    """Lane `k` as hit `h`: what goes on unchanged, and place `x` of the block for what does not."""
+def _take(k, h, x, lanes, queues, triangles, block, hits):
+    """Copy lane `k` to hit `h`, and the inputs of what is computed to place `x` of the block."""
+    rays, rows, lane_tags = lanes.rays, lanes.rows, lanes.tags
+    into, tags, records = hits.rows, hits.tags, triangles.records
     bits = rays.view(np.uint32)
     p, lane = k >> 4, k & 15
-    triangle, key = bits[p, PRIMITIVE, lane], whole(keys[k])
+    triangle, key = bits[p, PRIMITIVE, lane], whole(queues.keys[k])
     tags[PATH, h], tags[DEPTH, h] = lane_tags[0, k], lane_tags[1, k]
     tags[TRIANGLE, h], tags[MATERIAL, h], tags[LEVEL, h] = triangle, key // 6, (key // 2) % 3
     for row in range(3):
-        hits[BETA + row, h] = lanes[LANE_BETA + row, k]
-    hits[BEFORE, h] = lanes[LANE_PDF, k]
-    width = lanes[LANE_WIDTH, k] + rays[p, TFAR, lane] * lanes[LANE_SPREAD, k]
-    hits[WIDTH, h], hits[SPREAD, h] = width, lanes[LANE_SPREAD, k]
-    hits[CORNERS, h], hits[CORNERS + 1, h] = rays[p, HIT_U, lane], rays[p, HIT_V, lane]
+        into[BETA + row, h] = rows[LANE_BETA + row, k]
+    into[BEFORE, h] = rows[LANE_PDF, k]
+    width = rows[LANE_WIDTH, k] + rays[p, TFAR, lane] * rows[LANE_SPREAD, k]
+    into[WIDTH, h], into[SPREAD, h] = width, rows[LANE_SPREAD, k]
+    into[CORNERS, h], into[CORNERS + 1, h] = rays[p, HIT_U, lane], rays[p, HIT_V, lane]
     for row in range(3):
         block[RAY + row * BLOCK + x] = rays[p, DX + row, lane]
     block[RAY + 3 * BLOCK + x] = rays[p, HIT_U, lane]
@@ -159,30 +162,32 @@ def _take(k, h, x, rays, lanes, lane_tags, keys, records, block, hits, tags):
 
 @njit(**PART)
 def _bring(start, size, block, hits):
-    """Bring the block's frames, numbers and lights to the hits."""
-    _bring_rows(MADE, 0, SIDE + 1, start, size, block, hits)
-    _bring_rows(NUMBERS, CHANCE, CHANCE + 4, start, size, block, hits)
-    _bring_rows(CHOSEN, WI, LIGHT_PDF + 1, start, size, block, hits)
+    """Copy the block's frames, numbers and light samples to the hits."""
+    rows = hits.rows
+    _bring_rows(MADE, 0, SIDE + 1, start, size, block, rows)
+    _bring_rows(NUMBERS, CHANCE, CHANCE + 4, start, size, block, rows)
+    _bring_rows(CHOSEN, WI, LIGHT_PDF + 1, start, size, block, rows)
 
 
 @njit(**INLINE)
-def _bring_rows(source, first, end, start, size, block, hits):
+def _bring_rows(source, first, end, start, size, block, rows):
     for row in range(first, end):
-        into, at = hits[row][start:], whole(source + (row - first) * BLOCK)
+        into, at = rows[row][start:], whole(source + (row - first) * BLOCK)
         for x in range(size):
             into[x] = block[at + x]
 
 
 @njit(**LEAN)
-def add_emission(count, surfaces, hits, tags, film):
-    """Add what surfaces that shine by themselves send back along the ray, on their front."""
+def add_emission(count, surfaces, hits, film):
+    """Add the radiance that emissive surfaces send back along the ray from their front."""
+    rows, tags = hits.rows, hits.tags
     for h in range(count):
         red, green, blue = emission_at(
-            surfaces, tags[MATERIAL, h], hits[PLACE, h], hits[PLACE + 1, h]
+            surfaces, tags[MATERIAL, h], rows[PLACE, h], rows[PLACE + 1, h]
         )
-        if red + green + blue > R(0) and hits[SIDE, h] > R(0):
+        if red + green + blue > R(0) and rows[SIDE, h] > R(0):
             row = DIRECT if tags[DEPTH, h] <= 1 else INDIRECT
             path = tags[PATH, h]
-            film[row, path] += red * hits[BETA, h]
-            film[row + 1, path] += green * hits[BETA + 1, h]
-            film[row + 2, path] += blue * hits[BETA + 2, h]
+            film[row, path] += red * rows[BETA, h]
+            film[row + 1, path] += green * rows[BETA + 1, h]
+            film[row + 2, path] += blue * rows[BETA + 2, h]

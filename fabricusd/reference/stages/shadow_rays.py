@@ -1,4 +1,4 @@
-"""What becomes of shadow rays: blocked, let through, or weakened by see-through surfaces."""
+"""The last stage: adds the light of unblocked shadow rays, attenuated by see-through surfaces."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from fabricusd.reference.rays.embree import (
     GEOMETRY,
     HIT_U,
     HIT_V,
+    INFINITE_DISTANCE,
     MISS,
     OX,
     OY,
@@ -26,12 +27,12 @@ from fabricusd.reference.rays.wave import DIRECT, INDIRECT, LIT
 from fabricusd.reference.surfaces.preview import opacity_at
 
 R = np.float32
-FAR = R(1e30)
 
 
 @njit(**LEAN)
-def settle(count, shadow_rays, shadow, shadow_path, film, aovs):
-    """Add what unblocked shadow rays bring."""
+def settle(count, shadows, film, aovs):
+    """Add the light of the shadow rays that are not blocked."""
+    shadow_rays, shadow, shadow_path = shadows
     for k in range(whole(count)):
         signed = shadow_path[k]
         path, row = whole(signed if signed >= 0 else -1 - signed), DIRECT
@@ -47,14 +48,18 @@ def settle(count, shadow_rays, shadow, shadow_path, film, aovs):
 
 
 @njit(**LEAN)
-def thin_out(count, rays, shadow, shadow_path, opacity, surfaces, triangle_material, records,
-             epsilon, aovs, film):  # fmt: skip
-    """Let shadow rays through what is not opaque, after `intersect`.
+def thin_out(count, shadows, opacity, surfaces, triangles, epsilon, aovs, film):
+    """Attenuate shadow rays at see-through surfaces, after `intersect`.
 
-    Rays that met nothing are settled; those that met something opaque end; the others are
-    weakened and go on behind it. opacity : (materials,) float32 - constant of each material, below
-    0 where it varies over the surface. Returns how many go on, packed to the front.
+    A ray that hit nothing adds its light; a ray that hit an opaque surface ends; any other ray is
+    attenuated and goes on behind the surface. Returns the number of rays that go on, which are
+    packed to the front.
+
+    opacity : (materials,) float32 - the constant of each material, negative if its opacity varies
+        over the surface
     """
+    rays, shadow, shadow_path = shadows
+    records, triangle_material = triangles.records, triangles.material
     whole = rays.view(np.uint32)
     left = 0
     for k in range(count):
@@ -95,7 +100,7 @@ def thin_out(count, rays, shadow, shadow_path, opacity, surfaces, triangle_mater
         rays[q, OX, place], rays[q, OY, place], rays[q, OZ, place] = x, y, z
         rays[q, DX, place], rays[q, DY, place], rays[q, DZ, place] = dx, dy, dz
         rays[q, TNEAR, place] = R(8) * epsilon + R(4e-6) * max(abs(x), max(abs(y), abs(z)))
-        rays[q, TFAR, place] = end if end >= FAR else end - rest
+        rays[q, TFAR, place] = end if end >= INFINITE_DISTANCE else end - rest
         shadow[3, left] = rays[q, TFAR, place]
         whole[q, GEOMETRY, place] = MISS
         left += 1

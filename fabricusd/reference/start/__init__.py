@@ -1,1 +1,1 @@
-"""Compiling and loading kernels before the first picture."""
+"""Compiling or loading kernels ahead of the first picture."""

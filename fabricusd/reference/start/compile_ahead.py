@@ -1,14 +1,16 @@
-"""Kernels made ready while a scene is read: loaded by a thread, or compiled by other processes.
+"""Prepares kernels while a scene is read: a thread loads them, or other processes compile them.
 
-numba keeps on disk what it compiled. A thread calls every kernel of a list of `kernel_tasks` once,
-on next to nothing, so that numba loads them while the scene is read and its triangles are prepared.
+numba caches compiled kernels on disk. A thread calls every kernel of a list in `kernel_tasks` once,
+with minimal arguments, so that numba loads the kernels while the scene is read and its triangles
+are prepared.
 
-On a machine's first picture there is nothing to load. numba compiles one function at a time in a
-process, so processes of their own go through the list, from one end or the other, each taking
-the next that none has, and whoever wanted to render waits and finds them on disk. What only levels
-`weave` and `thread` need is a list of its own, for the first hit at one of those. Processes compile
-without Python's collector of cycles, which costs a fifth of the time, and end with the memory that
-this takes. Whatever they fail to make is compiled by the caller.
+For the first picture on a machine there is nothing to load. numba compiles one function at a time
+per process, so several processes go through the list from either end, and each takes the next task
+that no other process has claimed. The renderer waits for them and then finds the kernels on disk.
+The kernels that only levels `weave` and `thread` need form a list of their own, which is prepared
+at the first hit at one of these levels. The processes compile without Python's cyclic garbage
+collector, which would take a fifth of the time; the memory that this costs is freed when they exit.
+Kernels that they fail to compile are compiled by the caller.
 """
 
 from __future__ import annotations
@@ -27,30 +29,30 @@ from pathlib import Path
 from numba.core.dispatcher import Dispatcher
 
 from fabricusd.kernels.start import load_as_they_are, load_without_blas
-from fabricusd.reference.start.kernel_tasks import FAR, LONGEST, NEAR, TASKS
+from fabricusd.reference.start.kernel_tasks import CLOSE_UPS, EVERY_PICTURE, LONGEST, TASKS
 from fabricusd.run.workers import worker_count
 
-__all__ = ["FAR", "NEAR", "compile_ahead", "compile_kernels"]
+__all__ = ["CLOSE_UPS", "EVERY_PICTURE", "compile_ahead", "compile_kernels"]
 
 _LONGEST = 120.0
-"""Seconds after which the other processes are no longer waited for."""
+"""Longest time to wait for the other processes [s]."""
 _MOST_PROCESSES = 4
-"""More would wait for the longest kernel."""
+"""Largest number of processes; more of them would only wait for the longest kernel."""
 
 
 class CompileAhead:
-    """The thread, or where kernels have not been compiled the processes, of one list."""
+    """The thread that loads one list of kernels, or the processes that compile it."""
 
     def __init__(self, which: str) -> None:
         self._processes: list[subprocess.Popen[bytes]] = []
         self._thread: threading.Thread | None = None
         if _compiled(which):
-            # No daemon: Python must not take LLVM apart while it loads code.
+            # Not a daemon: Python must not shut LLVM down while it loads code.
             self._thread = threading.Thread(target=_load_kernels, args=(_kernels(), which))
             self._thread.start()
             return
         load_without_blas()
-        # Inside another program `executable` is that program, which must not be started again.
+        # Inside another program, `executable` names that program, which must not be started again.
         if not Path(sys.executable or "").name.startswith("python"):
             return
         atexit.register(self._stop)
@@ -65,7 +67,7 @@ class CompileAhead:
             self._processes.append(process)
 
     def wait(self) -> None:
-        """Return when the kernels are ready, or will not be."""
+        """Return when the kernels are ready, or when waiting for them is given up."""
         if self._thread is not None:
             self._thread.join()
         while self._processes:
@@ -84,22 +86,23 @@ class CompileAhead:
 
 @cache
 def compile_ahead(which: str) -> CompileAhead:
-    """Start the thread or the processes, once; for `wait` before the first kernel is called.
+    """Start the thread or the processes, once per list; call `wait` before the first kernel call.
 
-    which : FAR, what every picture needs, or NEAR, what levels `weave` and `thread` need besides
+    which : EVERY_PICTURE for what every picture needs, CLOSE_UPS for what levels `weave` and
+        `thread` also need
     """
     return CompileAhead(which)
 
 
 def _compiled(which: str) -> bool:
-    """Whether numba has that list's longest kernel on disk."""
+    """Whether numba's disk cache holds the longest kernel of the list."""
     kernel = LONGEST[which]
     name = f"{kernel.__module__.rpartition('.')[2]}.{kernel.__name__}"
     return any(Path(kernel.stats.cache_path).glob(f"{name}*.nbi"))
 
 
 def _load_kernels(kernels: list[Dispatcher], which: str) -> None:
-    """Call every kernel; one that cannot be loaded complains where it is needed."""
+    """Call every kernel. A kernel that cannot be loaded raises its error when it is needed."""
     load_as_they_are(kernels)
     for task in TASKS[which]:
         with suppress(Exception):
@@ -107,7 +110,7 @@ def _load_kernels(kernels: list[Dispatcher], which: str) -> None:
 
 
 def _kernels() -> list[Dispatcher]:
-    """Those of the appearance model and of the tracer, as far as they have been imported."""
+    """All kernels of the package in the modules imported so far."""
     return [
         value
         for name, module in sys.modules.copy().items()
@@ -118,8 +121,8 @@ def _kernels() -> list[Dispatcher]:
 
 
 def compile_kernels(which: str, claims: str, backwards: bool) -> None:
-    """Compile every kernel of a list that no file of its name in folder `claims` claims yet."""
-    # Most of what a compiler makes lives until the end.
+    """Compile the kernels of a list that no other process has claimed by a file in `claims`."""
+    # Most objects that a compiler makes live until the end, so collecting garbage frees little.
     gc.disable()
     load_without_blas()
     for task in TASKS[which][:: -1 if backwards else 1]:

@@ -1,6 +1,7 @@
-"""What a picture calls, kernel by kernel, on next to nothing: for `compile_ahead`.
+"""The kernels that a picture calls, as tasks that `compile_ahead` runs with minimal arguments.
 
-A task is one kernel or a few that have parts in common. A test compares with what pictures call.
+A task calls one kernel, or a few kernels that share parts. A test compares the tasks with the
+kernels that pictures call.
 """
 
 from __future__ import annotations
@@ -21,33 +22,33 @@ from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.fabric import Fabric
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import Film
-from fabricusd.reference.lights.table import build_lights
-from fabricusd.reference.rays.camera import build_lens, camera_rays
+from fabricusd.reference.lights.table import Lights, build_lights
+from fabricusd.reference.rays.camera import Lens, build_lens, camera_rays
 from fabricusd.reference.rays.embree import Accelerator
 from fabricusd.reference.rays.sobol import new_numbers
-from fabricusd.reference.rays.triangles import build_tables
+from fabricusd.reference.rays.triangles import Triangles, build_tables
 from fabricusd.reference.rays.wave import CHANCE, F_PDF, GO_PDF, LANE_SPREAD, LANE_WIDTH, Wave
-from fabricusd.reference.stages.arrivals import arrive, sort_lanes
+from fabricusd.reference.stages.arrivals import Settings, arrive, sort_lanes
 from fabricusd.reference.stages.departures import depart
 from fabricusd.reference.stages.hits import prepare
 from fabricusd.reference.stages.shadow_rays import settle, thin_out
-from fabricusd.reference.surfaces.fabric import finish_point, look_up
+from fabricusd.reference.surfaces.fabric import Points, Scattering, finish_point, look_up
 from fabricusd.reference.surfaces.fabric_far import shade_far
 from fabricusd.reference.surfaces.preview import build_surfaces, shade_preview
 from fabricusd.scene.scene import Camera, Mesh, PreviewSurface, Scene
 
 R = np.float32
+_SETTINGS = Settings(estimator=0, level=0, max_depth=1)
 
 
 class _Sample(NamedTuple):
-    """A triangle, lit as a scene without lights is, and buffers: what kernels take their types
-    from."""
+    """One triangle under the default lights, and buffers: arguments of the kernels' types."""
 
     scene: Scene
     wave: Wave
-    tables: Any
-    lights: Any
-    dome: Any
+    triangles: Triangles
+    lights: Lights
+    lens: Lens
 
 
 @cache
@@ -57,27 +58,31 @@ def _sample() -> _Sample:
     scene = Scene(meshes=[mesh], materials=[PreviewSurface()])
     tables = build_tables(scene)
     wave = Wave(16, aovs=False)
-    wave.hits[:], wave.tags[:], wave.film[:] = 0, 0, 0
-    return _Sample(scene, wave, tables, *build_lights(default_lights(scene), tables.centre))
+    for rows in (*wave.hits, wave.film):
+        rows[:] = 0
+    return _Sample(
+        scene, wave, Triangles(tables.records, tables.material),
+        build_lights(default_lights(scene), tables.centre),
+        build_lens(Camera(), 1, 1, tables.centre, "tent"),
+    )  # fmt: skip
 
 
 def _cloth() -> tuple[Any, SurfaceTables]:
-    # Level threads: next to nothing to sample.
+    # The default fabric's threads are level, so its lobes are made quickly.
     fabric = Fabric()
     return fabric, surface_tables(fabric, precision=np.float32)
 
 
 def _prepare() -> None:
-    _, wave, tables, lights, dome = _sample()
+    _, wave, triangles, lights, _ = _sample()
     prepare(
-        0, 0, np.zeros(6, np.int64), wave.rays, wave.lanes, wave.lane_tags, wave.keys, wave.order,
-        tables.records, lights, dome, R(0), wave.path_pixel, wave.path_sample, new_numbers(0),
-        wave.hits, wave.tags,
+        0, _SETTINGS, np.zeros(6, np.int64), wave.lanes, wave.queues, wave.paths, new_numbers(0),
+        triangles, lights, R(0), wave.hits,
     )  # fmt: skip
 
 
 def _shade_far() -> None:
-    shade_far(R, _cloth()[1], no_mixture(R), R(0), _sample().wave.hits, 0, 0)
+    shade_far(R, _cloth()[1], no_mixture(R), R(0), _sample().wave.hits.rows, 0, 0)
 
 
 def _share_lobes() -> None:
@@ -85,56 +90,53 @@ def _share_lobes() -> None:
 
 
 def _arrive() -> None:
-    _, wave, tables, lights, dome = _sample()
+    _, wave, triangles, lights, _ = _sample()
     counts, limits = np.zeros(6, np.int64), np.zeros((1, 4), np.float32)
     arrive(
-        0, 0, 0, 0, wave.rays, wave.lanes, wave.lane_tags, lights, dome, wave.film, wave.keys,
-        tables.material, limits, tables.records, 0, wave.path_pixel, wave.path_sample,
-        new_numbers(0), counts,
+        0, _SETTINGS, 0, wave.lanes, wave.paths, new_numbers(0), lights, triangles, limits,
+        wave.film, wave.queues, counts,
     )  # fmt: skip
-    sort_lanes(0, wave.keys, np.cumsum(counts) - counts, wave.order)
+    sort_lanes(0, wave.queues, np.cumsum(counts) - counts)
 
 
 def _shade_preview() -> None:
     scene, wave, *_ = _sample()
-    shade_preview(build_surfaces(scene), wave.hits, wave.tags, 0, 0)
+    shade_preview(build_surfaces(scene), wave.hits.rows, wave.hits.tags, 0, 0)
 
 
 def _camera_rays() -> None:
-    _, wave, tables, *_ = _sample()
+    _, wave, _, _, lens = _sample()
+    rays, rows, _ = wave.lanes
     camera_rays(
-        build_lens(Camera(), 1, 1, tables.centre, "tent"), 1, np.zeros(0, np.int32), 0, 1,
-        new_numbers(0), wave.rays.reshape(len(wave.rays), -1),
-        wave.lanes[LANE_WIDTH : LANE_SPREAD + 1], wave.path_pixel, wave.path_sample,
+        lens, 1, np.zeros(0, np.int32), 0, 1, new_numbers(0), rays.reshape(len(rays), -1),
+        rows[LANE_WIDTH : LANE_SPREAD + 1], wave.paths,
     )  # fmt: skip
 
 
 def _depart() -> None:
     wave = _sample().wave
     depart(
-        0, 0, 0, 1, wave.hits, wave.tags, wave.film, wave.shadow_rays, wave.shadow,
-        wave.shadow_path, wave.next_rays, wave.next_lanes, wave.next_tags, np.zeros(3, np.int64),
-    )  # fmt: skip
+        0, _SETTINGS, 0, wave.hits, wave.film, wave.shadows, wave.next_lanes, np.zeros(3, np.int64)
+    )
 
 
 def _trace_and_settle() -> None:
-    scene, wave, tables, *_ = _sample()
+    scene, wave, triangles, *_ = _sample()
     rays = Accelerator(scene.meshes[0].points, scene.meshes[0].triangles)
-    rays.intersect(wave.rays, 0)
-    rays.occluded(wave.rays, 0)
-    shadows = (wave.shadow_rays, wave.shadow, wave.shadow_path)
-    settle(0, *shadows, wave.film, False)
+    rays.intersect(wave.lanes.rays, 0)
+    rays.occluded(wave.lanes.rays, 0)
+    settle(0, wave.shadows, wave.film, False)
     thin_out(
-        0, *shadows, np.ones(1, np.float32), build_surfaces(scene), tables.material,
-        tables.records, R(0), False, wave.film,
+        0, wave.shadows, np.ones(1, np.float32), build_surfaces(scene), triangles, R(0), False,
+        wave.film,
     )  # fmt: skip
     Film(4, 4, ("beauty",)).add(np.zeros(1, np.int32), 16, wave.film)
 
 
-def _scratch() -> tuple[Any, ...]:
-    """Of a hit in finer detail: side by side as the laws want them, none."""
+def _points() -> Points:
+    """The arrays of hits at levels `weave` and `thread`, each of length 0."""
     real = np.zeros(0, np.float32)
-    return np.zeros(0, np.uint8), np.zeros(0, np.int32), real, real, real, real
+    return Points(np.zeros(0, np.uint8), np.zeros(0, np.int32), real, real, real, real)
 
 
 @cache
@@ -148,12 +150,12 @@ def _shadow_table() -> None:
 
 
 def _look_up() -> None:
-    look_up(R, _woven()[0], R(1), _sample().wave.hits, 0, *_scratch())
+    look_up(R, _woven()[0], R(1), _sample().wave.hits.rows, 0, _points())
 
 
 def _sample_points() -> None:
-    sets, threads, _, across, psi0, _ = _scratch()
-    hits, vectors = _sample().wave.hits, np.zeros((3, 0), np.float32)
+    sets, threads, _, across, psi0, _ = _points()
+    hits, vectors = _sample().wave.hits.rows, np.zeros((3, 0), np.float32)
     sample_points(
         R, _cloth()[1].threads, no_mixture(R), False, sets, threads, psi0, across, vectors, vectors,
         *hits[CHANCE : CHANCE + 3], vectors, hits[F_PDF], hits[GO_PDF], 0, 0,
@@ -161,7 +163,7 @@ def _sample_points() -> None:
 
 
 def _point_values() -> None:
-    sets, threads, _, across, psi0, _ = _scratch()
+    sets, threads, _, across, psi0, _ = _points()
     vectors = np.zeros((3, 0), np.float32)
     point_values(
         R, _cloth()[1], False, sets, threads, psi0, across, vectors, vectors, vectors, 0, 0
@@ -169,20 +171,21 @@ def _point_values() -> None:
 
 
 def _finish_point() -> None:
-    vectors = [np.zeros((3, 0), np.float32)] * 4
-    finish_point(R, *_woven(), R(1), R(0), 1, _sample().wave.hits, 0, *vectors, *_scratch())
+    scattering = Scattering(*[np.zeros((3, 0), np.float32)] * 5)
+    finish_point(R, *_woven(), R(1), R(0), 1, _sample().wave.hits.rows, 0, scattering, _points())
 
 
-FAR, NEAR = "far", "near"
+EVERY_PICTURE, CLOSE_UPS = "every picture", "close-ups"
 TASKS: dict[str, tuple[Callable[[], None], ...]] = {
-    FAR: (
+    EVERY_PICTURE: (
         _shade_far, _share_lobes, _shade_preview, _depart, _trace_and_settle, _camera_rays,
         _arrive, _prepare,
     ),
-    NEAR: (_finish_point, _look_up, _sample_points, _point_values, _shadow_table),
+    CLOSE_UPS: (_finish_point, _look_up, _sample_points, _point_values, _shadow_table),
 }  # fmt: skip
-"""Those that take longest at both ends, beside those with which they have parts in common. Level
-`far` is what every picture needs, `near` what levels `weave` and `thread` need besides."""
+"""The tasks of each list. Tasks that take longest stand at both ends, next to those with which they
+share parts. Every picture needs the first list; levels `weave` and `thread` also need the second.
+"""
 
-LONGEST = {FAR: shade_far, NEAR: finish_point}
-"""A kernel of each list that takes long: where numba has it on disk, it has the others."""
+LONGEST = {EVERY_PICTURE: shade_far, CLOSE_UPS: finish_point}
+"""A kernel of each list that takes long to compile: if it is cached, so are the others."""

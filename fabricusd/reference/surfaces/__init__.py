@@ -1,1 +1,1 @@
-"""What a path meets: cloth and preview surfaces."""
+"""Shading of the surfaces that paths hit: cloth and UsdPreviewSurface materials."""

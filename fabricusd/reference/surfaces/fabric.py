@@ -1,15 +1,15 @@
-"""Cloth as a surface of the path tracer: the appearance kernels on hits, in blocks.
+"""The fabric shader: applies the appearance kernels to blocks of hits on cloth.
 
-Every fabric has tables for both its sides. At levels `weave` and `thread` the thread under each hit
-is looked up first; the laws are then evaluated towards the light and in the sampled direction by
-the vectorised loops, which want directions of their own, side by side.
+Every fabric has tables for both of its sides. At levels `weave` and `thread`, the thread under each
+hit is looked up first. Vectorised loops then evaluate the law towards the light and in the sampled
+direction; they need these directions in arrays of their own.
 """
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -52,8 +52,36 @@ R = np.float32
 _ONE_AT_A_TIME = threading.Lock()
 
 
+class Points(NamedTuple):
+    """The thread under each of n hits, as `weave.lookup.find` gives it.
+
+    sets : (n,) uint8; threads : (n,) int32; along, across, psi0, length : (n,) float32
+    """
+
+    sets: NDArray[np.uint8]
+    threads: NDArray[np.int32]
+    along: NDArray[np.float32]
+    across: NDArray[np.float32]
+    psi0: NDArray[np.float32]
+    length: NDArray[np.float32]
+
+
+class Scattering(NamedTuple):
+    """Directions and values of n hits in the surface frame, each (3, n) float32.
+
+    wo, wi, go : directions to the viewer, to the light, and sampled
+    towards, onwards : f times cosine, unshadowed, for `wi` and for `go`
+    """
+
+    wo: NDArray[np.float32]
+    wi: NDArray[np.float32]
+    go: NDArray[np.float32]
+    towards: NDArray[np.float32]
+    onwards: NDArray[np.float32]
+
+
 class _Scratch:
-    """Directions and values of up to `capacity` hits, side by side; one per worker."""
+    """Arrays for the directions and values of up to `capacity` hits; one per worker."""
 
     def __init__(self, capacity: int) -> None:
         self.vectors = [aligned_empty((3 * capacity,)) for _ in range(5)]
@@ -64,13 +92,20 @@ class _Scratch:
         self.along = aligned_empty((capacity,))
         self.length = aligned_empty((capacity,))
 
-    def views(self, count: int) -> list[NDArray[np.float32]]:
-        """Five (3, count) arrays, C-contiguous."""
-        return [v[: 3 * count].reshape(3, count) for v in self.vectors]
+    def scattering(self, count: int) -> Scattering:
+        """C-contiguous arrays for `count` hits."""
+        return Scattering(*(v[: 3 * count].reshape(3, count) for v in self.vectors))
+
+    def points(self, count: int) -> Points:
+        """Arrays for `count` hits."""
+        return Points(
+            self.sets[:count], self.threads[:count], self.along[:count], self.across[:count],
+            self.psi0[:count], self.length[:count],
+        )  # fmt: skip
 
 
 class _Side:
-    """One side of a cloth, made ready."""
+    """The tables of one side of a cloth, made on demand."""
 
     def __init__(self, fabric: Fabric, shadow: str, make_ready: Callable[[], None]) -> None:
         self.fabric, self.method, self.make_ready = fabric, shadow, make_ready
@@ -80,16 +115,16 @@ class _Side:
 
     @property
     def law(self) -> SurfaceLaw:
-        """The surface law, made when first needed: many a cloth never shows its back."""
+        """The surface law, made when it is first needed: often a cloth's back is never seen."""
         with _ONE_AT_A_TIME:
             if self._law is None:
                 self._law = surface_law(self.fabric, precision=np.float32)
             return self._law
 
     def near(self, level: int) -> tuple[CompiledFabric, Shadow]:
-        """Weave and shadowing of level `weave` or `thread`, made when first needed."""
-        # One at a time for all cloths: some of these tables are made by numba's own workers, which
-        # may not be called from two threads at once.
+        """Weave and shadowing for level `weave` or `thread`, made when they are first needed."""
+        # One lock for all cloths: numba's own workers compute some of these tables, and they may
+        # not be called from two threads at once.
         with _ONE_AT_A_TIME:
             if level not in self._near:
                 self.make_ready()
@@ -102,10 +137,10 @@ class _Side:
 
 
 class FabricShader:
-    """Shades hits of one fabric: rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP of `Wave.hits`.
+    """Shades hits of one fabric: rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP of `Hits.rows`.
 
     shadow : one of `shadow.METHODS`, at levels `weave` and `thread`
-    make_ready : called before the first hit at one of those levels, which many a picture never has
+    make_ready : called before the first hit at one of those levels; many pictures have none
     """
 
     def __init__(
@@ -116,30 +151,30 @@ class FabricShader:
         self.gap = 0.0 if fabric.opaque else float(self.sides[0].law.published.gap)
 
     def __call__(self, level: int, back: int, wave: Wave, first: int, last: int) -> None:
-        """Shade hits `first` to `last`, all on one side at one level."""
-        side = self.sides[back]
+        """Shade the hits from `first` to before `last`, all on one side and at one level."""
+        side, hits = self.sides[back], wave.hits.rows
         if level == FAR_LEVEL and side.law.kind == PUBLISHED_ONLY:
-            shade_far(R, side.law.published, side.law.lobes, R(self.gap), wave.hits, first, last)
+            shade_far(R, side.law.published, side.law.lobes, R(self.gap), hits, first, last)
             return
         scratch = wave.scratch or _Scratch(wave.capacity)
         wave.scratch = scratch
-        vectors = scratch.views(last - first)
-        wo, wi = vectors[:2]
-        gather(wave.hits, first, last - first, wo, wi)
+        scattering = scratch.scattering(last - first)
+        gather(hits, first, last - first, scattering.wo, scattering.wi)
         if level == FAR_LEVEL:
-            self._shade_by_law(side, wave.hits, first, vectors)
+            self._shade_by_law(side, hits, first, scattering)
         else:
-            self._shade_near(side, level, back, scratch, wave.hits, first, vectors)
+            points = scratch.points(last - first)
+            self._shade_near(side, level, back, hits, first, scattering, points)
 
     def _shade_by_law(
-        self, side: _Side, hits: NDArray[np.float32], first: int, vectors: list[Any]
+        self, side: _Side, hits: NDArray[np.float32], first: int, scattering: Scattering
     ) -> None:
-        """Level `far` of cloth with `conserving` threads."""
-        _, _, go, towards, onwards = vectors
+        """Shade hits at level `far` on cloth with `conserving` threads."""
+        _, _, go, towards, onwards = scattering
         count = go.shape[1]
         none, real = np.zeros(count, np.uint8), np.zeros(count, np.float32)
-        _by_law(R, side.law, FAR_LEVEL, hits, first, *vectors, none, none.astype(np.int32), real,
-                real)  # fmt: skip
+        points = Points(none, none.astype(np.int32), real, real, real, real)
+        _by_law(R, side.law, FAR_LEVEL, hits, first, scattering, points)
         finish_far(R, hits, first, count, R(self.gap), go, towards, onwards)
 
     def _shade_near(
@@ -147,21 +182,17 @@ class FabricShader:
         side: _Side,
         level: int,
         back: int,
-        scratch: _Scratch,
         hits: NDArray[np.float32],
         first: int,
-        vectors: list[Any],
+        scattering: Scattering,
+        points: Points,
     ) -> None:
-        wo, wi, go, towards, onwards = vectors
+        wo, wi, go, towards, onwards = scattering
         law, (cloth, shadow) = side.law, side.near(level)
         count = wo.shape[1]
-        found = (
-            scratch.sets[:count], scratch.threads[:count], scratch.along[:count],
-            scratch.across[:count], scratch.psi0[:count], scratch.length[:count],
-        )  # fmt: skip
-        sets, threads, _, across, psi0, _ = found
+        sets, threads, _, across, psi0, _ = points
         v_sign = R(-1) if back else R(1)
-        look_up(R, cloth, v_sign, hits, first, *found)
+        look_up(R, cloth, v_sign, hits, first, points)
         if law.kind == PUBLISHED_ONLY:
             sample_points(
                 R, law.published.threads, law.lobes, level == THREAD_LEVEL, sets, threads, psi0,
@@ -172,16 +203,18 @@ class FabricShader:
             point_values(*near, wi, wo, towards, 0, count)
             point_values(*near, go, wo, onwards, 0, count)
         else:
-            _by_law(R, law, level, hits, first, *vectors, sets, threads, psi0, across)
+            _by_law(R, law, level, hits, first, scattering, points)
         finish_point(
-            R, cloth, shadow, v_sign, R(0 if self.gap == 0 else 1), side.types, hits, first, wi,
-            go, towards, onwards, *found,
+            R, cloth, shadow, v_sign, R(0 if self.gap == 0 else 1), side.types, hits, first,
+            scattering, points,
         )  # fmt: skip
 
 
 @njit(**LEAN)
-def _by_law(R, law, level, hits, first, wo, wi, go, towards, onwards, sets, threads, psi0, across):
-    """Directions, densities and values of cloth with `conserving` threads, one hit at a time."""
+def _by_law(R, law, level, hits, first, scattering, points):
+    """Sample and evaluate cloth with `conserving` threads, one hit at a time."""
+    wo, wi, go, towards, onwards = scattering
+    sets, threads, psi0, across = points.sets, points.threads, points.psi0, points.across
     for k in range(wo.shape[1]):
         h = first + k
         which, thread, angle, w = int(sets[k]), int(threads[k]), psi0[k], across[k]
@@ -191,7 +224,7 @@ def _by_law(R, law, level, hits, first, wo, wi, go, towards, onwards, sets, thre
             hits[CHANCE, h], hits[CHANCE + 1, h], hits[CHANCE + 2, h],
         )  # fmt: skip
         go[0, k], go[1, k], go[2, k] = x, y, z
-        # One call of each function, for both directions: they are large, and compiled in place.
+        # Loop over both directions: the functions are large and inlined at each call.
         for turn in range(2):
             pdf = law_density(R, law, level, which, thread, angle, w, x, y, z, ox, oy, oz)
             red, green, blue = law_value(
@@ -223,8 +256,9 @@ def _finish(hits, h, keep, k, go, onwards):
 
 
 @njit(**LEAN)
-def look_up(R, cloth, v_sign, hits, first, sets, threads, along, across, psi0, length):
-    """The thread under each hit."""
+def look_up(R, cloth, v_sign, hits, first, points):
+    """Look up the thread under each hit."""
+    sets, threads, along, across, psi0, length = points
     for k in range(sets.shape[0]):
         h = first + k
         which, thread, s, w, angle, run = find(
@@ -235,11 +269,10 @@ def look_up(R, cloth, v_sign, hits, first, sets, threads, along, across, psi0, l
 
 
 @njit(**LEAN)
-def finish_point(
-    R, cloth, shadow, v_sign, open_gap, types, hits, first, wi, go, towards, onwards,
-    sets, threads, along, across, psi0, length,
-):  # fmt: skip
-    """Shadow the values by the neighbouring threads; in a gap the path goes straight on or ends."""
+def finish_point(R, cloth, shadow, v_sign, open_gap, types, hits, first, scattering, points):
+    """Apply the shadowing of neighbouring threads; in a gap, the path goes straight on or ends."""
+    _, wi, go, towards, onwards = scattering
+    sets, threads, along, across, _, length = points
     for k in range(wi.shape[1]):
         h = first + k
         if sets[k] == GAP:
@@ -251,7 +284,7 @@ def finish_point(
         u, v = float(hits[PLACE, h]), float(v_sign * hits[PLACE + 1, h])
         light, bounce = R(1), R(1)
         if shadow.method != NONE:
-            # Light from behind the cloth has threads of its own before it.
+            # Light from behind the cloth is shadowed by the threads on that side.
             light = R(1) if wi[2, k] <= R(0) else shade(
                 R, cloth, shadow, u, v, sets[k], threads[k], along[k], across[k], length[k],
                 wi[0, k], wi[1, k], wi[2, k],
@@ -263,7 +296,7 @@ def finish_point(
         for row in range(3):
             hits[F + row, h] = light * towards[row, k]
             onwards[row, k] = bounce * onwards[row, k]
-        # As `weave.thread_number` has it.
+        # The same number as `weave.thread_number`.
         hits[KEEP, h] = R(1)
         hits[THREAD, h] = R(threads[k] + (types if sets[k] == WARP else 0))
         _finish(hits, h, R(1), k, go, onwards)

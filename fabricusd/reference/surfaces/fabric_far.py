@@ -1,6 +1,6 @@
-"""Published cloth at level `far`: directions, densities and values of hits, a block at a time.
+"""Shading of cloth with the published law at level `far`, one block of hits at a time.
 
-A block goes through all of it while it is in the first-level cache.
+A block goes through sampling and evaluation while it stays in the first-level cache.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from fabricusd.kernels.real import BLOCK, KERNEL, LEAN, as_part
 from fabricusd.reference.rays.wave import CHANCE, F_PDF, GO, GO_PDF, KEEP, THREAD, WEIGHT, WI, WO, F
 
 STRAIGHT = np.float32(-1)
-"""In GO_PDF: the path goes straight on."""
+"""The value of GO_PDF that lets a path go straight on."""
 
 
 @njit(**LEAN)
 def gather(hits, first, size, wo, wi):
-    """Directions to the viewer and to the light of `size` hits, side by side."""
+    """Copy the directions to the viewer and to the light of `size` hits to `wo` and `wi`."""
     for row in range(3):
         to_viewer, to_light = hits[WO + row][first:], hits[WI + row][first:]
         for x in range(size):
@@ -30,9 +30,10 @@ def gather(hits, first, size, wo, wi):
 
 @njit(**LEAN)
 def finish_far(R, hits, first, count, gap, go, towards, onwards):
-    """Values and weights; the gap lets its share of the paths go straight on.
+    """Write values and weights; the share `gap` of the paths goes straight on.
 
-    Row by row: LLVM vectorises a loop over few rows, whose overlap it can check beforehand.
+    Works row by row: LLVM vectorises a loop over few rows, because it can check beforehand that
+    they do not overlap.
     """
     keep = R(1) - gap
     go_pdf, chances = hits[GO_PDF][first:], hits[CHANCE + 3][first:]
@@ -63,7 +64,7 @@ _gather, _sample_far, _far_values, _finish_far = (
 
 @njit(**KERNEL)
 def shade_far(R, tables, sampling, gap, hits, first, last):
-    """Rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP and THREAD of hits `first` to before `last`."""
+    """Fill rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP and THREAD of hits `first` to before `last`."""
     wo, wi = np.empty((3, BLOCK), np.float32), np.empty((3, BLOCK), np.float32)
     go, towards = np.empty((3, BLOCK), np.float32), np.empty((3, BLOCK), np.float32)
     onwards = np.empty((3, BLOCK), np.float32)

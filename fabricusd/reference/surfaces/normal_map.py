@@ -1,11 +1,11 @@
-"""Normal maps: from a texel to the frame that a hit is shaded in.
+"""Normal mapping: turns the frame in which a hit is shaded as a normal map's texel says.
 
-A texel is a normal in tangent space: x along growing u of the *picture*, y along its growing v, z
-along the surface's normal. The tangent is the mesh's direction of growing u, the bitangent
-`handedness * cross(normal, tangent)`, both perpendicular to the normal [Mikkelsen2008].
+A texel is a normal in tangent space: x along increasing u of the *picture*, y along its increasing
+v, z along the surface's normal. The tangent is the mesh's direction of increasing u, the bitangent
+is `handedness * cross(normal, tangent)`, and both are perpendicular to the normal [Mikkelsen2008].
 
-Light from below the surface itself counts for nothing, whatever the map says, and paths that would
-go there end: none leaks through, and none is reflected twice by one place.
+Light from below the unmapped surface contributes nothing, whatever the map says, and paths that
+would go there end. No light leaks through, and no path is reflected twice at one point.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ Floats = NDArray[np.float32]
 Integers = NDArray[np.int32]
 
 LEAST_FACING = R(0.01)
-"""Least cosine between a mapped normal and the direction to the viewer. What a map turns further
-away would be black from the front, and lit from behind."""
+"""Smallest cosine between a mapped normal and the direction to the viewer. A normal that a map
+turns further away would make the surface black from the front, or lit from behind."""
 
 
 @njit(**INLINE)
 def mapped_frame(x, y, z, side, ox, oy, oz):
     """(tx, ty, tz, bx, by, bz, nx, ny, nz): tangent, bitangent and normal in the hit's own frame.
 
-    x, y, z - the texel, of any length; none where it is 0
+    x, y, z - the texel, of any length; a texel of length 0 leaves the normal unchanged
     side - 1 on the front and -1 on the back, whose frame is (U, -V, -N) of the front's: seen from
         behind, a bump is a dent, so its normal is minus the front's
     ox, oy, oz - the direction to the viewer, oz > 0
 
-    A normal that is turned away from the viewer is bent towards him until its cosine is
-    LEAST_FACING, or that of the surface where it is less.
+    A normal that is turned away from the viewer is bent towards the viewer until its cosine is
+    LEAST_FACING, or the cosine of the unmapped surface if that is smaller.
     """
     square = x * x + y * y + z * z
     inverse = R(1) / math.sqrt(max(square, R(1e-12)))
@@ -65,7 +65,8 @@ def mapped_frame(x, y, z, side, ox, oy, oz):
     x, y, z = x + missing * ox, y + missing * oy, z + missing * oz
     inverse = R(1) / math.sqrt(x * x + y * y + z * z)
     x, y, z = x * inverse, y * inverse, z * inverse
-    # The first axis made perpendicular to the normal, or the second where the normal lies along it.
+    # Make the first axis perpendicular to the normal, or the second if the normal lies along the
+    # first.
     first = abs(x) < R(0.999)
     d = x if first else y
     tx, ty, tz = (R(1) if first else R(0)) - d * x, (R(0) if first else R(1)) - d * y, -d * z
@@ -89,9 +90,9 @@ def _dot(hits, row, h, x, y, z):
 
 @njit(**LEAN)
 def turn_frames(surfaces, hits, tags, first, last, own):
-    """Turn the frames of hits first..last, and the directions in them, as the normal map says.
+    """Turn the frames of hits `first` to before `last`, and the directions given in these frames.
 
-    own : (3, last - first) float32, filled with the surface's own normals in the turned frames
+    own : (3, last - first) float32 - filled with the unmapped normals in the turned frames
     """
     first, last = whole(first), whole(last)
     index = int(surfaces.table[tags[MATERIAL, first], NORMAL_MAP])
@@ -114,9 +115,9 @@ def turn_frames(surfaces, hits, tags, first, last, own):
 
 @njit(**LEAN)
 def end_below(hits, first, last, own):
-    """Drop the light from below the surface, and end the paths that go there.
+    """Drop light from below the unmapped surface, and end the paths that go there.
 
-    own : (3, last - first) float32 - as `turn_frames` fills it
+    own : (3, last - first) float32 - as filled by `turn_frames`
     """
     first, last = whole(first), whole(last)
     for h in range(first, last):

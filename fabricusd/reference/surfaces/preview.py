@@ -1,8 +1,9 @@
-"""Surfaces other than cloth: Lambert under GGX, as UsdPreviewSurface describes them.
+"""The shader of UsdPreviewSurface materials: a Lambertian base under a GGX specular layer.
 
-[Walter2007] GGX, height-correlated masking, sampled by visible normals in the form of
-[Dupuy2023]. The diffuse part is scaled by the smaller of both directions' Fresnel transmittance,
-which keeps it reciprocal and passive. `normal_map` turns the frame in which all this happens.
+The layer is the GGX model of [Walter2007] with height-correlated masking, sampled by visible
+normals in the form of [Dupuy2023]. The diffuse part is scaled by the smaller Fresnel transmittance
+of the two directions, which keeps it reciprocal and passive. `normal_map` may first turn the frame
+in which the surface is shaded.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from fabricusd.kernels.real import INLINE, KERNEL, PART, cos, sin
 from fabricusd.reference.rays.wave import (
+    BLOCK,
     CHANCE,
     F_PDF,
     GO,
@@ -58,7 +60,7 @@ class Surfaces(NamedTuple):
 
 
 def build_surfaces(scene: Scene) -> Surfaces:
-    """One row per material of the scene; rows of fabrics stay empty."""
+    """Build the table with one row per material of the scene; the rows of fabrics stay empty."""
     table = np.zeros((max(len(scene.materials), 1), COLUMNS), np.float32)
     table[:, DIFFUSE_MAP:] = -1.0
     table[:, OPACITY] = 1.0
@@ -98,14 +100,14 @@ def _map_row(texture: Texture, start: int) -> list[int]:
 
 
 def along_the_mesh(pixels: NDArray[np.float32], place: tuple[float, ...]) -> NDArray[np.float32]:
-    """(h, w, 3) normals along the picture's axes -> along the mesh's u and v.
+    """Convert (h, w, 3) normals from the axes of the picture to the mesh's u and v.
 
-    place : `Texture.place`. Where it turns or mirrors the picture, the relief turns with it. A
-    place that squeezes the picture to a line leaves the normals as they are.
+    place : `Texture.place`. If it rotates or mirrors the picture, the relief follows. A place that
+        collapses the picture to a line leaves the normals unchanged.
     """
     a, b, _, d, e, _ = place
     mirrored = math.copysign(1.0, a * e - b * d)
-    # The direction of growing picture u in (u, v): the first column of the inverse.
+    # The direction of increasing picture u in (u, v): the first column of the inverse.
     along, up = e * mirrored, -d * mirrored
     length = math.hypot(along, up)
     if a * e - b * d == 0 or length == 0 or (up == 0 and along > 0 and mirrored > 0):
@@ -117,7 +119,7 @@ def along_the_mesh(pixels: NDArray[np.float32], place: tuple[float, ...]) -> NDA
 
 @njit(**INLINE)
 def _wrapped(i, n, mode):
-    """Texel index `i` brought into [0, n), or -1 for black."""
+    """Texel index `i` wrapped into [0, n); -1 for black."""
     if mode == 0:
         return i % n
     if mode == 1:
@@ -130,7 +132,7 @@ def _wrapped(i, n, mode):
 
 @njit(**PART)
 def texture_at(surfaces, index, u, v):
-    """Bilinear lookup: (r, g, b); v grows upwards from the bottom row."""
+    """Bilinear lookup of (r, g, b); v increases upwards from the bottom row."""
     m = surfaces.maps[index]
     start, h, w, channels = m[0], m[1], m[2], m[3]
     place = surfaces.places[index]
@@ -156,7 +158,7 @@ def texture_at(surfaces, index, u, v):
 
 @njit(**INLINE)
 def opacity_at(surfaces, material, u, v):
-    """Share of the light that does not go straight through."""
+    """Opacity at (u, v): the share of light that does not pass straight through."""
     row = surfaces.table[material]
     opacity = row[OPACITY]
     if row[OPACITY_MAP] >= R(0):
@@ -168,7 +170,7 @@ def opacity_at(surfaces, material, u, v):
 
 @njit(**INLINE)
 def emission_at(surfaces, material, u, v):
-    """Radiance that the surface itself sends out: (r, g, b)."""
+    """Emitted radiance (r, g, b) at (u, v)."""
     row = surfaces.table[material]
     if row[EMISSIVE_MAP] >= R(0):
         return texture_at(surfaces, int(row[EMISSIVE_MAP]), u, v)
@@ -182,15 +184,30 @@ def _fresnel(f0, f90, c):
     return f0 + (f90 - f0) * d2 * d2 * d
 
 
+class _Layers(NamedTuple):
+    """The surface at a hit: base colour, metallic, the alpha of GGX, the reflectance at normal
+    incidence, and the share of samples that the specular layer gets."""
+
+    red: np.float32
+    green: np.float32
+    blue: np.float32
+    metallic: np.float32
+    alpha: np.float32
+    f0: np.float32
+    share: np.float32
+
+
 @njit(**INLINE)
-def _evaluate(red, green, blue, metallic, alpha, f0, share, ox, oy, oz, ix, iy, iz):
+def _evaluate(layers, wo, wi):
     """f times cosine (r, g, b) and pdf of `wi`; 0 unless both directions are above the surface."""
+    red, green, blue, metallic, alpha, f0, share = layers
+    (ox, oy, oz), (ix, iy, iz) = wo, wi
     hx, hy, hz = ix + ox, iy + oy, iz + oz
     inverse = R(1) / math.sqrt(max(hx * hx + hy * hy + hz * hz, R(1e-20)))
     hx, hy, hz = hx * inverse, hy * inverse, hz * inverse
     c = max(hx * ox + hy * oy + hz * oz, R(0))
     a2 = alpha * alpha
-    # Written with the tangent's parts: a2 - 1 would cancel in float32 at small roughness.
+    # Written with the tangential components: a2 - 1 would cancel in float32 at small roughness.
     d = (hx * hx + hy * hy) + a2 * hz * hz
     distribution = a2 / max(_PI * d * d, R(1e-20))
     go = math.sqrt(a2 * (ox * ox + oy * oy) + oz * oz)
@@ -215,7 +232,7 @@ def _evaluate(red, green, blue, metallic, alpha, f0, share, ox, oy, oz, ix, iy, 
 
 @njit(**INLINE)
 def _sample(alpha, share, ox, oy, oz, u0, u1, u2):
-    """A direction for `wi`: GGX by visible normals with the chance `share`, else by cosine."""
+    """Sample `wi`: by GGX visible normals with probability `share`, else by the cosine."""
     phi = R(2) * _PI * u1
     c, s = cos(R, phi), sin(R, phi)
     flat = math.sqrt(u2)
@@ -236,11 +253,11 @@ def _sample(alpha, share, ox, oy, oz, u0, u1, u2):
     )
 
 
-BLOCK = 128
 _STEP = BLOCK + 16
-"""Between rows of a block: a power of two would put all of them into the same few cache lines."""
+"""Distance between rows of a block. Rows at a distance of a power of two would all map to the same
+few cache lines."""
 
-# Rows of a block: what `Wave.hits` brings, the surface's properties there, what is made.
+# Rows of a block: inputs from `Hits.rows`, the surface's properties at each hit, and the results.
 (_O, _I, _CHANCE, _RED, _GREEN, _BLUE, _METALLIC, _ALPHA, _OPACITY, _F, _F_PDF, _GO, _WEIGHT,
  _GO_PDF) = (
     row * _STEP for row in (0, 3, 6, 10, 11, 12, 13, 14, 15, 16, 19, 20, 23, 26)
@@ -250,8 +267,10 @@ _ROWS = 27
 
 @njit(**KERNEL)
 def shade_preview(surfaces, hits, tags, first, last):
-    """Evaluate and sample the surface of hits first..last, all of one material: rows F, F_PDF, GO,
-    WEIGHT, GO_PDF, KEEP, THREAD."""
+    """Evaluate and sample the surface at hits `first` to before `last`, all of one material.
+
+    Fills rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP and THREAD, and updates the last row of CHANCE.
+    """
     block = np.empty(_ROWS * _STEP, np.float32)
     row = surfaces.table[tags[MATERIAL, first]]
     f0 = (row[IOR] - R(1)) / (row[IOR] + R(1))
@@ -280,12 +299,12 @@ def shade_preview(surfaces, hits, tags, first, last):
 
 @njit(**PART)
 def _look_up(surfaces, material, hits, start, size, block):
-    """The surface's properties at each hit of a block."""
+    """Look up the surface's properties at each hit of a block."""
     row = surfaces.table[material]
     for x in range(size):
         block[_RED + x], block[_GREEN + x] = row[DIFFUSE], row[DIFFUSE + 1]
         block[_BLUE + x], block[_METALLIC + x] = row[DIFFUSE + 2], row[METALLIC]
-        # Below 0.02 a lobe is a mirror, which light sampling would turn into sparks.
+        # A lobe of roughness below 0.02 is nearly a mirror; light sampling would make fireflies.
         block[_ALPHA + x] = max(row[ROUGHNESS] * row[ROUGHNESS], R(4e-4))
         block[_OPACITY + x] = min(max(row[OPACITY], R(0)), R(1))
     textured = row[OPACITY_MAP] >= R(0) or row[THRESHOLD] > R(0)
@@ -306,7 +325,7 @@ def _look_up(surfaces, material, hits, start, size, block):
 
 @njit(**PART)
 def _shade(f0, size, block):
-    """The values of a block: one loop without branches, which LLVM vectorises."""
+    """Evaluate and sample a block in one loop without branches, which LLVM vectorises."""
     for x in range(size):
         red, green, blue = block[_RED + x], block[_GREEN + x], block[_BLUE + x]
         metallic, alpha, opacity = block[_METALLIC + x], block[_ALPHA + x], block[_OPACITY + x]
@@ -315,19 +334,16 @@ def _shade(f0, size, block):
         base = max(red, max(green, blue)) * (R(1) - metallic)
         share = gloss / max(gloss + base, R(1e-6))
         share = R(0) if gloss <= R(0) else min(max(share, R(0.1)), R(1))
-        fr, fg, fb, pdf = _evaluate(
-            red, green, blue, metallic, alpha, f0, share, ox, oy, oz,
-            block[_I + x], block[_I + _STEP + x], block[_I + 2 * _STEP + x],
-        )  # fmt: skip
+        layers = _Layers(red, green, blue, metallic, alpha, f0, share)
+        wi = block[_I + x], block[_I + _STEP + x], block[_I + 2 * _STEP + x]
+        fr, fg, fb, pdf = _evaluate(layers, (ox, oy, oz), wi)
         block[_F + x], block[_F + _STEP + x] = opacity * fr, opacity * fg
         block[_F + 2 * _STEP + x], block[_F_PDF + x] = opacity * fb, opacity * pdf
         gx, gy, gz = _sample(
             alpha, share, ox, oy, oz,
             block[_CHANCE + x], block[_CHANCE + _STEP + x], block[_CHANCE + 2 * _STEP + x],
         )  # fmt: skip
-        wr, wg, wb, pdf = _evaluate(
-            red, green, blue, metallic, alpha, f0, share, ox, oy, oz, gx, gy, gz
-        )
+        wr, wg, wb, pdf = _evaluate(layers, (ox, oy, oz), (gx, gy, gz))
         block[_GO + x], block[_GO + _STEP + x], block[_GO + 2 * _STEP + x] = gx, gy, gz
         inverse = R(1) / pdf if pdf > R(0) else R(0)
         block[_WEIGHT + x], block[_WEIGHT + _STEP + x] = wr * inverse, wg * inverse

@@ -1,1 +1,1 @@
-"""Mesh files: OBJ, glTF and PLY."""
+"""Readers of mesh files: OBJ, glTF and PLY."""

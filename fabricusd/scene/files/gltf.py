@@ -1,7 +1,7 @@
-"""glTF 2.0: the default scene's triangles in world space, one piece for each primitive of a node.
+"""Reads glTF 2.0: the default scene's triangles in world space, one piece per primitive of a node.
 
-What touches only textures, materials and lights is not read. What changes geometry or its place is
-read as the file says, or refused by the name of the extension.
+Textures, materials and lights are not read. Everything that changes geometry or its placement is
+either read or refused by the name of its extension.
 """
 
 from __future__ import annotations
@@ -20,22 +20,23 @@ from fabricusd.scene.files.gltf_nodes import Placed, joint_matrices, placed_node
 from fabricusd.scene.files.piece import QUIET, MeshFile, Piece, renumbered, unique_names
 
 READ = ("KHR_mesh_quantization",)
-"""Required extensions that are read."""
+"""Extensions that a file may require because they are read."""
 
 _LOOKS = re.compile(r"[A-Z0-9]+_(texture|materials|lights|image|xmp|audio)(_|$)")
-"""Extensions that do not touch geometry, by how Khronos names them."""
+"""Pattern of the extensions that do not affect geometry, by Khronos's naming scheme."""
 
 POINTS, TRIANGLES, STRIP, FAN = 0, 4, 5, 6
 
 MOST_TRIANGLES = 10_000_000
-"""Triangles of all nodes together. A small file may name one mesh in very many nodes."""
+"""Largest number of triangles of all nodes together: many nodes of a small file may use one mesh.
+"""
 
 _VECTOR, _PAIR = ("VEC3",), ("VEC2",)
 
 
 @QUIET
 def read_gltf(path: Path) -> MeshFile:
-    """The file's pieces in metres, +y up. Raises FabricError."""
+    """Read the file's pieces in metres, with +y up. Raises FabricError."""
     file = Document(path)
     _refuse_extensions(file)
     notes: list[tuple[str, str]] = []
@@ -49,9 +50,7 @@ def read_gltf(path: Path) -> MeshFile:
         if node.mesh not in shapes:
             shapes[node.mesh] = _shapes(file, node.mesh, notes)
         if node.instanced:
-            notes.append(
-                (node.name, "is drawn once, without its EXT_mesh_gpu_instancing, which is not read")
-            )
+            notes.append((node.name, "is drawn once: EXT_mesh_gpu_instancing is not supported"))
         for shape in shapes[node.mesh]:
             if not len(shape.triangles):
                 continue
@@ -61,7 +60,7 @@ def read_gltf(path: Path) -> MeshFile:
             if total > MOST_TRIANGLES:
                 file.refuse(
                     "nodes",
-                    f"draw more than {MOST_TRIANGLES} triangles together, which is the most",
+                    f"draw more than {MOST_TRIANGLES} triangles together; that is the limit",
                 )
     names = unique_names([name for name, _, _ in found])
     worlds = {node.number: node.world for node in placed}
@@ -79,18 +78,20 @@ def _refuse_extensions(file: Document) -> None:
         if name not in READ and not _LOOKS.match(name):
             file.refuse(
                 "",
-                f"requires the extension {one_line(name, 60)}, which is not read; save it without",
+                f"requires the extension {one_line(name, 60)}, which is not supported; save the "
+                f"file without it",
             )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Shape:
-    """A primitive in its mesh's space; arrays by vertex.
+    """A primitive in its mesh's space, with arrays by vertex.
 
-    triangles : (m, 3) int; points, normals : (n, 3); uv : (n, 2), v upwards; None for none
-    targets : morph targets, each (points, normals, uv) to add, or None
-    weights : of the mesh's targets, where a node names none
-    joints, weighed : (n, 4 k) the skin's joints that move a vertex, and how much
+    triangles : (m, 3) int
+    points : (n, 3); normals : (n, 3) or None; uv : (n, 2) or None - v upwards
+    targets : morph targets, each (points, normals, uv) to add; each of these may be None
+    weights : the mesh's weights of the targets, for nodes without weights of their own
+    joints, weighed : (n, 4 k) or None - the skin's joints that move each vertex, and their weights
     """
 
     name: str
@@ -105,7 +106,7 @@ class _Shape:
 
 
 def _shapes(file: Document, number: int, notes: list[tuple[str, str]]) -> list[_Shape]:
-    """The primitives of a mesh that are triangles."""
+    """The primitives of a mesh that consist of triangles."""
     mesh = file.one("meshes", number, f"meshes[{number}]")
     mesh_name = _words(mesh.get("name")) or f"mesh_{number}"
     weights = tuple(file.numbers(mesh, "weights", None, f"meshes[{number}]") or ())
@@ -134,7 +135,7 @@ def _shapes(file: Document, number: int, notes: list[tuple[str, str]]) -> list[_
 def _refuse_draco(
     file: Document, primitive: dict[str, Any], attributes: dict[str, Any], extensions: Any
 ) -> None:
-    """Raise FabricError where a compressed primitive has no plain numbers beside."""
+    """Raise FabricError for a Draco-compressed primitive without uncompressed data."""
     if "KHR_draco_mesh_compression" not in extensions:
         return
     for index in (*attributes.values(), primitive.get("indices")):
@@ -142,7 +143,9 @@ def _refuse_draco(
             accessor = file.one("accessors", index, "attributes")
             if "bufferView" not in accessor and "sparse" not in accessor:
                 file.refuse(
-                    "", "needs KHR_draco_mesh_compression, which is not read; save it without"
+                    "",
+                    "needs KHR_draco_mesh_compression, which is not supported; save the file "
+                    "without it",
                 )
 
 
@@ -190,7 +193,7 @@ def _shape(
         triangles=_triangles(file, primitive, where, mode, count),
         points=points,
         normals=values(attributes, "NORMAL", _VECTOR, place),
-        # The file's v runs downwards.
+        # v runs downwards in the file.
         uv=None if uv is None else uv * (1.0, -1.0) + (0.0, 1.0),
         targets=tuple(targets),
         weights=weights,
@@ -200,7 +203,7 @@ def _shape(
 
 
 def _material_name(file: Document, primitive: dict[str, Any], where: str, number: int) -> str:
-    """What a primitive is called beside others of its mesh."""
+    """The name that tells a primitive from the others of its mesh."""
     index = primitive.get("material")
     if index is None:
         return str(number)
@@ -215,7 +218,7 @@ def _words(name: Any) -> str:
 def _triangles(
     file: Document, primitive: dict[str, Any], where: str, mode: int, count: int
 ) -> NDArray[np.int64]:
-    """(m, 3) vertices of a list, a strip or a fan of triangles."""
+    """(m, 3) vertices of the triangles of a list, a strip or a fan."""
     index = primitive.get("indices")
     if index is None:
         order = np.arange(count)
@@ -235,10 +238,10 @@ def _triangles(
     if mode == FAN:
         return np.stack([np.full(len(order) - 2, order[0]), order[1:-1], order[2:]], axis=1)
     found = np.stack([order[:-2], order[1:-1], order[2:]], axis=1)
-    # Every other triangle of a strip runs the other way around.
+    # Every other triangle of a strip has the opposite winding.
     found[1::2] = found[1::2][:, [1, 0, 2]]
     a, b, c = found.T
-    # Strips are sewn together by triangles that name a vertex twice.
+    # Drop triangles that name a vertex twice: they only join strips.
     return found[(a != b) & (b != c) & (a != c)]
 
 
@@ -249,7 +252,7 @@ def _piece(
     shape: _Shape,
     worlds: dict[int, NDArray[np.float64]],
 ) -> Piece:
-    """A primitive where its node has it: morphed, then skinned or moved."""
+    """A primitive as its node places it: morphed, then skinned or transformed."""
     used, triangles = renumbered(shape.triangles, len(shape.points))
     points, normals, uv = (
         None if values is None else values[used]
@@ -271,8 +274,9 @@ def _piece(
         else:
             matrices = node.world[None]
         points = np.einsum("nij,nj->ni", matrices[:, :3, :3], points) + matrices[:, :3, 3]
-        # Rows of the cofactor matrix are crossed columns; it turns normals as the inverse
-        # transpose does, times the determinant, and exists where that does not.
+        # Transform normals by the cofactor matrix, whose columns are cross products of columns. It
+        # equals the inverse transpose times the determinant, and it also exists if the inverse does
+        # not.
         x, y, z = (matrices[:, :3, k] for k in range(3))
         cofactor = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=2)
         mirrors = np.einsum("ni,ni->n", x, cofactor[:, :, 0]) < 0
@@ -280,7 +284,7 @@ def _piece(
             normals = np.einsum("nij,nj->ni", cofactor, normals)
             normals *= np.where(mirrors, -1.0, 1.0)[:, None]
     if mirrors.mean() > 0.5:
-        # A transform that mirrors turns every triangle's front to its back.
+        # A mirroring transform reverses the winding of every triangle.
         triangles = triangles[:, [0, 2, 1]]
     return Piece(
         name=name,
@@ -298,14 +302,14 @@ def _blended(
     weights: NDArray[np.float64],
     worlds: dict[int, NDArray[np.float64]],
 ) -> NDArray[np.float64]:
-    """(n, 4, 4) of each vertex the mean of its joints' matrices, by weight."""
+    """(n, 4, 4) for each vertex, the weighted mean of its joints' matrices."""
     matrices = joint_matrices(file, skin, worlds)
     if joints.size and int(joints.max()) >= len(matrices):
         file.refuse(
             "JOINTS_0", f"name joint {int(joints.max())}; skins[{skin}] has {len(matrices)}"
         )
     total = weights.sum(axis=1, keepdims=True)
-    # What no joint moves is moved by the first one, as other readers have it.
+    # Vertices without weights follow their first joint, as in other readers.
     first = np.zeros_like(weights)
     first[:, 0] = 1.0
     weights = np.where(total > 0, weights / np.where(total > 0, total, 1.0), first)

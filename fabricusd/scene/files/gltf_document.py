@@ -1,4 +1,4 @@
-"""A glTF 2.0 file as JSON and numbers: the container, its buffers, and accessors as arrays."""
+"""Parses a glTF 2.0 file: the container, the JSON, the buffers, and accessors as arrays."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from fabricusd.files import readable_file
 TYPES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 LARGEST = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
-"""What the integer types' 1.0 is, where an accessor is normalized."""
+"""The integers that stand for 1.0 in normalized accessors, by component type."""
 
 MOST_ZEROS = 4_000_000
-"""Numbers of an accessor that has no bytes in the file, all of them zero."""
+"""Largest number of zeros in an accessor without a buffer view."""
 
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942
 _COMPRESSED = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
 class Document:
-    """The JSON of `path`, whose entries are asked for by what they must be.
+    """The JSON of `path`; callers ask for its entries by the type that they must have.
 
-    Every entry that is missing, of another type or out of its range is a `FabricError` that names
-    it, as in `x.glb accessors[3].count is -1; it must be a whole number from 0`.
+    An entry that is missing, of another type or out of range raises a `FabricError` that names it,
+    as in `x.glb accessors[3].count is -1; it must be a whole number from 0`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -59,7 +59,7 @@ class Document:
         raise FabricError(f"{self._path} {where}".strip(), one_line(problem))
 
     def _unpacked(self, content: bytes) -> bytes:
-        """The JSON of a binary file; its binary chunk is kept."""
+        """The JSON of a binary file; stores its binary chunk."""
         if len(content) < 20:
             self.refuse("", f"cannot be read as glTF: it ends after {len(content)} bytes")
         version, _ = struct.unpack_from("<II", content, 4)
@@ -71,7 +71,9 @@ class Document:
             size, kind = struct.unpack_from("<II", content, at)
             if at + 8 + size > len(content):
                 self.refuse(
-                    "", f"is cut short: a chunk of {size} bytes, {len(content) - at - 8} are there"
+                    "",
+                    f"is cut short: a chunk should have {size} bytes, but only "
+                    f"{len(content) - at - 8} are left",
                 )
             chunks.setdefault(kind, content[at + 8 : at + 8 + size])
             at += 8 + size + -size % 4
@@ -83,7 +85,10 @@ class Document:
     def entry(
         self, holder: dict[str, Any], key: str, kind: type, where: str, default: Any = None
     ) -> Any:
-        """`holder[key]` if it is of the `kind`, numbers from 0; `default` where it is missing."""
+        """`holder[key]`, which must be of type `kind` and, if a number, at least 0.
+
+        Returns `default` if the key is missing.
+        """
         value = holder.get(key, default)
         if value is default:
             return default
@@ -100,7 +105,7 @@ class Document:
     def numbers(
         self, holder: dict[str, Any], key: str, count: int | None, where: str
     ) -> list[float] | None:
-        """A list of `count` numbers, of any count if None; None where there is none."""
+        """The list `holder[key]` of `count` numbers, or of any length if None; None if missing."""
         values = self.entry(holder, key, list, where)
         if values is None:
             return None
@@ -112,12 +117,12 @@ class Document:
         return [float(min(max(value, -1e300), 1e300)) for value in values]
 
     def all(self, key: str) -> list[dict[str, Any]]:
-        """A list of objects at the root, empty where it is missing."""
+        """The list of objects `key` at the root; empty if it is missing."""
         found: list[dict[str, Any]] = self.entry(self.root, key, list, "", [])
         return found
 
     def one(self, key: str, index: Any, where: str) -> dict[str, Any]:
-        """The object number `index` of the list `key`; `where` names it."""
+        """Object number `index` of the list `key`; `where` names the entry that holds the index."""
         entries = self.all(key)
         whole = isinstance(index, int) and not isinstance(index, bool)
         if not whole or not 0 <= index < len(entries):
@@ -128,7 +133,7 @@ class Document:
         return found
 
     def array(self, index: Any, where: str, types: tuple[str, ...]) -> NDArray[np.float64]:
-        """(n, k) float64 an accessor's values, of one of `types`, normalized where it says so."""
+        """(n, k) float64 values of an accessor of one of `types`, normalized if it says so."""
         values, accessor, name = self._accessor(index, where, types)
         component = accessor["componentType"]
         if self.entry(accessor, "normalized", bool, name, False) and component in LARGEST:
@@ -136,19 +141,19 @@ class Document:
         return values.astype(np.float64)
 
     def indices(self, index: Any, where: str) -> NDArray[np.int64]:
-        """(n,) int64 an accessor of whole numbers."""
+        """(n,) int64 values of an accessor of indices."""
         values, accessor, name = self._accessor(index, where, ("SCALAR",))
         if accessor["componentType"] not in (5121, 5123, 5125):
             self.refuse(
                 f"{name}.componentType",
-                f"is {accessor['componentType']}; indices are 5121, 5123 or 5125",
+                f"is {accessor['componentType']}; indices must be 5121, 5123 or 5125",
             )
         return values.astype(np.int64).ravel()
 
     def _accessor(
         self, index: Any, where: str, types: tuple[str, ...]
     ) -> tuple[NDArray[Any], dict[str, Any], str]:
-        """The stored numbers, (n, k), their accessor, and its name."""
+        """The stored numbers, (n, k), with their accessor and its name."""
         accessor = self.one("accessors", index, where)
         name = f"accessors[{index}]"
         if accessor.get("type") not in types:
@@ -169,8 +174,7 @@ class Document:
             if count * width > MOST_ZEROS:
                 self.refuse(
                     f"{name}.count",
-                    f"is {count}, without bytes of its own; it must be at most "
-                    f"{MOST_ZEROS // width}",
+                    f"is {count}, without a buffer view; it must be at most {MOST_ZEROS // width}",
                 )
             values = np.zeros((count, width), kind)
         else:
@@ -189,7 +193,7 @@ class Document:
         return np.dtype(COMPONENTS[component])
 
     def _sparse(self, values: NDArray[Any], sparse: dict[str, Any], name: str) -> NDArray[Any]:
-        """The values with some of them replaced."""
+        """The values with those of the sparse accessor replaced."""
         count = self.entry(sparse, "count", int, name, 0)
         places = self.entry(sparse, "indices", dict, name, {})
         where = f"{name}.indices"
@@ -214,7 +218,7 @@ class Document:
     def _viewed(
         self, view: Any, offset: int, count: int, width: int, kind: np.dtype[Any], name: str
     ) -> NDArray[Any]:
-        """(count, width) numbers out of a buffer view, without copying where they lie close."""
+        """(count, width) numbers from a buffer view, without a copy if they are tightly packed."""
         one = self.one("bufferViews", view, f"{name}.bufferView")
         where = f"bufferViews[{view}]"
         data = self._buffer(one, where)
@@ -245,7 +249,9 @@ class Document:
             extensions = self.entry(view, "extensions", dict, where, {})
             for extension in _COMPRESSED:
                 if extension in extensions:
-                    self.refuse("", f"needs {extension}, which is not read; save it without")
+                    self.refuse(
+                        "", f"needs {extension}, which is not supported; save the file without it"
+                    )
             if number != 0 or self._binary is None:
                 self.refuse(name, "has no bytes in the file and names no other file")
             data = self._binary
@@ -255,7 +261,7 @@ class Document:
             data = self._beside(uri, name)
         length = self.entry(buffer, "byteLength", int, name, len(data))
         if length > len(data):
-            self.refuse(f"{name}.byteLength", f"is {length}; {len(data)} bytes are there")
+            self.refuse(f"{name}.byteLength", f"is {length}; the buffer has {len(data)} bytes")
         self._buffers[number] = data
         return data
 
@@ -266,13 +272,13 @@ class Document:
         try:
             return base64.b64decode(body, validate=True)
         except (binascii.Error, ValueError):
-            self.refuse(f"{name}.uri", "is no base64")
+            self.refuse(f"{name}.uri", "is not valid base64")
 
     def _beside(self, uri: str, name: str) -> bytes:
         relative = unquote(uri)
         if "://" in uri or uri.startswith(("/", "file:")) or "\\" in relative:
             self.refuse(
-                f"{name}.uri", f"is '{one_line(uri, 80)}'; it must be a file's place from here"
+                f"{name}.uri", f"is '{one_line(uri, 80)}'; it must be a relative path of a file"
             )
         file = readable_file(self._path.parent / relative, f"is missing; {self._path} needs it")
         try:
@@ -282,7 +288,7 @@ class Document:
 
 
 def _no_constant(word: str) -> NoReturn:
-    raise ValueError(f"{word} is no number of JSON")
+    raise ValueError(f"{word} is not a number in JSON")
 
 
 def _short(value: Any) -> str:

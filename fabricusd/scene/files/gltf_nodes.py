@@ -1,4 +1,4 @@
-"""The node tree of a glTF scene: where each node stands, and what it draws."""
+"""Walks the node tree of a glTF scene: where each node is placed, and what it draws."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from fabricusd.scene.files.gltf_document import Document
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Placed:
-    """A node of the scene.
+    """A node of the scene with its transform.
 
-    world : (4, 4) float64 - from its own space to the world's [m]
-    mesh, skin : their numbers, or None
-    weights : of its mesh's morph targets; empty where the mesh's own hold
-    instanced : whether it carries EXT_mesh_gpu_instancing
+    world : (4, 4) float64 - from the node's space to world space [m]
+    mesh, skin : numbers of the node's mesh and skin, or None
+    weights : weights of the mesh's morph targets; empty if the mesh's own weights apply
+    instanced : whether the node carries EXT_mesh_gpu_instancing
     """
 
     number: int
@@ -32,9 +32,9 @@ class Placed:
 
 
 def placed_nodes(file: Document) -> list[Placed]:
-    """The nodes of the default scene, or of the first, parents before their children.
+    """The nodes of the default scene, or else of the first, with parents before their children.
 
-    A node below two parents, or below itself, is refused: nodes are a tree.
+    Raises FabricError for a node below two parents or below itself: nodes must form a tree.
     """
     found: list[Placed] = []
     seen: set[int] = set()
@@ -44,7 +44,7 @@ def placed_nodes(file: Document) -> list[Placed]:
         node = file.one("nodes", number, where)
         name = f"nodes[{number}]"
         if number in seen:
-            file.refuse(name, "is named twice; nodes must be a tree, each below one parent")
+            file.refuse(name, "is named twice; nodes must form a tree, each below one parent")
         seen.add(number)
         with np.errstate(all="ignore"):
             world = above @ _matrix(file, node, name)
@@ -61,7 +61,7 @@ def _roots(file: Document) -> list[Any]:
         scene = file.one("scenes", number, "scene")
         roots: list[Any] = file.entry(scene, "nodes", list, f"scenes[{number}]", [])
         return roots
-    # Without a scene, all that no other node has below it.
+    # Without a scene, start at all nodes that are no other node's children.
     below: set[Any] = set()
     for k, node in enumerate(file.all("nodes")):
         if isinstance(node, dict):
@@ -93,7 +93,7 @@ def _matrix(file: Document, node: dict[str, Any], name: str) -> NDArray[np.float
     """(4, 4) a node's own transform."""
     given = file.numbers(node, "matrix", 16, name)
     if given is not None:
-        # Columns come one after the other.
+        # The file stores the matrix column by column.
         return np.array(given).reshape(4, 4).T
     matrix = np.eye(4)
     x, y, z, w = file.numbers(node, "rotation", 4, name) or (0.0, 0.0, 0.0, 1.0)
@@ -113,7 +113,7 @@ def _matrix(file: Document, node: dict[str, Any], name: str) -> NDArray[np.float
 def joint_matrices(
     file: Document, skin: int, worlds: dict[int, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """(joints, 4, 4) what each joint of a skin does to the mesh, from its place at binding."""
+    """(joints, 4, 4) for each joint of a skin, the transform from the bind pose to the world."""
     name = f"skins[{skin}]"
     one = file.one("skins", skin, "skin")
     joints = file.entry(one, "joints", list, name, [])

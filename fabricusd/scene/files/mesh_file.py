@@ -1,4 +1,4 @@
-"""OBJ, glTF and PLY files as scenes: metres, and one fabric for all that has UVs."""
+"""Turns OBJ, glTF and PLY files into scenes in metres, with one fabric for all meshes with UVs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fabricusd.scene.size import note_size, unit_length
 from fabricusd.scene.surface.normals import smooth_normals
 
 WITH_INSTANCES = (".glb", ".gltf")
-"""Formats in which one mesh may stand in several places."""
+"""Suffixes of formats in which one mesh may be placed several times."""
 
 READERS: dict[str, Callable[[Path], MeshFile]] = {
     ".obj": read_obj,
@@ -31,17 +31,19 @@ READERS: dict[str, Callable[[Path], MeshFile]] = {
 }
 
 FARTHEST = 1e9
-"""Metres from the origin: beyond it squares of areas leave the range of 32-bit numbers."""
+"""Largest coordinate [m]: beyond it, squared areas overflow float32."""
 
 GREY, CLOTH = 0, 1
 
 
 def read_mesh_file(path: Path, binding: Binding | None, units: str | None = None) -> Scene:
-    """The file's meshes, +y as up, each named by the file and its piece there.
+    """Read the file's meshes with +y up, each named after the file and its piece.
 
-    Every triangle with UVs is made of `binding`; without a binding all are grey.
+    Triangles with UVs get the fabric of `binding`; without a binding, all triangles are grey.
 
-    units : what the file's lengths are in, one of `mesh_size.UNITS`; None for metres
+    units : the file's unit of length, one of `size.UNITS`; None for metres
+
+    Raises `FabricError` if the file cannot be read or holds no triangles.
     """
     metres = unit_length(units, path.suffix.lower())
     file = _read(path)
@@ -51,12 +53,12 @@ def read_mesh_file(path: Path, binding: Binding | None, units: str | None = None
     if binding is not None:
         scene.materials.append(FabricSurface(name=binding.fabric.name, binding=binding))
     else:
-        scene.note(path.name, "is rendered grey: no fabric is named for it")
+        scene.note(path.name, "is rendered grey: no fabric was given for it")
     for where, problem in file.notes:
         scene.note(_place(path, where), problem)
     pieces = [piece for piece in file.pieces if len(piece.triangles)]
     names = unique_names([_place(path, piece.name) for piece in pieces])
-    # A file without instances names its pieces because each is one of its own.
+    # In a format without instances, no piece is a copy of another.
     instances = path.suffix.lower() in WITH_INSTANCES
     for name, piece in zip(names, pieces, strict=True):
         mesh = _mesh(scene, name, piece, metres, bound=binding is not None)
@@ -79,13 +81,13 @@ def _read(path: Path) -> MeshFile:
     except OSError as error:
         raise FabricError(str(path), f"cannot be read: {error.strerror or error}") from error
     except Exception as error:
-        # A file so broken that its reader did not foresee it is bad input all the same.
+        # A file that is broken in a way that its reader did not foresee is still bad input.
         words = one_line(f"{type(error).__name__}: {error}", 200)
         raise FabricError(str(path), f"cannot be read as a mesh: {words}") from error
 
 
 def _mesh(scene: Scene, name: str, piece: Piece, metres: float, *, bound: bool) -> Mesh:
-    """A piece in metres and in its fabric, with notes of what it lacks."""
+    """A piece as a mesh in metres with its material; adds notes about what the piece lacks."""
     with np.errstate(over="ignore", invalid="ignore"):
         points = piece.points * metres
         far = np.asarray((np.abs(points) > FARTHEST).any(axis=1))
@@ -101,7 +103,9 @@ def _mesh(scene: Scene, name: str, piece: Piece, metres: float, *, bound: bool) 
         material[:] = GREY
     elif uv is not None and bound and piece.textured is not None:
         bare = ~piece.textured
-        scene.note(name, f"lacks UVs on {int(bare.sum())} of {count} triangles, rendered grey")
+        scene.note(
+            name, f"has no UVs on {int(bare.sum())} of {count} triangles; they are rendered grey"
+        )
         material[bare] = GREY
     if uv is not None:
         broken = ~np.isfinite(uv).all(axis=(1, 2))
@@ -123,9 +127,10 @@ def _mesh(scene: Scene, name: str, piece: Piece, metres: float, *, bound: bool) 
 def _normals(
     scene: Scene, name: str, piece: Piece, points: NDArray[np.float64]
 ) -> NDArray[Any] | None:
-    """(m, 3, 3) float32 unit normals at the corners, or None where the file gives none.
+    """(m, 3, 3) float32 unit normals at the corners, or None if the file gives none.
 
-    The file's own, on the side that the winding makes the front; faces without are smoothed.
+    The file's normals are turned to the side that the winding makes the front. Faces without
+    normals get smooth ones.
     """
     if piece.normals is None:
         return None

@@ -1,7 +1,8 @@
-"""Wavefront OBJ: polygons, UVs, normals, and the names of objects and groups.
+"""Reads Wavefront OBJ: polygons, UVs, normals, and the names of objects and groups.
 
-Read by class of line instead of line by line: all `v` lines are one array of numbers, then all `vt`
-lines, and so on, in blocks that stay small. Materials, curves and smoothing groups are not read.
+The reader goes by kind of line instead of line by line: all `v` lines become one array of numbers,
+then all `vt` lines, and so on, in blocks of limited size. Materials, curves and smoothing groups
+are not read.
 """
 
 from __future__ import annotations
@@ -18,17 +19,18 @@ from fabricusd.errors import FabricError, one_line
 from fabricusd.scene.files.number_text import is_blank, parsed, word_starts, words_per_line
 from fabricusd.scene.files.piece import QUIET, MeshFile, Polygons
 
-BLOCK = 1 << 22
-"""Bytes that are worked on together."""
+BYTES_AT_ONCE = 1 << 22
+"""Number of bytes that are processed at once."""
 
 V, VT, VN, F = 1, 2, 3, 4
 WORDS = {b"v": V, b"vt": VT, b"vn": VN, b"f": F}
 FEWEST = {V: 3, VT: 1, VN: 3}
-"""Numbers that a line must have; `vt u` means (u, 0), as the format says."""
+"""Smallest number of values in a line; `vt u` means (u, 0), as the format specifies."""
 
 NUMBER = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
 MOST_DIGITS = 18
-"""Of an index: beyond, 64 bits do not hold it, and what numpy makes of it is any number."""
+"""Largest number of digits of an index: beyond it, 64 bits overflow, and numpy returns arbitrary
+numbers."""
 CORNER = re.compile(rb"N(/(N)?(/(N)?)?)?".replace(b"N", rb"[+-]?\d{1,%d}" % (MOST_DIGITS - 1)))
 _NOT_A_SURFACE = {b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "curves"}
 _FREE_FORM = (b"surf",)
@@ -36,7 +38,7 @@ _FREE_FORM = (b"surf",)
 
 @QUIET
 def read_obj(path: Path) -> MeshFile:
-    """The file's pieces, one for each name of an object or group. Raises FabricError."""
+    """Read the file's pieces, one for each name of an object or group. Raises FabricError."""
     text = _Text(path)
     numbers = {kind: text.numbers(kind) for kind in (V, VT, VN)}
     faces = text.faces()
@@ -66,9 +68,10 @@ _NAMES = {V: "v", VT: "vt", VN: "vn"}
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Faces:
-    """lines : (f,) numbers of the `f` lines; counts : (f,) corners of each.
+    """The faces of a file.
 
-    index : (c, 3) int64 - v, vt, vn of each corner as written, 0 where there is none
+    lines : (f,) int - line numbers of the `f` lines; counts : (f,) int - corners of each face
+    index : (c, 3) int64 - v, vt and vn of each corner as written in the file, 0 if missing
     """
 
     lines: NDArray[np.int64]
@@ -77,7 +80,7 @@ class _Faces:
 
 
 class _Text:
-    """The file's bytes as lines of known kinds."""
+    """The file's bytes, split into lines of known kinds."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -88,7 +91,7 @@ class _Text:
             original = b"   " + original[3:]
         self._original = original
         if b"\\" in original:
-            # A line goes on behind a backslash. Blanks in its place keep every byte where it was.
+            # A backslash continues a line. Replacing it by blanks keeps every byte where it was.
             original = re.sub(rb"\\[ \t]*\r?\n", lambda m: b" " * len(m[0]), original)
         self._bytes = original
         data = np.frombuffer(original + b"\n\n\n", np.uint8)
@@ -98,7 +101,7 @@ class _Text:
         self._kinds = self._classify(data)
 
     def _classify(self, data: NDArray[np.uint8]) -> NDArray[np.int8]:
-        """(lines,) the kind of each line, 0 for those that hold no numbers."""
+        """(lines,) the kind of each line, 0 for lines without numbers."""
         first, second, third = (data[self._starts + k] for k in range(3))
         kinds = np.zeros(len(self._starts), np.int8)
         kinds[(first == ord("v")) & is_blank(second)] = V
@@ -123,19 +126,19 @@ class _Text:
         return f"{self._path}:{self._original.count(10, 0, int(self._starts[line])) + 1}"
 
     def _blocks(self, kind: int) -> Any:
-        """(numbers of some lines of the kind, their bytes without the keyword as one array)."""
+        """Yield blocks: (line numbers, the bytes of these lines of the kind without keywords)."""
         lines = np.flatnonzero(self._kinds == kind)
         sizes = np.cumsum(self._ends[lines] - self._starts[lines] + 1)
         last = 0
         while last < len(lines):
             done = sizes[last - 1] if last else 0
-            first, last = last, max(int(np.searchsorted(sizes, done + BLOCK)), last + 1)
+            first, last = last, max(int(np.searchsorted(sizes, done + BYTES_AT_ONCE)), last + 1)
             part = lines[first:last]
             yield part, self._joined(part, 1 if kind in (V, F) else 2)
 
     def _joined(self, lines: NDArray[np.int64], keyword: int) -> NDArray[np.uint8]:
-        """The bytes of `lines`, each ended by a line feed; keywords and comments blanked out."""
-        # Lines that follow one another are copied in one piece.
+        """The bytes of `lines`, each ending with a line feed; keywords and comments are blanked."""
+        # Copy runs of consecutive lines in one piece.
         breaks = np.flatnonzero(np.diff(lines) != 1) + 1
         firsts = lines[np.concatenate([[0], breaks])]
         lasts = lines[np.concatenate([breaks - 1, [len(lines) - 1]])]
@@ -146,7 +149,7 @@ class _Text:
         data = np.frombuffer(bytearray(joined), np.uint8)
         begins = np.concatenate([[0], np.flatnonzero(data == 10)[:-1] + 1])
         if is_blank(data[begins]).any():
-            # Indented lines have blanks where the keyword would be.
+            # In indented lines, blanks stand where the keyword would be.
             words = np.flatnonzero(word_starts(data))
             begins = words[np.searchsorted(words, begins)]
         for k in range(keyword):
@@ -154,7 +157,7 @@ class _Text:
         return data
 
     def numbers(self, kind: int) -> NDArray[np.float64]:
-        """(k, 3) float64 the numbers of all lines of the kind; (k, 2) of `vt` lines."""
+        """(k, 3) float64 numbers of all lines of the kind; (k, 2) for `vt` lines."""
         width = 2 if kind == VT else 3
         parts = []
         for lines, data in self._blocks(kind):
@@ -184,12 +187,12 @@ class _Text:
             if len(words) < FEWEST[kind]:
                 return FabricError(
                     self._where(line),
-                    f"has {len(words)} numbers; {_NAMES[kind]} takes at least {FEWEST[kind]}",
+                    f"has {len(words)} numbers; {_NAMES[kind]} needs at least {FEWEST[kind]}",
                 )
         return FabricError(self._where(int(lines[0])), "and the lines below cannot be read")
 
     def faces(self) -> _Faces:
-        """Every `f` line, indices as they are written."""
+        """All `f` lines, with indices as written in the file."""
         lines, counts, index = [], [], []
         for part, data in self._blocks(F):
             found = _corners(data)
@@ -216,21 +219,22 @@ class _Text:
                 if not CORNER.fullmatch(word) or zero:
                     return FabricError(
                         self._where(line),
-                        f"has the corner '{_text(word)}'; it must be as 7, 7/3, 7//2 or 7/3/2, "
-                        "each number from 1 up, or from -1 down",
+                        f"has the corner '{_text(word)}'; it must look like 7, 7/3, 7//2 or 7/3/2, "
+                        "with numbers from 1 up or from -1 down",
                     )
         return FabricError(self._where(int(lines[0])), "and the lines below cannot be read")
 
     def resolved(self, faces: _Faces, slot: int, kind: int, total: int) -> NDArray[np.int64]:
-        """(c,) index from 0 of each corner's v, vt or vn; -1 where it has none.
+        """(c,) zero-based index of each corner's v, vt or vn; -1 if the corner has none.
 
-        Negative numbers count back from the line they stand on.
+        Negative numbers in the file count back from the line in which they stand.
         """
         index = faces.index[:, slot]
         if (index < 0).any():
             before = np.searchsorted(np.flatnonzero(self._kinds == kind), faces.lines)
             before = np.repeat(before, faces.counts)
-            # What counts back beyond the first one stays 0 or below: refused, not missing.
+            # An index that counts back beyond the first line stays negative and is refused; it must
+            # not be mistaken for a missing one.
             found = np.where(index < 0, before + index, index - 1)
             wrong = (index != 0) & ((found < 0) | (found >= total))
         else:
@@ -253,9 +257,9 @@ class _Text:
         return np.asarray(found)
 
     def pieces(self, lines: NDArray[np.int64]) -> tuple[list[str], NDArray[np.int64]]:
-        """Names of the pieces, and which of them each face line is part of.
+        """The names of the pieces, and the piece to which each face line belongs.
 
-        An object and a group within it name a piece together. A new object ends the group.
+        A piece is named by its object and the group within it. A new object ends the group.
         """
         numbers: dict[str, int] = {"": 0}
         begins, which = [0], [0]
@@ -275,7 +279,7 @@ class _Text:
         return list(numbers), np.array(which, np.int64)[at]
 
     def notes(self) -> list[tuple[str, str]]:
-        """What the file holds besides polygons."""
+        """Notes about what the file holds besides polygons."""
         found: dict[str, int] = {}
         for _, (keyword, *_) in self._others:
             noun = _NOT_A_SURFACE.get(keyword)
@@ -287,7 +291,7 @@ class _Text:
 
 
 def _text(word: bytes, longest: int = 60) -> str:
-    """Names and words, in UTF-8 or, where they are not, in Latin-1; on one line that prints."""
+    """Decode a name or word as UTF-8, or else as Latin-1, into one printable line."""
     try:
         return one_line(word.decode("utf-8"), longest)
     except UnicodeDecodeError:
@@ -295,8 +299,8 @@ def _text(word: bytes, longest: int = 60) -> str:
 
 
 def _corners(data: NDArray[np.uint8]) -> NDArray[np.int64] | None:
-    """(c, 3) int64 v, vt, vn of the corners in `data`, 0 for none; None where one is not as it
-    must be."""
+    """(c, 3) int64 v, vt and vn of the corners in `data`, 0 if missing; None if any corner is
+    malformed."""
     starts = word_starts(data)
     slash = data == 47
     digit = ((data >= 48) & (data <= 57)) | (data == 43) | (data == 45)
@@ -314,7 +318,7 @@ def _corners(data: NDArray[np.uint8]) -> NDArray[np.int64] | None:
     slot = slashes[at] - slashes[starts][word] if slash.any() else np.zeros(len(at), np.int32)
     values = parsed(np.where(slash, np.uint8(32), data), np.int64)
     words = int(starts.sum())
-    # A word begins with its point's number.
+    # Every word must begin with the number of its point.
     if values is None or len(values) != len(at) or not digit[starts].all():
         return None
     if (slot > 2).any() or (values == 0).any():

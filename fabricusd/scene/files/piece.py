@@ -1,4 +1,4 @@
-"""What readers of mesh files hand on: pieces as the file has them, before units and fabrics."""
+"""The result of every mesh file reader: pieces as stored in the file, before units and fabrics."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 from fabricusd.scene.surface.polygons import triangulate
 
 QUIET = np.errstate(all="ignore")
-"""Numbers that are not finite, or too large, are read as they are: whoever uses them judges them,
-and numpy need not warn on the way."""
+"""Silences numpy's warnings in readers: values that are not finite or too large are read as they
+are, and the code that uses them judges them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Piece:
-    """Triangles that the file names together, lengths in its own unit.
+    """Triangles that share a name in the file; lengths are in the file's unit.
 
-    name : str - '' where the file names none
+    name : str - '' if the file gives no name
     points : (n, 3) float64
     triangles : (m, 3) int32 - counter-clockwise seen from the front
     uv : (m, 3, 2) float64 or None - at the corners, v upwards
-    textured : (m,) bool or None - which triangles have UVs, None for all of them
+    textured : (m,) bool or None - which triangles have UVs; None if all have
     normals : (m, 3, 3) float or None - at the corners; zeros where the file gives none
     """
 
@@ -38,7 +38,7 @@ class Piece:
 
 @dataclass(frozen=True, kw_only=True)
 class MeshFile:
-    """The pieces of one file, and what was left out of it: (piece or '', what is said of it)."""
+    """The pieces of one file, with notes about what was left out: (name of a piece or '', note)."""
 
     pieces: list[Piece]
     notes: list[tuple[str, str]] = field(default_factory=list)
@@ -46,12 +46,12 @@ class MeshFile:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Polygons:
-    """Faces of any number of corners, and what their corners carry.
+    """Faces with any number of corners, and the values at their corners.
 
     points : (n, 3) float64
-    counts : (f,) int - corners of each face; corners : (c,) int - their points
+    counts : (f,) int - number of corners of each face; corners : (c,) int - the corners' points
     uv, normals : (c, 2) and (c, 3) float, or None
-    uv_given, normal_given : (c,) bool - which corners have one
+    uv_given, normal_given : (c,) bool or None - which corners have a value; None if all have
     """
 
     points: NDArray[np.float64]
@@ -63,9 +63,11 @@ class Polygons:
     normal_given: NDArray[np.bool_] | None = None
 
     def pieces(self, names: Sequence[str], piece: NDArray[np.int64]) -> list[Piece]:
-        """One piece for each of `names` that has triangles; `piece` : (f,) the name of each face.
+        """Make one piece for each of `names` that has triangles.
 
-        A face lacks its UVs or normals where one of its corners does.
+        piece : (f,) int - index into `names` for each face
+
+        A face counts as lacking UVs or normals if any of its corners lacks them.
         """
         face, at = triangulate(self.points, self.counts, self.corners)
         begins = np.concatenate([[0], np.cumsum(self.counts)])
@@ -102,7 +104,8 @@ class Polygons:
 def renumbered(
     triangles: NDArray[np.int64], count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Which of `count` points the triangles use, and the triangles with numbers among those."""
+    """The numbers of the points, out of `count`, that the triangles use, and the triangles
+    renumbered to index them."""
     if count > 8 * triangles.size:
         used, numbers = np.unique(triangles, return_inverse=True)
         return used, numbers.reshape(-1, 3).astype(np.int32)
@@ -115,7 +118,7 @@ def renumbered(
 def _of_faces(
     given: NDArray[np.bool_] | None, begins: NDArray[np.int64]
 ) -> NDArray[np.bool_] | None:
-    """(f,) which faces have what all their corners must have; None where all corners do."""
+    """(f,) which faces have a value at all corners; None if all corners have one."""
     if given is None or given.all():
         return None
     total = np.concatenate([[0], np.cumsum(given)])
@@ -123,7 +126,7 @@ def _of_faces(
 
 
 def unique_names(names: Sequence[str]) -> list[str]:
-    """The same names in the same order, `_2`, `_3` and so on behind those that were there."""
+    """The names in the same order, with `_2`, `_3` and so on appended to repeated ones."""
     taken: set[str] = set(names)
     seen: dict[str, int] = {}
     found = []

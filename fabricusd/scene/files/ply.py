@@ -1,4 +1,4 @@
-"""PLY: polygons of any size, triangle strips, UVs of vertices and of corners, normals."""
+"""Reads PLY: polygons of any size, triangle strips, UVs of vertices or of corners, and normals."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ INDEX_NAMES = ("vertex_indices", "vertex_index")
 
 @QUIET
 def read_ply(path: Path) -> MeshFile:
-    """The file's one piece. Raises FabricError."""
+    """Read the file as one piece. Raises FabricError."""
     body = PlyBody(path)
     tables: dict[str, Table] = {}
     for element in body.elements:
@@ -62,7 +62,8 @@ def _faces(
 ) -> tuple[
     NDArray[np.int64], NDArray[np.int64], tuple[NDArray[np.float64], NDArray[np.bool_]] | None
 ]:
-    """Corners of each face, their vertices, and the corners' own UVs with who has them."""
+    """The number of corners of each face, the corners' vertices, and the corners' own UVs with a
+    mask of the corners that have them."""
     lists = tables["face"].lists if "face" in tables else {}
     name = next((n for n in INDEX_NAMES if n in lists), None)
     if name is None:
@@ -75,7 +76,7 @@ def _faces(
     if not whole.all():
         at = int(np.argmin(whole))
         face = int(np.searchsorted(np.cumsum(counts), at, "right"))
-        body.refuse(f"has face {face} with vertex {named[at]:.15g}; there are {points}")
+        body.refuse(f"has face {face} with vertex {named[at]:.15g}; there are {points} vertices")
     corners = named.astype(np.int64)
     if name is None or "texcoord" not in lists:
         return counts, corners, None
@@ -90,7 +91,7 @@ def _faces(
 
 
 def _strips(table: Table) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Triangles of strips that -1 parts from one another."""
+    """The triangles of strips that are separated by -1."""
     found = [np.zeros((0, 3))]
     name = next((n for n in INDEX_NAMES if n in table.lists), None)
     counts, values = table.lists[name] if name else (np.zeros(0, np.int64), np.zeros(0))

@@ -1,6 +1,7 @@
-"""The rows of a PLY file: its header, and every element's numbers and lists.
+"""Parses a PLY file: its header, and the numbers and lists of every element.
 
-Rows of numbers are read at once where they are alike; lists of several lengths row after row.
+Rows with the same layout are read all at once; binary rows with lists of different lengths are read
+one by one.
 """
 
 from __future__ import annotations
@@ -25,12 +26,16 @@ ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
 FORMATS = ("ascii", *ORDERS)
 
 LONGEST_HEADER = 1 << 20
-"""Bytes in which a header must end."""
+"""Largest number of bytes of a header."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Property:
-    """kind : of the numbers; length : of a list's count, None for a single number."""
+    """A property of an element.
+
+    kind : numpy type of the numbers; length : numpy type of a list's count, None for a single
+        number
+    """
 
     name: str
     kind: str
@@ -39,7 +44,7 @@ class Property:
 
 @dataclass(frozen=True, kw_only=True)
 class Element:
-    """Rows of one kind, `count` of them."""
+    """An element of the header: `count` rows with the same properties."""
 
     name: str
     count: int
@@ -48,14 +53,17 @@ class Element:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Table:
-    """single : property -> (n,) float64; lists : property -> ((n,) int lengths, their values)."""
+    """The values of an element's n rows.
+
+    single : property -> (n,) float64; lists : property -> ((n,) int lengths, all values in a row)
+    """
 
     single: dict[str, NDArray[np.float64]]
     lists: dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]]
 
 
 class PlyBody:
-    """What follows the header, read element by element."""
+    """A PLY file whose elements are read one after another."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -91,7 +99,7 @@ class PlyBody:
             elif words[0] == "property" and elements:
                 elements[-1][2].append(self._property(words[1:], where))
             else:
-                self.refuse(f"says '{one_line(line, 60)}', which is no line of a PLY header", where)
+                self.refuse(f"says '{one_line(line, 60)}', which is not valid in a header", where)
         if not form:
             self.refuse(f"has no format; it must be one of {', '.join(FORMATS)}")
         return form, [
@@ -104,16 +112,16 @@ class PlyBody:
             return Property(name=words[1], kind=TYPES[words[0]])
         if len(words) == 4 and words[0] == "list" and words[1] in TYPES and words[2] in TYPES:
             if TYPES[words[1]][0] == "f":
-                self.refuse(f"counts a list by '{words[1]}'; it must be a whole number", where)
+                self.refuse(f"counts a list by '{words[1]}'; it must be an integer type", where)
             return Property(name=words[3], kind=TYPES[words[2]], length=TYPES[words[1]])
         self.refuse(
-            f"says 'property {one_line(' '.join(words), 60)}'; it must be a type and a name, or "
-            f"list, two types and a name",
+            f"says 'property {one_line(' '.join(words), 60)}'; it must be 'property', a type and a "
+            "name, or 'property list', two types and a name",
             where,
         )
 
     def read(self, element: Element) -> Table:
-        """All rows of the element that comes next."""
+        """Read all rows of the next element."""
         if not element.properties or not element.count:
             return Table(single={}, lists={})
         least = sum(np.dtype(p.length or p.kind).itemsize for p in element.properties)
@@ -122,8 +130,8 @@ class PlyBody:
             least, left = 2 * len(element.properties), self._lines.left + 1
         if element.count * least > left:
             self.refuse(
-                f"says it has {element.count} of '{element.name}', which take "
-                f"{element.count * least} bytes or more; {left} are there"
+                f"says it has {element.count} rows of '{element.name}', which take at least "
+                f"{element.count * least} bytes; {left} are left"
             )
         if self.form == "ascii":
             return self._read_ascii(element)
@@ -160,20 +168,20 @@ class PlyBody:
 
     def _wrong_row(self, element: Element, row: int, words: int) -> NoReturn:
         self.refuse(
-            f"has {words} numbers, which is not what the header says of '{element.name}'",
+            f"has {words} numbers, which does not match the header's '{element.name}'",
             f":{self._lines.number(row)}",
         )
 
     def _wrong_list(self, element: Element, one: Property, row: int, count: float) -> NoReturn:
         where = f":{self._lines.number(row)}" if self.form == "ascii" else ""
         self.refuse(
-            f"says that list '{one.name}' of '{element.name}' {row} has {count:.6g} values; "
-            "so many are not there",
+            f"says that list '{one.name}' of '{element.name}' {row} has {count:.6g} values, which "
+            "are not there",
             where,
         )
 
     def _read_binary(self, element: Element) -> Table:
-        """Rows as one array where all lists are as long as the first row's, else row by row."""
+        """Read the rows as one array if all have lists of the same lengths, else one by one."""
         if all(one.length is None for one in element.properties):
             return self._alike(element, {})
         lengths = self._first_row(element)
@@ -185,7 +193,7 @@ class PlyBody:
         return self._row_by_row(element)
 
     def _first_row(self, element: Element) -> dict[str, int] | None:
-        """Lengths of the first row's lists; None where the rows cannot all be like it."""
+        """Lengths of the lists in the first row; None if not all rows can have these lengths."""
         self._begin = at = self._at
         lengths: dict[str, int] = {}
         for one in element.properties:
@@ -203,7 +211,7 @@ class PlyBody:
         return lengths if fits else None
 
     def _alike(self, element: Element, lengths: dict[str, int]) -> Table:
-        """All rows, whose lists are as long as `lengths` says; the caller checks that they are."""
+        """Read all rows as if their lists had these `lengths`; the caller checks that they have."""
         fields: list[Any] = []
         for k, one in enumerate(element.properties):
             kind = self._order + one.kind
@@ -269,7 +277,7 @@ class PlyBody:
 
 
 class _Lines:
-    """The rows of an ascii body, one a line; empty lines do not count."""
+    """The rows of an ascii body, one per line; empty lines are skipped."""
 
     def __init__(self, text: bytes, first: int) -> None:
         if b"\n" not in text:
@@ -285,22 +293,22 @@ class _Lines:
 
     @property
     def left(self) -> int:
-        """Bytes that are not read yet."""
+        """Number of bytes that have not been read yet."""
         if self._next >= len(self._begins):
             return 0
         return len(self._text) - int(self._begins[self._next])
 
     def number(self, row: int) -> int:
-        """The file's line of a row of the element that was read last."""
+        """The line number in the file of a row of the element that was read last."""
         return int(self._numbers[self._last + row])
 
     def numbers(self, body: PlyBody, element: Element) -> tuple[NDArray[np.float64], NDArray[Any]]:
-        """All numbers of the element's rows, and how many each row has."""
+        """All numbers in the element's rows, and the count in each row."""
         self._last, self._next = self._next, self._next + element.count
         if self._next > len(self._begins):
             body.refuse(
-                f"says it has {element.count} of '{element.name}'; "
-                f"{len(self._begins) - self._last} lines are there"
+                f"says it has {element.count} rows of '{element.name}'; "
+                f"{len(self._begins) - self._last} lines are left"
             )
         begin, end = int(self._begins[self._last]), int(self._ends[self._next - 1])
         text = self._text[begin:end] + b"\n"
@@ -323,11 +331,11 @@ class _Lines:
                         f"holds '{one_line(word.decode('latin-1'), 40)}'; it must hold numbers",
                         f":{self.number(row)}",
                     )
-        body.refuse("cannot be read: its numbers", f":{self.number(0)}")
+        body.refuse("and the lines below hold numbers that cannot be read", f":{self.number(0)}")
 
 
 def _spans(begins: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """begins[k], begins[k] + 1, ... for each k, `counts[k]` of them."""
+    """Concatenate, for each k, the `counts[k]` integers that start at `begins[k]`."""
     total = int(counts.sum())
     ends = np.cumsum(counts)
     return np.arange(total) + np.repeat(begins - (ends - counts), counts)

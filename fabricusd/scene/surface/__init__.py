@@ -1,1 +1,1 @@
-"""Meshes as triangles: polygons, subdivision surfaces, normals."""
+"""Turning meshes into triangles: polygons, subdivision surfaces and normals."""

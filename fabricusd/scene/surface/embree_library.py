@@ -1,4 +1,4 @@
-"""The Embree 4 library that the embreex wheel ships, called through its C functions."""
+"""Finds and loads the Embree 4 library of the embreex wheel, and declares its C functions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 
 def _find_library() -> str | None:
-    """The Embree 4 library of the embreex wheel, or None."""
+    """The path of the Embree 4 library in the embreex wheel, or None."""
     if os.environ.get("FABRICUSD_EMBREE") == "python":
         return None
     spec = importlib.util.find_spec("embreex")
@@ -30,7 +30,7 @@ def _find_library() -> str | None:
 
 
 def declare(library: ctypes.CDLL, functions: tuple[tuple[Any, ...], ...]) -> None:
-    """Give functions of the library their types: (name, result, *arguments) each."""
+    """Declare the types of the library's functions, each given as (name, result, *arguments)."""
     for name, result, *arguments in functions:
         function = getattr(library, name)
         function.restype = result
@@ -38,7 +38,7 @@ def declare(library: ctypes.CDLL, functions: tuple[tuple[Any, ...], ...]) -> Non
 
 
 def _declare_scene(library: ctypes.CDLL) -> None:
-    """Give the few functions that build a scene their types."""
+    """Declare the types of the functions that build a scene."""
     pointer, size, unsigned = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_uint
     declare(library, (
         ("rtcNewDevice", pointer, ctypes.c_char_p),
@@ -63,7 +63,7 @@ PATH = _find_library()
 
 @cache
 def library() -> ctypes.CDLL | None:
-    """Embree's C library, None where embreex's own interface must do."""
+    """Embree's C library, or None if only embreex's Python interface can be used."""
     if PATH is None:
         return None
     try:

@@ -1,11 +1,12 @@
 """Limit surfaces of Catmull-Clark cages, evaluated by Embree's subdivision geometry.
 
-Faces are spoken to by their corners: each corner of a face owns a sub-quad, what one step of
-subdivision makes of it. Its coordinate s runs from the corner to the middle of the edge that leaves
-it, t to the middle of the edge that arrives, and (1, 1) is the middle of the face.
+Faces are addressed by their corners: each corner of a face owns a sub-quad, the quad that one
+subdivision step makes at that corner. Its coordinate s runs from the corner to the midpoint of the
+edge that leaves the corner, t to the midpoint of the edge that arrives, and (1, 1) is the middle of
+the face.
 
-Embree subdivides around irregular points and creases ten times and closes what is left with a
-Gregory patch: a crease that stays sharp is rounded within a thousandth of a cage's edge.
+Embree subdivides ten times around irregular points and creases and closes the remaining hole with a
+Gregory patch. A crease that stays sharp is therefore rounded within a thousandth of a cage's edge.
 """
 
 from __future__ import annotations
@@ -20,14 +21,15 @@ from fabricusd.errors import FabricError
 from fabricusd.scene.surface import embree_library
 
 MOST_CORNERS = 15
-"""Corners that a face may have."""
+"""Largest number of corners of a face."""
 
 MOST_FACES, MOST_RING = 64, 128
-"""Faces around a point, and their corners that are no neighbours of it along both edges; a border
-counts as one more of each. Beyond that Embree writes past its arrays."""
+"""Limits on the number of faces around a point, and on the number of those faces' corners that are
+not neighbours of the point along both edges; a border adds one to each. Beyond these limits Embree
+writes past its arrays."""
 
 INFINITE = 10.0
-"""Sharpness from which USD and OpenSubdiv take a crease for one that never softens."""
+"""Sharpness from which on USD and OpenSubdiv treat a crease as infinitely sharp."""
 
 _GEOMETRY = 8
 _INDEX, _VERTEX, _FACE = 0, 1, 16
@@ -58,19 +60,21 @@ class _Arguments(ctypes.Structure):
 
 
 def available() -> bool:
-    """Whether surfaces can be evaluated here: embreex must ship its C library."""
+    """Whether limit surfaces can be evaluated: embreex must ship Embree's C library."""
     library = embree_library.library()
     return library is not None and hasattr(library, "rtcInterpolateN")
 
 
 class LimitSurface:
-    """The limit of one cage; boundaries run smoothly along its border.
+    """The limit surface of one cage; its boundaries follow the cage's border smoothly.
 
     points : (n, 3) float, finite; counts : (f,) int, 3 to MOST_CORNERS; indices : (h,) int
     creases : (c, 2) int - points at the ends of edges, each edge once
-    crease_sharpness : (c,) float, sharpness : (n,) float - at least 0; from INFINITE on for ever
+    crease_sharpness : (c,) float, sharpness : (n,) float - at least 0; infinitely sharp from
+        INFINITE on
 
-    The caller must keep to MOST_FACES and MOST_RING. Raises `FabricError` where Embree refuses.
+    The caller must respect MOST_FACES and MOST_RING. Raises `FabricError` if Embree refuses the
+    cage.
     """
 
     def __init__(
@@ -87,12 +91,12 @@ class LimitSurface:
         starts = np.cumsum(counts) - counts
         self._face = np.repeat(np.arange(len(counts)), counts)
         self._corner = np.arange(len(indices)) - starts[self._face]
-        # Float32 is spent on the shape, wherever it lies.
+        # Centre and scale the cage, so that float32 resolves its shape wherever it lies.
         used = points[indices]
         low, high = used.min(axis=0), used.max(axis=0)
         self._middle = 0.5 * (low + high)
         self._scale = float((high - low).max()) or 1.0
-        # Embree reads 16 bytes for the last vertex.
+        # Embree reads 16 bytes per vertex, also for the last one.
         vertices = np.zeros((len(points) + 1, 3), np.float32)
         vertices[:-1] = (points - self._middle) / self._scale
         sharp = np.flatnonzero(sharpness > 0)
@@ -123,10 +127,10 @@ class LimitSurface:
     def evaluate(
         self, corners: NDArray[Any], s: NDArray[Any], t: NDArray[Any], *, normals: bool = False
     ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-        """Points of the surface, and the cross products of its derivatives where asked for.
+        """Evaluate points of the surface and, if `normals`, the cross products of its derivatives.
 
-        corners : (k,) int - position in `indices`; s, t : (k,) float in [0, 1]
-        Returns (k, 3) points and (k, 3) normals of any length, right-handed, or None.
+        corners : (k,) int - positions in `indices`; s, t : (k,) float in [0, 1]
+        Returns (k, 3) points, and (k, 3) right-handed normals of any length or None.
         """
         count = len(corners)
         padded = -(-count // 4) * 4
@@ -147,7 +151,7 @@ class LimitSurface:
         return points, np.cross(values[1].T, values[2].T) if normals else None
 
     def _coordinates(self, corners: NDArray[Any], s: Any, t: Any) -> NDArray[np.float64]:
-        """(2, k) Embree's u and v: over the whole of a quad, else with the sub-quad's number."""
+        """(2, k) Embree's u and v: over a whole quad, or with the sub-quad's number otherwise."""
         corner = self._corner[corners]
         quad = self._counts[self._face[corners]] == 4
         a, b = 0.5 * s, 0.5 * t
@@ -170,7 +174,7 @@ class LimitSurface:
 def _library() -> ctypes.CDLL:
     library = embree_library.library()
     if library is None:
-        raise FabricError("Embree", "has no C library here, which limit surfaces need")
+        raise FabricError("Embree", "has no C library here, and limit surfaces need one")
     embree_library.declare(library, (("rtcInterpolateN", None, ctypes.c_void_p),))
     return library
 

@@ -1,9 +1,9 @@
-"""Face-varying values on a Catmull-Clark surface, by OpenSubdiv's rules of linear interpolation.
+"""Interpolates face-varying values on Catmull-Clark surfaces by OpenSubdiv's linear rules.
 
-Values that faces share around a point make a topology of their own, torn along seams. Where it is
-torn it has borders, which Embree follows smoothly, and the rule says which of its points stay where
-they are. That is all six rules as OpenSubdiv has them (`FVarLevel`), but for creases that soften:
-there a value at a seam keeps to its border from the start.
+The values that faces share around a point form a topology of their own, which is torn along seams.
+A tear creates borders, which Embree follows smoothly, and the rule decides which points of the
+topology stay fixed. This reproduces all six of OpenSubdiv's rules (`FVarLevel`), except at
+semi-sharp creases: there a value on a seam follows its border from the start.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ def face_varying(
 ) -> NDArray[np.float64]:
     """(k, 2) values at the grid's points.
 
-    values : (h, 2) float - at the faces' corners; keys : (h,) int - equal where faces share a value
+    values : (h, 2) float - at the faces' corners
+    keys : (h,) int - equal at corners that share a value
+    rule : one of RULES
     """
     if rule == "all":
         return grid.bilinear(values)
@@ -48,7 +50,7 @@ def face_varying(
 def _fixed(
     cage: Cage, torn: Topology, point: NDArray[Any], crease: NDArray[Any], rule: str
 ) -> NDArray[np.bool_]:
-    """(w,) which values stay where they are; `point` is the cage's point that each belongs to."""
+    """(w,) which values stay fixed; `point` is the cage's point to which each value belongs."""
     own = cage.topology
     seam = np.flatnonzero((torn.uses[torn.edge] == 1) & (own.uses[own.edge] > 1))
     differs = np.zeros(own.count, bool)

@@ -1,4 +1,4 @@
-"""How finely a subdivision surface is refined: as usdrecord is told to, or as a picture shows."""
+"""Chooses how finely a subdivision surface is refined: by a fixed complexity or for a picture."""
 
 from __future__ import annotations
 
@@ -15,18 +15,20 @@ from fabricusd.scene.surface.subdivision import COMPLEXITIES, around_faces
 
 AUTO = "auto"
 OFF = 0.25
-"""Pixels that triangles may be off from the surface where the mesh is nearest to the camera. An
-estimate: on cages of a few large faces three times as much was seen in places."""
+"""Allowed distance of the triangles from the surface [pixels] where the mesh is nearest to the
+camera. The distance is estimated: on cages of a few large faces, it was up to three times as large
+in places."""
 _MOST, _WORST = 0.95, 4.0
-"""Share of the edges that this is asked of, and how many times as far off the others may be: a few
-sharp ones, at a hem, do not refine all the rest, and a small part that is coarse is not left so."""
+"""Share of the edges that must meet OFF, and the factor by which the others may exceed it. A few
+sharp edges, as at a hem, thus do not force the whole mesh to be refined, and a small part that is
+coarse does not stay coarse."""
 _LAST = 6
-"""A cage of few large faces is refined further than `veryhigh`, but not without end."""
+"""Highest level that `auto` chooses; a cage of few large faces may need more than `veryhigh`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fineness:
-    """A complexity, and what `auto` needs to know: the picture's width [pixels] and its camera.
+    """A complexity, with the picture's width [pixels] and camera, which `auto` needs.
 
     Raises `FabricError` for a complexity that does not exist.
     """
@@ -50,7 +52,7 @@ class Fineness:
     def level(
         self, points: NDArray[np.float64], counts: NDArray[Any], indices: NDArray[Any]
     ) -> int:
-        """How often a cage's edges are halved. points : (n, 3) float64 [m] in the world."""
+        """How often the cage's edges are halved. points : (n, 3) float64 [m] in world space."""
         if not self.is_auto:
             return COMPLEXITIES[self.complexity]
         finite = np.isfinite(points).all(axis=1)
@@ -59,15 +61,16 @@ class Fineness:
             return 0
         bends = _bends(points, counts, indices)
         bend = max(float(np.quantile(bends, _MOST)), float(bends.max()) / _WORST) / (OFF * pixel)
-        # Of a cubic B-spline: the limit lies a sixth of the second difference beside its control
-        # point, and an eighth beside the middle of a chord, which each halving makes a quarter.
+        # For a cubic B-spline, the limit lies a sixth of the second difference away from its
+        # control point, and an eighth away from the middle of a chord. Each halving of the edges
+        # divides the second difference by four.
         if bend <= 6.0:
             return 0
         return min(max(math.ceil(math.log(bend / 8.0, 4.0)), 1), _LAST)
 
     def _pixel(self, points: NDArray[np.float64]) -> float:
-        """Width of a pixel where `points` are nearest [m]; as if they filled a picture that has no
-        camera."""
+        """Width [m] of a pixel at the nearest of `points`; without a camera, the points are assumed
+        to fill the picture."""
         if not len(points):
             return 0.0
         if self.camera is None:
@@ -82,11 +85,11 @@ class Fineness:
 def _bends(
     points: NDArray[np.float64], counts: NDArray[Any], indices: NDArray[Any]
 ) -> NDArray[np.float64]:
-    """(h,) length of each corner's edge [m] times the angle that the normal turns along it; 0 where
-    a point is not finite."""
+    """(h,) length of each corner's edge [m] times the angle by which the normal turns along it; 0
+    where a point is not finite."""
     face, after, _ = around_faces(counts)
     edge = points[indices[after]] - points[indices]
-    # Newell's normal, about the face's own first corner, where products keep their digits.
+    # Newell's normal, relative to the face's first corner, so that products keep their digits.
     own = points[indices] - points[indices[(np.cumsum(counts) - counts)[face]]]
     part = np.cross(own, own[after])
     part[~np.isfinite(part).all(axis=1)] = 0.0

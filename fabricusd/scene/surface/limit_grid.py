@@ -1,7 +1,7 @@
-"""Points of a cage's limit surface, close enough to one another to be triangles' corners.
+"""Tessellates a cage's limit surface into a grid of points on each sub-quad.
 
-Every corner of a cage's face becomes a grid of points on its sub-quad (`embree_subdivision`).
-Points that neighbouring faces share are one by the cage's topology, so that there are no cracks.
+Each corner of a cage's face owns a sub-quad (`embree_subdivision`), which becomes a grid of points.
+Points that neighbouring faces share are identified by the cage's topology, so there are no cracks.
 """
 
 from __future__ import annotations
@@ -16,23 +16,26 @@ from fabricusd.scene.surface.embree_subdivision import LimitSurface
 from fabricusd.scene.surface.subdivision import Cage, Topology
 
 PART = 1 << 17
-"""Points that are evaluated together."""
+"""Number of points that are evaluated at once."""
 
 ASIDE = 1 / 16
-"""How far beside a point, of its sub-quad, a normal is looked for that is not to be had there."""
+"""Where a point has no usable normal, the normal is evaluated this far beside it, as a fraction of
+the sub-quad's side."""
 
 
 def triangles_at(topology: Topology, level: int) -> int:
-    """How many triangles a level makes: each corner's sub-quad is halved `level` - 1 times."""
+    """The number of triangles at a level: each corner's sub-quad is halved `level` - 1 times."""
     return len(topology.indices) * 2 * 4 ** (level - 1)
 
 
 class Grid:
-    """Points of a topology's sub-quads, (r + 1) x (r + 1) each, as one array.
+    """The points of a topology's sub-quads, (r + 1) x (r + 1) each, as one array.
 
-    Point (i, j) of corner h is at h (r + 1)^2 + i (r + 1) + j, its s is i / r and its t is j / r.
-    place : (h (r + 1)^2,) int - number of the point there, as `places` has it
-    triangles : (m, 3) int - into the array, in the faces' winding; face : (m,) int
+    Point (i, j) of corner h is at h (r + 1)^2 + i (r + 1) + j; its s is i / r, its t is j / r.
+
+    place : (h (r + 1)^2,) int - number of the point at each index, as `places` gives it
+    triangles : (m, 3) int - indices into the array, in the faces' winding
+    face : (m,) int - the face of each triangle
     """
 
     def __init__(self, topology: Topology, level: int) -> None:
@@ -52,13 +55,13 @@ class Grid:
         self.place = places(topology, self.size)
 
     def evaluate(self, surface: LimitSurface, place: NDArray[Any]) -> NDArray[np.float64]:
-        """(k, 3) points of the surface at the whole array, the same wherever `place` is."""
+        """(k, 3) points of the surface for the whole array; equal where `place` is equal."""
         return self._once(surface, place)[0][place]
 
     def with_normals(self, cage: Cage) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-        """(k, 3) points and unit normals of the cage's surface, from the side of each face.
+        """(k, 3) points and unit normals of the cage's surface, each taken on its own face's side.
 
-        A normal is 0 where there is none.
+        A normal is 0 where the surface has none.
         """
         surface = cage.limit()
         points, one = self._once(surface, self.place, normals=True)
@@ -74,12 +77,12 @@ class Grid:
     def _once(
         self, surface: LimitSurface, place: NDArray[Any], *, normals: bool = False
     ) -> tuple[NDArray[np.float64], NDArray[np.float32] | None]:
-        """(places, 3) points of the surface, and unit normals where asked for."""
+        """(places, 3) points of the surface, and unit normals if requested."""
         source = np.full(int(place.max(initial=0)) + 1, -1, np.int32)
         source[place] = np.arange(len(place), dtype=np.int32)
         points = np.zeros((len(source), 3))
         units = np.zeros((len(source), 3), np.float32) if normals else None
-        # Face by face, which Embree prepares once for all of its points that follow one another.
+        # Go face by face: Embree prepares a face once for all consecutive points on it.
         for part in _parts(np.sort(source[source >= 0])):
             corners, at = np.divmod(part, len(self.s))
             found = surface.evaluate(corners, self.s[at], self.t[at], normals=normals)
@@ -91,7 +94,7 @@ class Grid:
     def _beside(
         self, surface: LimitSurface, some: NDArray[Any], aside: NDArray[np.int8], step: float
     ) -> NDArray[np.float32]:
-        """(n, 3) unit normals a step aside of `some` points of the array."""
+        """(n, 3) unit normals of the surface a small step beside `some` points of the array."""
         units = np.empty((len(some), 3), np.float32)
         for where in _parts(np.arange(len(some))):
             part = some[where]
@@ -101,16 +104,16 @@ class Grid:
         return units
 
     def _make_one(self, normals: NDArray[np.float32], some: NDArray[np.bool_]) -> None:
-        """Give `some` points of the array the mean normal of all that lie at the same place.
+        """Give `some` points of the array the mean normal of all those at the same place.
 
-        What each of them is off by, as it was looked for on one side, is opposite to the others'.
+        Each normal was evaluated to one side of the place, and these errors cancel in the mean.
         """
         place, which = np.unique(self.place[some], return_inverse=True)
         total = [np.bincount(which, x, len(place)) for x in normals[some].T]
         normals[some] = _unit(np.stack(total, axis=1))[which]
 
     def _creased(self, cage: Cage) -> NDArray[np.bool_]:
-        """(places,) where the surface has a normal for each side."""
+        """(places,) where the surface has a different normal on each side."""
         top = self.topology
         creased = np.zeros(int(self.place.max(initial=0)) + 1, bool)
         edges, points = self._sharp(cage)
@@ -120,7 +123,7 @@ class Grid:
         return creased
 
     def _sharp(self, cage: Cage) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """(e,) edges and (n,) points that are sharper than what these triangles can round."""
+        """(e,) edges and (n,) points that are too sharp for these triangles to round."""
         top, most = self.topology, np.log2(2 * self.size)
         edges = ((cage.crease > most) & (top.uses > 1)) | top.tangled_edges
         points = cage.point_sharpness > most
@@ -128,10 +131,10 @@ class Grid:
         return edges, points
 
     def _aside(self, cage: Cage) -> NDArray[np.int8]:
-        """(h, (r + 1)^2, 2) direction in s and t in which a normal must be looked for, 0 for none.
+        """(h, (r + 1)^2, 2) direction in s and t of the step to where a normal exists; 0 for none.
 
-        Around irregular points derivatives shrink until nothing is left of them in float32, and at
-        a crease there are two normals: there the normal is that of the face's own side.
+        At irregular points the derivatives vanish in float32, and at a crease there are two normals
+        of which the one on the face's own side is needed.
         """
         top, side = self.topology, self.size + 1
         aside = np.zeros((len(top.indices), side, side, 2), np.int8)
@@ -144,7 +147,7 @@ class Grid:
         return aside.reshape(len(top.indices), side**2, 2)
 
     def bilinear(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(k, c) at the whole array, of values (h, c) at the corners; edges stay straight."""
+        """(k, c) values for the whole array, bilinear in (h, c) values at the corners."""
         top = self.topology
         total = np.stack([np.bincount(top.face, x, len(top.counts)) for x in values.T], axis=1)
         middle = (total / top.counts[:, None])[top.face][:, None]
@@ -156,9 +159,10 @@ class Grid:
 
 
 def places(topology: Topology, size: int) -> NDArray[np.int32]:
-    """(h (r + 1)^2,) numbers of the points of a grid of r = `size`, equal where faces meet.
+    """(h (r + 1)^2,) numbers of the points of a grid with r = `size`, equal where faces meet.
 
-    In turn: the topology's points, those on its edges, on spokes from edges to middles, in faces.
+    The numbers run through the topology's points, then the points on its edges, on the spokes from
+    edges to the middles of faces, and inside faces.
     """
     top, r, side = topology, size, size + 1
     corners, on_edge = len(top.indices), 2 * r - 1
@@ -169,7 +173,7 @@ def places(topology: Topology, size: int) -> NDArray[np.int32]:
     step = np.arange(1, side)
 
     def along(corner: Any, steps: NDArray[Any]) -> NDArray[np.int64]:
-        # `steps` from the corner's point, of 2 r to the next one.
+        # `steps` counts from the corner's point; the next corner is 2 r steps away.
         up = np.where(top.forward[corner][:, None], steps, 2 * r - steps)
         return np.asarray(top.count + top.edge[corner][:, None] * on_edge + up - 1)
 
@@ -190,7 +194,7 @@ def _parts(numbers: NDArray[Any]) -> Iterator[NDArray[Any]]:
 
 
 def _unit(vectors: NDArray[Any] | None) -> NDArray[np.float64]:
-    """(k, 3) at length 1; 0 where there is no length."""
+    """(k, 3) the vectors normalized; 0 for vectors of length 0."""
     assert vectors is not None
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     good = np.isfinite(length) & (length > 0)

@@ -1,4 +1,4 @@
-"""Smooth normals of triangles, and what else is measured on them."""
+"""Computes smooth normals of triangles, groups coincident points, and measures the scale of UVs."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 PART = 1 << 16
-"""Triangles that are worked on together."""
+"""Number of triangles that are processed at once."""
 
 
 SAME = 2e-6
-"""Side of the cells, over a mesh's extent, in which points count as one place. Single precision
-moves a point by a twentieth of it."""
+"""Side of the cells, over the mesh's extent, in which points count as one place. Rounding to single
+precision moves a point by a twentieth of it."""
 
 
 CREASE = math.radians(40.0)
-"""Below it, two faces around a point are one smooth surface: a fold of up to 80 degrees."""
+"""Half of the largest angle of a smooth fold: two faces that share an edge belong to one smooth
+surface if they are folded by up to 80 degrees."""
 
 
 def _unit(v: NDArray[Any], instead: NDArray[Any]) -> NDArray[Any]:
-    """`v` at length 1, and `instead` at length 1 where `v` has none or is not finite."""
+    """Normalize `v`; where `v` has no length or is not finite, normalize `instead`."""
     length = _length(v)[..., None]
     good = np.isfinite(length) & (length > 1e-12)
     if good.all():
@@ -32,21 +33,22 @@ def _unit(v: NDArray[Any], instead: NDArray[Any]) -> NDArray[Any]:
 
 
 def _length(v: NDArray[Any]) -> NDArray[Any]:
-    """Length along the last axis, in a third of the time of `numpy.linalg.norm`."""
+    """Euclidean length along the last axis, in a third of the time of `numpy.linalg.norm`."""
     return np.asarray(np.sqrt(np.einsum("...i,...i->...", v, v)))
 
 
 def _parts(count: int) -> list[slice]:
-    """Slices of at most PART triangles, so that what is computed on the way stays small."""
+    """Slices of at most PART triangles, so that temporary arrays stay small."""
     return [slice(k, min(k + PART, count)) for k in range(0, count, PART)]
 
 
 def smooth_normals(points: NDArray[Any], tri: NDArray[Any]) -> NDArray[np.float32]:
-    """(m, 3, 3) unit normals at the corners: faces around a point, weighted by their angle there.
+    """(m, 3, 3) unit normals at the corners: the mean over the faces around a point, weighted by
+    their angles there.
 
-    Points at one place are one point, so a seam of the UVs is no crease. Where the faces around a
-    point do not make one smooth surface, as along the edge of a box or the rim of a cylinder, each
-    corner averages the faces that it can be reached from without crossing a crease.
+    Coincident points count as one, so a UV seam does not become a crease. Where the faces around a
+    point do not form one smooth surface, as along the edge of a box or the rim of a cylinder, each
+    corner averages the faces that can be reached from it without crossing a crease.
     """
     place = _same_places(points)
     total = np.zeros((int(place.max(initial=0)) + 1, 3))
@@ -71,10 +73,10 @@ def smooth_normals(points: NDArray[Any], tri: NDArray[Any]) -> NDArray[np.float3
 def _between_creases(
     points: NDArray[Any], tri: NDArray[Any], place: NDArray[np.int64], corners: NDArray[np.int64]
 ) -> NDArray[Any]:
-    """(k, 3) unit normals at `corners`, (k, 2) rows of triangle and corner number.
+    """(k, 3) unit normals at `corners`, (k, 2) pairs of triangle and corner number.
 
-    All corners at a place must be given. Two of them are one surface where their triangles share an
-    edge and are folded there by less than twice CREASE.
+    All corners at a place must be given. Two corners belong to the same surface if their triangles
+    share an edge and are folded there by less than twice CREASE.
     """
     which, k = corners.T
     shape = points[tri[which]]
@@ -90,7 +92,7 @@ def _between_creases(
     smooth = np.einsum("ij,ij->i", face[one], face[other]) > math.cos(2 * CREASE)
     one, other = one[smooth], other[smooth]
     while (group[one] != group[other]).any():
-        # The smaller number passes to the neighbour, and to whatever has the neighbour's number.
+        # Pass the smaller group number to the neighbour and to everything in the neighbour's group.
         least = np.minimum(group[one], group[other])
         for end in (one, other):
             np.minimum.at(group, group[end], least)
@@ -112,7 +114,7 @@ def _angle_at(corners: NDArray[Any], k: int) -> NDArray[Any]:
 
 
 def _add_at(total: NDArray[Any], index: NDArray[np.int64], vectors: NDArray[Any]) -> None:
-    """`total[index] += vectors`, (n, 3), also where an index occurs often."""
+    """`total[index] += vectors` for (n, 3) vectors; also correct for repeated indices."""
     for axis in range(3):
         total[:, axis] += np.bincount(index, vectors[:, axis], len(total))
 
@@ -126,8 +128,8 @@ def _face_normals(corners: NDArray[Any]) -> NDArray[Any]:
 def _same_places(points: NDArray[Any]) -> NDArray[np.int64]:
     """(n,) number of each point's place; points within a few millionths of the extent share one.
 
-    Two grids of cells, the second shifted by half a cell: coincident points that rounding puts on
-    either side of a border in one of them lie in one cell of the other.
+    Uses two grids of cells, the second shifted by half a cell: coincident points that rounding puts
+    into different cells of one grid lie in the same cell of the other.
     """
     extent = float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0
     at = (points - points.min(axis=0, initial=np.inf)) / max(extent * SAME, 1e-12)
@@ -143,14 +145,14 @@ def _same_places(points: NDArray[Any]) -> NDArray[np.int64]:
 
 
 def _smallest_of_each(group: NDArray[np.int64], value: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(n,) for each entry the smallest `value` of those in its `group`."""
+    """(n,) for each entry, the smallest `value` in its `group`."""
     smallest = np.full(int(group.max(initial=-1)) + 1, np.iinfo(np.int64).max)
     np.minimum.at(smallest, group, value)
     return smallest[group]
 
 
 def group_numbers(*columns: NDArray[Any]) -> NDArray[np.int64]:
-    """(n,) a number for each entry, equal exactly where all of the integer `columns` are."""
+    """(n,) a number for each entry, equal if and only if all integer `columns` are equal."""
     key = np.zeros(len(columns[0]), np.int64)
     size = 1
     for column in columns:
@@ -165,7 +167,7 @@ def group_numbers(*columns: NDArray[Any]) -> NDArray[np.int64]:
 
 
 def measured_scale(uv: NDArray[np.float64], area2: NDArray[Any]) -> float:
-    """Metres of cloth per UV unit, by area; 0 where the UVs have none."""
+    """Metres of cloth per UV unit, from the ratio of areas; 0 if the UVs have no area."""
     a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     flat = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()
     solid = np.linalg.norm(area2, axis=1).sum(dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Polygons cut into triangles."""
+"""Triangulates polygons."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 PART = 1 << 20
-"""Corners that are looked at together."""
+"""Number of corners that are processed at once."""
 
 
 def triangulate(
     points: NDArray[np.float64], counts: NDArray[np.int64], indices: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles of polygons with `counts` corners each, which are `indices` into `points`.
+    """Triangulate polygons with `counts` corners each; `indices` holds the corners' points.
 
     Returns the polygon that each triangle comes from, (m,), and the positions of its corners in
-    `indices`, (m, 3), in the polygon's own winding. Triangles, quads and convex polygons fan out
-    from their first corner, a quad with a reflex corner from that one; others lose ear after ear.
-    Polygons of fewer than three corners are left out.
+    `indices`, (m, 3), in the polygon's own winding. Triangles, quads and convex polygons are cut
+    into a fan around their first corner; a quad with a reflex corner, around that corner. Other
+    polygons are cut by ear clipping. Polygons with fewer than three corners are left out.
     """
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     faces: list[NDArray[Any]] = []
@@ -54,7 +54,7 @@ def triangulate(
 
 
 def _better_diagonal(quads: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(n, 4, 3) -> (n,) 1 where the quad must be cut from its second corner, else 0."""
+    """(n,) 1 if the (n, 4, 3) quad must be cut from its second corner, else 0."""
     a, b, c, d = (quads[:, k] for k in range(4))
     first = np.einsum("ij,ij->i", np.cross(b - a, c - a), np.cross(c - a, d - a))
     other = np.einsum("ij,ij->i", np.cross(c - b, d - b), np.cross(d - b, a - b))
@@ -64,7 +64,7 @@ def _better_diagonal(quads: NDArray[np.float64]) -> NDArray[np.int64]:
 def _are_convex(
     points: NDArray[np.float64], indices: NDArray[np.int64], first: NDArray[np.int64], size: int
 ) -> NDArray[np.bool_]:
-    """(n,) which polygons of `size` corners turn left at every corner, once around."""
+    """(n,) which polygons of `size` corners turn left at every corner and go around once."""
     convex = np.zeros(len(first), bool)
     with np.errstate(all="ignore"):
         for begin in range(0, len(first), max(PART // size, 1)):
@@ -75,7 +75,7 @@ def _are_convex(
             normal = np.cross(at - at[:, :1], along).sum(axis=1)
             normal /= np.linalg.norm(normal, axis=1)[:, None]
             out = np.einsum("nki,ni->nk", turn, normal)
-            # Turns add up to one round, or to several where a polygon winds like a star.
+            # The turns add up to one full turn, or to several if the polygon winds like a star.
             ahead = np.einsum("nki,nki->nk", np.roll(along, 1, axis=1), along)
             around = np.arctan2(out, ahead).sum(axis=1)
             least = 1e-9 * np.square(along).sum(axis=2).max(axis=1)
@@ -84,10 +84,10 @@ def _are_convex(
 
 
 def _cut_ears(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(k, 3) -> (k-2, 3) corner numbers: ears of the polygon in its mean plane.
+    """(k - 2, 3) corner numbers of a (k, 3) polygon's triangles, by ear clipping in its mean plane.
 
-    One ear after another on the way around. Where a whole round finds none, the polygon crosses
-    itself, and what is left is a fan.
+    Clips one ear after another on the way around. If a whole round finds no ear, the polygon
+    crosses itself, and the rest is cut into a fan.
     """
     n = len(polygon)
     if not np.isfinite(polygon).all():
@@ -100,7 +100,7 @@ def _cut_ears(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
         flat = flat * (1.0, -1.0)
     places = flat.tolist()
     before, after = [n - 1, *range(n - 1)], [*range(1, n), 0]
-    # Only corners that turn right, or not at all, can lie in an ear.
+    # Only corners that turn right or go straight can lie inside an ear.
     reflex = {k for k in range(n) if _turn(places[before[k]], places[k], places[after[k]]) <= 0}
     array = np.array(sorted(reflex), np.int64)
     ears = []
@@ -119,7 +119,7 @@ def _cut_ears(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
             ):
                 reflex.remove(corner)
                 array = array[array != corner]
-        # On to the corner after the next: ears that follow one another make slivers.
+        # Skip a corner: clipping neighbouring ears in a row makes slivers.
         k, missed = after[c], 0
     while left > 2:
         a, c = before[k], after[k]
@@ -135,8 +135,8 @@ def _holds_another(
 ) -> bool:
     """Whether one of the corners `others` lies in the triangle a, b, c or on its edges.
 
-    Corners at the places of a, b and c do not count: where a hole is cut open towards the outline,
-    the cut has two corners at each end.
+    Corners that coincide with a, b or c are ignored: where a cut joins a hole to the outline, the
+    cut has two corners at each end.
     """
     q = flat[others]
     inside = np.ones(len(others), bool)

@@ -1,4 +1,4 @@
-"""Catmull-Clark cages [CatmullClark1978] and the rules of their limit surfaces."""
+"""Catmull-Clark cages [CatmullClark1978]: their topology, and the rules of their limit surfaces."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ from fabricusd.scene.surface.embree_subdivision import (
 )
 
 COMPLEXITIES = {"low": 0, "medium": 1, "high": 2, "veryhigh": 3}
-"""Levels by the names of usdrecord and usdview: each halves the edges; `low` is the cage."""
+"""Refinement levels by the names that usdrecord and usdview use: each level halves the edges, and
+`low` is the cage itself."""
 
 
 def around_faces(counts: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """(h,) of each corner of polygons with `counts` corners: its face, the next corner of that and
-    the one before."""
+    """For each corner of polygons with `counts` corners, (h,): its face, and the next and the
+    previous corner of that face."""
     starts = np.cumsum(counts) - counts
     face = np.repeat(np.arange(len(counts)), counts)
     corner = np.arange(len(face))
@@ -32,12 +33,14 @@ def around_faces(counts: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDAr
 
 
 class Topology:
-    """Which corners, edges and points of polygons belong together.
+    """The connectivity of polygons: which corners, edges and points belong together.
 
-    counts : (f,) int, indices : (h,) int - the polygons; count : int - points there are
-    face, after, before : (h,) int - of each corner: its face, the next corner and the one before
-    edge : (h,) int - the edge from a corner to the next; forward : (h,) bool - from the lower point
-    ends : (e, 2) int - points of each edge, the lower first; uses : (e,) int - faces at each edge
+    counts : (f,) int, indices : (h,) int - the polygons; count : int - number of points
+    face, after, before : (h,) int - for each corner: its face, the next and the previous corner
+    edge : (h,) int - the edge from a corner to the next
+    forward : (h,) bool - whether that edge starts at the point with the lower number
+    ends : (e, 2) int - points of each edge, the lower first
+    uses : (e,) int - number of faces at each edge
     """
 
     def __init__(self, counts: NDArray[Any], indices: NDArray[Any], count: int) -> None:
@@ -51,29 +54,29 @@ class Topology:
 
     @cached_property
     def faces_at(self) -> NDArray[np.int64]:
-        """(n,) faces around each point."""
+        """(n,) number of faces around each point."""
         return np.bincount(self.indices, minlength=self.count)
 
     @cached_property
     def borders_at(self) -> NDArray[np.int64]:
-        """(n,) edges of only one face at each point."""
+        """(n,) number of border edges, those of a single face, at each point."""
         return np.bincount(self.ends[self.uses == 1].ravel(), minlength=self.count)
 
     @cached_property
     def tangled_edges(self) -> NDArray[np.bool_]:
-        """(e,) edges of more than two faces, or of two that wind against each other."""
+        """(e,) edges of more than two faces, or of two faces with opposite winding."""
         same_way = np.bincount(self.edge, self.forward, len(self.uses))
         return np.asarray((self.uses > 2) | ((self.uses == 2) & (same_way != 1)))
 
     @cached_property
     def tangled(self) -> NDArray[np.bool_]:
-        """(n,) points where the faces are no single fan: OpenSubdiv keeps them where they are."""
+        """(n,) points whose faces do not form a single fan; OpenSubdiv keeps these points fixed."""
         bad = np.asarray(self.borders_at > 2)
         bad[self.ends[self.tangled_edges].ravel()] = True
         return bad
 
     def edges_of(self, pairs: NDArray[Any]) -> NDArray[np.int64]:
-        """(k,) the edge between each of (k, 2) points, -1 where there is none."""
+        """(k,) the edge between each of (k, 2) pairs of points, -1 if there is none."""
         keys = self.ends[:, 0] * self.count + self.ends[:, 1]
         low, high = np.sort(pairs, axis=1).T
         wanted = low.astype(np.int64) * self.count + high
@@ -83,12 +86,12 @@ class Topology:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cage:
-    """A cage and the rules of its surface, after OpenSubdiv.
+    """A cage with the rules of its limit surface, as in OpenSubdiv.
 
-    points : (n, 3) float; counts : (f,) int; indices : (h,) int
-    crease : (e,) float - sharpness of the topology's edges; sharpness : (n,) float - of points
-    sharp_corners : bool - whether a point of a single face stays where it is
-    hidden : (f,) bool - faces that shape the surface and are not drawn
+    points : (n, 3) float
+    crease : (e,) float - sharpness of the topology's edges; sharpness : (n,) float - of its points
+    sharp_corners : bool - whether a point of a single face stays fixed
+    hidden : (f,) bool - faces that shape the surface but are not drawn
     """
 
     points: NDArray[np.float64]
@@ -100,7 +103,7 @@ class Cage:
 
     @cached_property
     def point_sharpness(self) -> NDArray[np.float64]:
-        """(n,) with what the border and tangled faces add."""
+        """(n,) sharpness of the points, including the effects of borders and tangled faces."""
         topology = self.topology
         fixed = topology.tangled
         if self.sharp_corners:
@@ -111,8 +114,8 @@ class Cage:
     def _sharp_meetings(self) -> NDArray[np.float64]:
         """(n,) sharpness of points where three or more creases soften in the same step.
 
-        Embree leaves such points where they are until the last of a crease is gone; OpenSubdiv lets
-        go of them with the fraction of the last step, as both do by a point's own sharpness.
+        Embree keeps such a point fixed until its creases are gone. OpenSubdiv releases the point by
+        the fractional sharpness of the last step; both libraries do so for a point's own sharpness.
         """
         found = np.zeros(self.topology.count)
         top = self.topology
@@ -131,8 +134,8 @@ class Cage:
 
     @cached_property
     def irregular(self) -> NDArray[np.bool_]:
-        """(n,) points around which the surface is no B-spline: not in the middle of four quads, or
-        of two at the border; and corners that are rounded."""
+        """(n,) points around which the surface is not a B-spline: all but those shared by four
+        quads, or by two quads on the border. Corners count as irregular if they are rounded."""
         top = self.topology
         border = top.borders_at > 0
         usual = top.faces_at == np.where(border, 2, 4)
@@ -142,7 +145,7 @@ class Cage:
         return ~usual
 
     def limit(self, values: NDArray[np.float64] | None = None) -> LimitSurface:
-        """The surface of the points, or of other values (n, 3) at them."""
+        """The limit surface of the points, or of other (n, 3) values at the points."""
         return limit_of(
             self.points if values is None else values,
             self.topology, self.crease, self.point_sharpness,
@@ -155,7 +158,7 @@ def limit_of(
     crease: NDArray[np.float64],
     sharpness: NDArray[np.float64],
 ) -> LimitSurface:
-    """The limit of values (n, 3) at the topology's points."""
+    """The limit surface of (n, 3) values at the topology's points."""
     sharp = crease > 0
     return LimitSurface(
         values, topology.counts, topology.indices, topology.ends[sharp], crease[sharp], sharpness
@@ -163,9 +166,12 @@ def limit_of(
 
 
 def too_crowded(topology: Topology) -> str:
-    """Why neither the topology nor one with more borders can be evaluated, or an empty string."""
+    """The reason why the topology cannot be evaluated, also if more borders are added; else ""."""
     others = np.bincount(topology.indices, topology.counts[topology.face] - 2, topology.count)
     worst = int(np.argmax(np.maximum(topology.faces_at * (MOST_RING // MOST_FACES), others)))
     if topology.faces_at[worst] < MOST_FACES and others[worst] < MOST_RING:
         return ""
-    return f"has {topology.faces_at[worst]} faces around point {worst}; {MOST_FACES - 1} at most"
+    return (
+        f"has {topology.faces_at[worst]} faces around point {worst}; "
+        f"at most {MOST_FACES - 1} are possible"
+    )

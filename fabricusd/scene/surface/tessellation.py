@@ -1,4 +1,4 @@
-"""A polygon mesh as triangles, and its primvars at their corners: as it is, or refined."""
+"""Turns a polygon mesh into triangles, as it is or refined, with primvars at their corners."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ CONSTANT, UNIFORM, VARYING, VERTEX, FACE_VARYING = (
 
 
 class Tessellation(Protocol):
-    """Triangles of a mesh in its own space.
+    """The triangles of a mesh in its own space.
 
-    faces : (m,) int - the mesh's face that each triangle is part of
+    faces : (m,) int - the mesh's face to which each triangle belongs
     points : (n, 3) float64, triangles : (m, 3) int, counter-clockwise seen from the front
     normals : (m, 3, 3) float64 or None - at the corners, towards the front
     """
@@ -34,18 +34,17 @@ class Tessellation(Protocol):
     def spread(
         self, values: NDArray[np.float64], interpolation: str, indices: NDArray[Any] | None = None
     ) -> NDArray[np.float64] | None:
-        """(m, 3, c) a primvar's values at the triangles' corners; None where there are too few.
+        """(m, 3, c) a primvar's values at the triangles' corners; None if there are too few values.
 
-        values : (k, c) float; c is 2 where a surface is refined
-        indices : which value each element has, as an indexed primvar says; None for one after the
-        other
+        values : (k, c) float; c is 2 for a refined surface
+        indices : the indices of an indexed primvar; None if the values are in the elements' order
         """
 
 
 def _elements(
     values: NDArray[np.float64], indices: NDArray[Any] | None, pick: NDArray[Any]
 ) -> NDArray[np.float64] | None:
-    """The values of the elements `pick`, None where there is no such element or value."""
+    """The values of the elements `pick`; None if an element or its value does not exist."""
     for numbers in () if indices is None else (indices,):
         if pick.size and int(pick.max()) >= len(numbers):
             return None
@@ -56,7 +55,7 @@ def _elements(
 
 
 class CageTessellation:
-    """The polygons themselves, cut into triangles."""
+    """The mesh's own polygons, cut into triangles."""
 
     normals: NDArray[np.floating] | None = None
 
@@ -92,10 +91,10 @@ class CageTessellation:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refinement:
-    """A cage, how it came from a mesh's faces, and how face-varying values follow it.
+    """A cage, its relation to the mesh's faces, and the rule for face-varying values.
 
-    face : (f,) int - the mesh's face that each of the cage's is part of
-    corner : (h,) int - the mesh's corner that each of the cage's is
+    face : (f,) int - the mesh's face to which each face of the cage belongs
+    corner : (h,) int - the mesh's corner that corresponds to each corner of the cage
     rule : str - one of `face_varying.RULES`
     """
 
@@ -134,7 +133,7 @@ class RefinedTessellation:
     def spread(
         self, values: NDArray[np.float64], interpolation: str, indices: NDArray[Any] | None = None
     ) -> NDArray[np.float64] | None:
-        """As `Tessellation` says; `vertex` values follow the surface, `varying` ones its cage."""
+        """As `Tessellation` says; `vertex` values follow the surface, `varying` ones the cage."""
         top = self._refinement.cage.topology
         if interpolation in (CONSTANT, UNIFORM):
             pick = self.faces if interpolation == UNIFORM else np.zeros_like(self.faces)
@@ -157,7 +156,7 @@ class RefinedTessellation:
     def _interpolated(
         self, values: NDArray[np.float64], interpolation: str, keys: NDArray[Any] | None
     ) -> NDArray[np.float64]:
-        """(k, 2) at the grid's points, of (h, 2) values at corners or (n, 2) at points."""
+        """(k, 2) values at the grid's points, from (h, 2) values at corners or (n, 2) at points."""
         own = self._refinement
         if interpolation == FACE_VARYING:
             shared = _shared(values) if keys is None else keys
@@ -170,5 +169,5 @@ class RefinedTessellation:
 
 
 def _shared(values: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(h,) numbers, equal where the values are: what is not indexed is shared where it is equal."""
+    """(h,) numbers that are equal for equal values: values without indices are shared if equal."""
     return np.unique(values, axis=0, return_inverse=True)[1].reshape(-1)

@@ -10,7 +10,7 @@ from numba.core.dispatcher import Dispatcher
 
 from fabricusd.fabric import Binding
 from fabricusd.reference.start.compile_ahead import compile_kernels
-from fabricusd.reference.start.kernel_tasks import FAR, NEAR, TASKS
+from fabricusd.reference.start.kernel_tasks import CLOSE_UPS, EVERY_PICTURE, TASKS
 from fabricusd.scene.scene import FabricSurface, PreviewSurface, Scene
 from fabricusd.schema import load
 from tests.reference.scenes import above, grid, render_scene
@@ -42,12 +42,12 @@ def picture(level):
 
 
 def test_a_picture_compiles_nothing_that_was_not_compiled_ahead():
-    for task in TASKS[FAR]:
+    for task in TASKS[EVERY_PICTURE]:
         task()
     before = signatures()
     picture("far")
     assert signatures() == before
-    for task in TASKS[NEAR]:
+    for task in TASKS[CLOSE_UPS]:
         task()
     before = signatures()
     for level in ("weave", "thread"):
@@ -87,9 +87,11 @@ def test_processes_share_the_kernels_out_by_claims(tmp_path, monkeypatch):
     def second():
         done.append("second")
 
-    monkeypatch.setattr("fabricusd.reference.start.compile_ahead.TASKS", {FAR: (first, second)})
+    monkeypatch.setattr(
+        "fabricusd.reference.start.compile_ahead.TASKS", {EVERY_PICTURE: (first, second)}
+    )
     monkeypatch.setattr("gc.disable", lambda: None)
     (tmp_path / "first").touch()
-    compile_kernels(FAR, str(tmp_path), backwards=False)
-    compile_kernels(FAR, str(tmp_path), backwards=True)
+    compile_kernels(EVERY_PICTURE, str(tmp_path), backwards=False)
+    compile_kernels(EVERY_PICTURE, str(tmp_path), backwards=True)
     assert done == ["second"]

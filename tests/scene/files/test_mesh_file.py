@@ -13,7 +13,7 @@ from fabricusd.scene.size import mesh_words
 from tests.scene.files.mesh_files import CASES, Gltf, bounds, one_square, ply
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n"
-METRES = "; .obj has no unit and metres were taken"
+METRES = "; .obj files have no unit, and metres were assumed"
 
 
 def test_a_file_of_another_program_is_read(tmp_path):
@@ -43,14 +43,14 @@ def test_letters_of_another_encoding_are_no_reason_to_refuse_an_obj(tmp_path):
 def test_a_mesh_file_without_a_fabric_says_that_it_is_grey(tmp_path):
     (tmp_path / "x.obj").write_text(OBJ)
     assert read_scene(tmp_path / "x.obj").notes == [
-        "x.obj is rendered grey: no fabric is named for it",
+        "x.obj is rendered grey: no fabric was given for it",
         "x.obj is 1 m wide and 1 m high" + METRES,
     ]
 
 
 def test_a_mesh_file_has_no_cameras(tmp_path):
     (tmp_path / "x.obj").write_text(OBJ)
-    with pytest.raises(FabricError, match=r":/c is no camera; .obj files have none"):
+    with pytest.raises(FabricError, match=r":/c is not a camera; .obj files have none"):
         read_scene(tmp_path / "x.obj", camera="/c")
 
 
@@ -99,17 +99,17 @@ SIZES = {
     "metres, told": (_sides(0.6, 0.8), "m", None),
     "centimetres, told as metres": (
         _sides(60, 80), "m",
-        "is 60 m wide and 80 m high with --units m; no cloth is likely to be that size",
+        "is 60 m wide and 80 m high with --units m; cloth is unlikely to be that size",
     ),
     "metres, told as millimetres": (
         _sides(0.6, 0.8), "mm",
-        "is 0.0006 m wide and 0.0008 m high with --units mm; no cloth is likely to be that size, "
-        "scale it",
+        "is 0.0006 m wide and 0.0008 m high with --units mm; cloth is unlikely to be that size; "
+        "scale the file",
     ),
     "a swatch": (_sides(0.005, 0.005), None, "is 0.005 m wide and 0.005 m high" + METRES),
     "too small": (
         _sides(0.004, 0), None,
-        "is 0.004 m wide" + METRES + "; no cloth is likely to be that size, scale it",
+        "is 0.004 m wide" + METRES + "; cloth is unlikely to be that size; scale the file",
     ),
 }  # fmt: skip
 
@@ -134,8 +134,8 @@ def test_a_gltf_of_60_m_is_told_so(tmp_path):
     (tmp_path / "x.glb").write_bytes(one_square(scale=[600, 600, 600]).glb())
     [note] = read_scene(tmp_path / "x.glb", fabric="linen_plain").notes
     assert note == (
-        "x.glb is 60 m wide and 60 m high; lengths in glTF are metres; no cloth is likely to be "
-        "that size, scale it"
+        "x.glb is 60 m wide and 60 m high; lengths in glTF are metres; cloth is unlikely to be "
+        "that size; scale the file"
     )
 
 

@@ -117,7 +117,7 @@ REFUSED = {
     "a UV back beyond the first": (
         "vt 0 0\n" + QUAD + "f 1/-1 2/-6 3/-1", "'2/-6' with vt -6; there are 5 vt lines before it",
     ),
-    "an index of 0": (QUAD + "f 0 1 2", "x.obj:9 has the corner '0'; it must be as 7, 7/3"),
+    "an index of 0": (QUAD + "f 0 1 2", "x.obj:9 has the corner '0'; it must look like 7, 7/3"),
     "a UV index of 0": (QUAD + "f 1/0 2/1 3/1", "the corner '1/0'"),
     "a word for an index": (QUAD + "f 1 2 x", "the corner 'x'"),
     "two numbers in one": (QUAD + "f 1 2 3-4", "the corner '3-4'"),
@@ -127,8 +127,8 @@ REFUSED = {
     "an index beyond 64 bits": (QUAD + "f 1 2 99999999999999999999", "the corner '9999999"),
     "an index that 64 bits wrap": (QUAD + "f 18446744073709551617 2 3", "the corner '18446"),
     "an index back beyond 64 bits": (QUAD + "f -99999999999999999999 2 3", "the corner '-99999"),
-    "two coordinates": ("v 0 0\n" + QUAD + FULL, "x.obj:1 has 2 numbers; v takes at least 3"),
-    "no coordinate": (QUAD + "vt\n" + FULL, "x.obj:9 has 0 numbers; vt takes at least 1"),
+    "two coordinates": ("v 0 0\n" + QUAD + FULL, "x.obj:1 has 2 numbers; v needs at least 3"),
+    "no coordinate": (QUAD + "vt\n" + FULL, "x.obj:9 has 0 numbers; vt needs at least 1"),
     "a comma": (QUAD + "v 1,5 0 0\n" + FULL, "x.obj:9 has '1,5'; v takes numbers"),
     "a hexadecimal number": (QUAD + "vn 0x1 0 0\n" + FULL, "has '0x1'; vn takes numbers"),
     "a line after one that goes on": (
@@ -166,7 +166,7 @@ def test_faces_without_uvs_lose_the_fabric_alone():
     scene = read_scene(CASES / "obj_face_without_vt/mixed.obj", fabric="linen_plain")
     [mesh] = scene.meshes
     assert mesh.material.tolist() == [1, 1, 0, 0]
-    assert "mixed.obj lacks UVs on 2 of 4 triangles, rendered grey" in scene.notes
+    assert "mixed.obj has no UVs on 2 of 4 triangles; they are rendered grey" in scene.notes
     assert uv_area(mesh) == pytest.approx(1)
 
 
@@ -218,7 +218,7 @@ def test_a_thousand_groups_are_a_thousand_meshes_of_their_own_points(tmp_path):
 
 
 def test_blocks_of_lines_meet_without_a_seam(tmp_path, monkeypatch):
-    monkeypatch.setattr("fabricusd.scene.files.obj.BLOCK", 40)
+    monkeypatch.setattr("fabricusd.scene.files.obj.BYTES_AT_ONCE", 40)
     text = QUAD + FULL + "f -4/-4 -3/-3 -2/-2\n" * 9
     [small] = read(tmp_path, text).pieces
     monkeypatch.undo()

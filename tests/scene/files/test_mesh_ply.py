@@ -86,7 +86,7 @@ def test_corners_have_uvs_of_their_own(tmp_path, form):
     path = tmp_path / "x.ply"
     scene = read_scene(path, fabric="linen_plain")
     assert scene.meshes[0].material.tolist() == [1, 1, 0]
-    assert "x.ply lacks UVs on 1 of 3 triangles, rendered grey" in scene.notes
+    assert "x.ply has no UVs on 1 of 3 triangles; they are rendered grey" in scene.notes
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -157,12 +157,15 @@ LITTLE = "binary_little_endian"
 
 REFUSED = {
     # what is wrong: (content, words)
-    "more vertices than bytes": (_text(vertices=10**9), "1000000000 of 'vertex', which take 6000"),
-    "more faces than bytes": (_text(faces=10**17), "of 'face', which take"),
+    "more vertices than bytes": (
+        _text(vertices=10**9), "1000000000 rows of 'vertex', which take at least 6000",
+    ),
+    "more faces than bytes": (_text(faces=10**17), "rows of 'face', which take"),
     "more vertices than lines": (_text(vertices=5, faces=0), "x.ply:15 has 5 numbers"),
-    "more faces than lines": (_text(faces=2), "says it has 2 of 'face'"),
+    "more faces than lines": (_text(faces=2), "says it has 2 rows of 'face'"),
     "more in binary": (
-        _text(10**15, 1, ROWS, LITTLE), "of 'vertex', which take 12000000000000000 bytes",
+        _text(10**15, 1, ROWS, LITTLE),
+        "rows of 'vertex', which take at least 12000000000000000 bytes",
     ),
     "a list longer than its line": (
         _text(rows="0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2\n"), "x.ply:15 says that list 'vertex_ind",

@@ -1,12 +1,12 @@
-"""The kinds of light, one file each, found by themselves.
+"""The kinds of light, one module each; every module in this folder is registered.
 
 A kind is a module with
 
-    KIND        its number, as in `scene.scene`
-    fill        (row, light, axes): its columns of a row, besides those that all lights share
-    irradiance  (row, dome, places): how brightly it lights these places, to share out samples
-    sample      (light, dome, begin, end, block): directions to it, a kernel, see `hit_block`
-    meet        (light, dome, size, block): what rays see of it, a kernel, see `ray_block`
+    KIND        the kind's number, as in `scene.light_kinds`
+    fill        (row, light, axes): fills the columns of a row that not all lights share
+    irradiance  (row, dome, places): how brightly the light lights these places
+    sample      (light, dome, begin, end, block): kernel that samples directions, see `hit_block`
+    meet        (light, dome, size, block): kernel that adds what rays see, see `ray_block`
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ def _find() -> dict[int, ModuleType]:
         if missing:
             raise ImportError(f"{module.__name__} has no {', '.join(missing)}")
         if module.KIND in found:
-            raise ImportError(f"{module.__name__} and {found[module.KIND].__name__} are one kind")
+            raise ImportError(
+                f"{module.__name__} and {found[module.KIND].__name__} have the same KIND"
+            )
         found[module.KIND] = module
     forgotten = [kind.name for number, kind in enumerate(light_kinds.KINDS) if number not in found]
     if forgotten:

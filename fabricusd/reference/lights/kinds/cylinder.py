@@ -1,4 +1,4 @@
-"""The outside of a cylinder along its frame's x; its ends are open."""
+"""A cylinder light along its frame's x that shines outwards; the cylinder's ends are open."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PI = R(math.pi)
 
 
 def fill(row: NDArray[np.float64], light: Light, axes: Axes) -> None:
-    """X is half the axis, Y and Z unit directions across it, SIZE the radius."""
+    """X is half the axis, Y and Z are unit directions across it, and SIZE is the radius."""
     x = 0.5 * light.height * axes.x
     put_axes(row, x, axes.y / axes.lengths[1], axes.z / axes.lengths[2])
     row[SIZE] = light.radius * float(np.mean(axes.lengths[1:]))
@@ -30,13 +30,13 @@ def fill(row: NDArray[np.float64], light: Light, axes: Axes) -> None:
 
 
 def irradiance(row: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]) -> float:
-    """As if it were seen from all sides alike."""
+    """Treats the cylinder as if it looked the same from all sides."""
     return mean_irradiance(row, places, one_sided=False)
 
 
 @njit(**PART)
 def sample(light, dome, begin, end, block):
-    """Directions to it for the hits `begin` to `end` of a block, see `hit_block`."""
+    """Sample directions to the light for hits `begin` to before `end`, see `hit_block`."""
     r = light[SIZE]
     for y in range(whole(begin), whole(end)):
         a, phi = R(2) * block[U0 + y] - R(1), R(2) * _PI * block[U1 + y]
@@ -55,7 +55,7 @@ def sample(light, dome, begin, end, block):
 
 @njit(**PART)
 def meet(light, dome, size, block):
-    """Add what `size` rays see of it, see `ray_block`."""
+    """Add what `size` rays see of the light, see `ray_block`."""
     xx, xy, xz = light[X], light[X + 1], light[X + 2]
     per_half2 = R(1) / (xx * xx + xy * xy + xz * xz)
     r2 = light[SIZE] * light[SIZE]

@@ -1,4 +1,4 @@
-"""An ellipse that shines along its frame's -z."""
+"""A disk light: an ellipse that shines along its frame's -z."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ _PI = R(math.pi)
 
 
 def fill(row: NDArray[np.float64], light: Light, axes: Axes) -> None:
-    """X and Y reach from the middle to the border."""
+    """X and Y are the half axes of the ellipse."""
     x, y = light.radius * axes.x, light.radius * axes.y
     put_axes(row, x, y, axes.normal)
     row[AREA] = math.pi * np.linalg.norm(np.cross(x, y))
 
 
 def irradiance(row: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]) -> float:
-    """Nothing behind it."""
+    """Zero behind the light."""
     return mean_irradiance(row, places, one_sided=True)
 
 
 @njit(**PART)
 def sample(light, dome, begin, end, block):
-    """Directions to it for the hits `begin` to `end` of a block, see `hit_block`."""
+    """Sample directions to the light for hits `begin` to before `end`, see `hit_block`."""
     for y in range(whole(begin), whole(end)):
         r, phi = math.sqrt(block[U0 + y]), R(2) * _PI * block[U1 + y]
         keep_flat(light, block, y, r * cos(R, phi), r * sin(R, phi))
@@ -43,5 +43,5 @@ def sample(light, dome, begin, end, block):
 
 @njit(**PART)
 def meet(light, dome, size, block):
-    """Add what `size` rays see of it, see `ray_block`."""
+    """Add what `size` rays see of the light, see `ray_block`."""
     meet_flat(light, True, size, block)

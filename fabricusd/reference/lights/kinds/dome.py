@@ -1,4 +1,4 @@
-"""All domes together: one picture around the scene."""
+"""The dome light: all domes of a scene, merged into one picture around it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from fabricusd.reference.lights.hit_block import (
     DX,
     DY,
     DZ,
-    FAR,
     LIGHT_B,
     LIGHT_G,
     LIGHT_R,
@@ -34,7 +33,6 @@ from fabricusd.reference.lights.ray_block import (
     D_X,
     D_Y,
     D_Z,
-    ENDLESS,
     FIRST,
     REACH,
     ROW,
@@ -44,6 +42,7 @@ from fabricusd.reference.lights.ray_block import (
     weight_of,
 )
 from fabricusd.reference.lights.row import CHANCE, LUMINANCE, VISIBLE, Axes
+from fabricusd.reference.rays.embree import ENDLESS, INFINITE_DISTANCE
 from fabricusd.scene.light_kinds import DOME
 from fabricusd.scene.scene import Light
 
@@ -52,7 +51,7 @@ R = np.float32
 
 
 def fill(row: NDArray[np.float64], light: Light, axes: Axes) -> None:
-    """Everything else lies in the `Dome`; a dome is always seen."""
+    """Make the dome visible to the camera; its other data lies in the `Dome`."""
     row[VISIBLE] = 1.0
 
 
@@ -66,13 +65,13 @@ def irradiance(row: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]
 
 @njit(**PART)
 def sample(light, dome, begin, end, block):
-    """Directions to it for the hits `begin` to `end` of a block, see `hit_block`."""
+    """Sample directions to the light for hits `begin` to before `end`, see `hit_block`."""
     chance = light[CHANCE]
     for y in range(whole(begin), whole(end)):
         j, down, i, along = choose_cell(dome, block[U0 + y], block[U1 + y])
         cell = dome.cells[j * dome.size[1] + i]
         block[LIGHT_R + y], block[LIGHT_G + y], block[LIGHT_B + y] = cell[0], cell[1], cell[2]
-        block[DISTANCE + y], block[PDF + y] = FAR, cell[DENSITY] * chance
+        block[DISTANCE + y], block[PDF + y] = INFINITE_DISTANCE, cell[DENSITY] * chance
         block[DX + y], block[DY + y], block[DZ + y] = R(j), down, R(i) + along
     for y in range(whole(begin), whole(end)):
         dx, dy, dz = direction_in(dome, block[DX + y], block[DY + y], block[DZ + y])
@@ -81,7 +80,7 @@ def sample(light, dome, begin, end, block):
 
 @njit(**PART)
 def meet(light, dome, size, block):
-    """Add what `size` rays see of it, see `ray_block`."""
+    """Add what `size` rays see of the light, see `ray_block`."""
     if dome.cells.shape[0] == 1:
         pdf = dome.cells[0, DENSITY] * light[CHANCE]
         red, green, blue = dome.cells[0, 0], dome.cells[0, 1], dome.cells[0, 2]

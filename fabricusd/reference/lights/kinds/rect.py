@@ -1,4 +1,4 @@
-"""A parallelogram that shines along its frame's -z."""
+"""A rect light: a parallelogram that shines along its frame's -z."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ R = np.float32
 
 
 def fill(row: NDArray[np.float64], light: Light, axes: Axes) -> None:
-    """X and Y reach from the middle to the border."""
+    """X and Y reach from the middle to the edges."""
     x, y = 0.5 * light.width * axes.x, 0.5 * light.height * axes.y
     put_axes(row, x, y, axes.normal)
     row[AREA] = 4 * np.linalg.norm(np.cross(x, y))
 
 
 def irradiance(row: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]) -> float:
-    """Nothing behind it."""
+    """Zero behind the light."""
     return mean_irradiance(row, places, one_sided=True)
 
 
 @njit(**PART)
 def sample(light, dome, begin, end, block):
-    """Directions to it for the hits `begin` to `end` of a block, see `hit_block`."""
+    """Sample directions to the light for hits `begin` to before `end`, see `hit_block`."""
     for y in range(whole(begin), whole(end)):
         a, b = R(2) * block[U0 + y] - R(1), R(2) * block[U1 + y] - R(1)
         keep_flat(light, block, y, a, b)
@@ -40,5 +40,5 @@ def sample(light, dome, begin, end, block):
 
 @njit(**PART)
 def meet(light, dome, size, block):
-    """Add what `size` rays see of it, see `ray_block`."""
+    """Add what `size` rays see of the light, see `ray_block`."""
     meet_flat(light, False, size, block)

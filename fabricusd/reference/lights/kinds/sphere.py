@@ -1,4 +1,4 @@
-"""A sphere that shines outwards."""
+"""A sphere light that shines outwards."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ _PI = R(math.pi)
 
 
 def fill(row: NDArray[np.float64], light: Light, axes: Axes) -> None:
-    """SIZE is the radius; of a frame that scales unevenly the mean counts."""
+    """SIZE is the radius; a frame that scales unevenly is replaced by its mean scale."""
     put_axes(row, axes.x, axes.y, axes.normal)
     row[SIZE] = light.radius * float(np.mean(axes.lengths))
     row[AREA] = 4 * math.pi * row[SIZE] ** 2
 
 
 def irradiance(row: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]) -> float:
-    """Seen from all sides alike."""
+    """The sphere looks the same from all sides."""
     return mean_irradiance(row, places, one_sided=False)
 
 
 @njit(**PART)
 def sample(light, dome, begin, end, block):
-    """Directions to it for the hits `begin` to `end` of a block, see `hit_block`."""
+    """Sample directions to the light for hits `begin` to before `end`, see `hit_block`."""
     cx, cy, cz = light[P], light[P + 1], light[P + 2]
     chance, radius2 = light[CHANCE], light[SIZE] * light[SIZE]
     for y in range(whole(begin), whole(end)):
@@ -65,7 +65,7 @@ def sample(light, dome, begin, end, block):
 
 @njit(**PART)
 def meet(light, dome, size, block):
-    """Add what `size` rays see of it, see `ray_block`."""
+    """Add what `size` rays see of the light, see `ray_block`."""
     radius2 = light[SIZE] * light[SIZE]
     for x in range(size):
         ax, ay, az = towards(light, block, x)
