@@ -178,9 +178,7 @@ def _relight(  # type: ignore[no-untyped-def]
         for j in range(2):
             if sets[k, j, 3] <= 0.0:
                 continue
-            a_i, b_i, s_i, a_o, b_o, s_o, u = along_set(
-                R, j, precision, wi[0], wi[1], wi[2], wo[0], wo[1], wo[2]
-            )
+            pair = along_set(R, j, precision, wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
             for kind in range(types):
                 # The thread under the centre speaks for its set where there is one.
                 weight = share[j, kind]
@@ -193,18 +191,15 @@ def _relight(  # type: ignore[no-untyped-def]
                         continue
                     middle, spread = sets[k, j, 8 + part], sets[k, j, 12 + part]
                     surface, volume = _stretch(
-                        R, tables, row, middle, spread, shapes[j, part],
-                        a_i, b_i, wi[2], s_i, a_o, b_o, wo[2], s_o, u,
-                    )  # fmt: skip
+                        R, tables, row, middle, spread, shapes[j, part], pair
+                    )
                     for channel in range(3):
                         value = surface + volume * sets[k, j, channel]
                         out[k, channel] += covered / q * value
 
 
 @njit(**KERNEL)
-def _stretch(  # type: ignore[no-untyped-def]
-    R, tables, row, middle, spread, shape, a_i, b_i, iz, s_i, a_o, b_o, oz, s_o, u
-):
+def _stretch(R, tables, row, middle, spread, shape, pair):  # type: ignore[no-untyped-def]
     """Surface and volume term of a thread whose angles have this mean, deviation and shape."""
     fewest = 3.0 * math.sqrt(3.0) * spread / row[GAMMA_SURFACE]
     kind = 0
@@ -216,11 +211,8 @@ def _stretch(  # type: ignore[no-untyped-def]
         angle = middle + spread * shape[kind, node]
         angle = min(max(angle, -0.5 * math.pi), 0.5 * math.pi)
         c, s = math.cos(angle), math.sin(angle)
-        surface, volume = segment(
-            R, int(row[MODEL]), row, tables.overlap_precision,
-            c, s, a_i, b_i, iz, a_o, b_o, oz,
-        )  # fmt: skip
-        p = seen_along(R, c, s, a_i, iz, s_i, a_o, oz, s_o, u) / nodes
+        surface, volume = segment(R, int(row[MODEL]), row, tables.overlap_precision, c, s, pair)
+        p = seen_along(R, c, s, pair) / nodes
         first += p * surface
         second += p * volume
     return first, second

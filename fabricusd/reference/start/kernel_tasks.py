@@ -14,10 +14,11 @@ import numpy as np
 from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.published.shares import published_mixture
 from fabricusd.appearance.published.tables import SurfaceTables, surface_tables
-from fabricusd.appearance.sampling.blocks import sample_points
+from fabricusd.appearance.sampling.blocks import Drawn, sample_points
 from fabricusd.appearance.sampling.fit import no_mixture
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
+from fabricusd.appearance.weave.place import Places
 from fabricusd.fabric import Fabric
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import Film
@@ -137,6 +138,11 @@ def _scratch() -> tuple[Any, ...]:
     return np.zeros(0, np.uint8), np.zeros(0, np.int32), real, real, real, real
 
 
+def _places() -> Places:
+    sets, threads, _, across, psi0, _ = _scratch()
+    return Places(sets, threads, psi0, across)
+
+
 @cache
 def _woven() -> tuple[CompiledFabric, Shadow]:
     fabric = Fabric()
@@ -152,20 +158,16 @@ def _look_up() -> None:
 
 
 def _sample_points() -> None:
-    sets, threads, _, across, psi0, _ = _scratch()
     hits, vectors = _sample().wave.hits, np.zeros((3, 0), np.float32)
     sample_points(
-        R, _cloth()[1].threads, no_mixture(R), False, sets, threads, psi0, across, vectors, vectors,
-        *hits[CHANCE : CHANCE + 3], vectors, hits[F_PDF], hits[GO_PDF], 0, 0,
+        R, _cloth()[1].threads, no_mixture(R), False, _places(), vectors, vectors,
+        tuple(hits[CHANCE : CHANCE + 3]), Drawn(vectors, hits[F_PDF], hits[GO_PDF]), 0, 0,
     )  # fmt: skip
 
 
 def _point_values() -> None:
-    sets, threads, _, across, psi0, _ = _scratch()
     vectors = np.zeros((3, 0), np.float32)
-    point_values(
-        R, _cloth()[1], False, sets, threads, psi0, across, vectors, vectors, vectors, 0, 0
-    )  # fmt: skip
+    point_values(R, _cloth()[1], False, _places(), vectors, vectors, vectors, 0, 0)
 
 
 def _finish_point() -> None:
