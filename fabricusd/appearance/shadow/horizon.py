@@ -16,7 +16,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.shadow.height import crown_of, steepest
+from fabricusd.appearance.shadow.height import Origin, crown_of, steepest
 from fabricusd.appearance.shadow.horizon_lookup import horizon_at
 from fabricusd.appearance.weave.compiled import CompiledFabric
 from fabricusd.appearance.weave.coverage import GAP
@@ -131,9 +131,10 @@ def _fill(cloth, rounded, highest, directions, cells, entries):
                         continue
                     crown = crown_of(np.float64, cloth, rounded, which, thread, w)
                     h = height_on(np.float64, cloth, thread, s, length) + crown
+                    origin = Origin(u, v, which, crown, h)
                     for a in range(azimuths):
                         k = steepest(
-                            cloth, rounded, highest, u, v, which, crown, h,
+                            cloth, rounded, highest, origin,
                             directions[a, 0], directions[a, 1], LOWEST, False,
                         )  # fmt: skip
                         sine = k / math.sqrt(1.0 + k * k) if k > LOWEST else 0.0
@@ -253,9 +254,8 @@ def _compare(cloth, rounded, highest, table, uv, angle, out):
             x, y = math.cos(angle[k]), math.sin(angle[k])
             crown = crown_of(np.float64, cloth, rounded, which, thread, w)
             h = height_on(np.float64, cloth, thread, s, length) + crown
-            slope = steepest(
-                cloth, rounded, highest, uv[k, 0], uv[k, 1], which, crown, h, x, y, LOWEST, False
-            )  # fmt: skip
+            origin = Origin(uv[k, 0], uv[k, 1], which, crown, h)
+            slope = steepest(cloth, rounded, highest, origin, x, y, LOWEST, False)
             sine = horizon_at(np.float64, cloth, table, uv[k, 0], uv[k, 1], which, x, y)
             out[k] = math.asin(min(1.0, sine)) - math.atan(slope)
 

@@ -24,7 +24,13 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.shadow.height import crown_of, highest_point, level_is_round, steepest
+from fabricusd.appearance.shadow.height import (
+    Origin,
+    crown_of,
+    highest_point,
+    level_is_round,
+    steepest,
+)
 from fabricusd.appearance.shadow.horizon import (
     AZIMUTHS,
     ELEVATIONS,
@@ -56,6 +62,7 @@ from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.curve import crest, peak
 from fabricusd.appearance.weave.lookup import find, height_on, lower_run, upper_run, wrap
+from fabricusd.appearance.weave.place import Hit
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, index
@@ -195,28 +202,28 @@ def _between_means(shadow, which, row, column, a, b):
 
 
 @njit(**INLINE)
-def shade(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
+def shade(R, cloth, shadow, u, v, hit, x, y, z):
     """The factor of the value at a point for light from (x, y, z); see the module's docstring.
 
     The arguments are those of `lit`.
     """
-    g = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
+    g = lit(R, cloth, shadow, u, v, hit, x, y, z)
     if shadow.method < HORIZON or not g > R(0):
         return g
-    return g / mean_lit(R, shadow, which, x, y, z)
+    return g / mean_lit(R, shadow, hit.thread_set, x, y, z)
 
 
 @njit(**INLINE)
-def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
+def lit(R, cloth, shadow, u, v, hit, x, y, z):
     """`g`: the share of light from direction (x, y, z) of the surface frame that reaches a point.
 
-    u, v : weave coordinates, float64
-    which, thread, s, w, length : what `weave.find` returns at (u, v)
+    u, v : weave coordinates, float64; hit : the `Hit` at (u, v)
 
     NaN in the arguments gives NaN, and never indexes a table.
     """
     flat = math.sqrt(x * x + y * y)
-    if not (s >= R(0) and flat < R(2) and z < R(2)):
+    which, thread = hit.thread_set, hit.thread
+    if not (hit.s >= R(0) and flat < R(2) and z < R(2)):
         return R(np.nan)
     if z <= R(0):
         return R(0)
@@ -227,7 +234,7 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
     if shadow.method == HORIZON:
         sine = horizon_at(R, cloth, shadow.table, u, v, which, x, y)
         return soft_edge(R, above_horizon(R, sine, flat, z), shadow.softness)
-    axis = height_on(R, cloth, thread, s, length)
+    axis = height_on(R, cloth, thread, hit.s, hit.length)
     if shadow.method == PEAK:
         # [Bisker2011] gives a place on the thread one height at every level, so threads are flat.
         drop = shadow.highest - axis - cloth.half_thickness[which, thread]
@@ -238,11 +245,11 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
         distance = R(_to_crest(cloth, shadow, u, v, float(drop / lowest)))
         reach = math.sqrt(drop * drop + distance * distance)
         return soft_edge(R, (z * distance - flat * drop) / reach, shadow.softness)
-    crown = crown_of(R, cloth, shadow.rounded, which, thread, w)
+    crown = crown_of(R, cloth, shadow.rounded, which, thread, hit.w)
+    origin = Origin(u, v, which, float(crown), float(axis + crown))
     slope = float(z) / float(flat)
     found = steepest(
-        cloth, shadow.rounded, float(shadow.highest), u, v,
-        which, float(crown), float(axis + crown),
+        cloth, shadow.rounded, float(shadow.highest), origin,
         float(x) / float(flat), float(y) / float(flat), slope, True,
     )  # fmt: skip
     return R(0) if found > slope else R(1)
@@ -356,7 +363,7 @@ def _one_by_one(R, cloth, shadow, shaded, uv, begin, wi, out):
         u, v = uv[begin + k, 0], uv[begin + k, 1]
         x, y, z = wi[0, begin + k], wi[1, begin + k], wi[2, begin + k]
         which, thread, s, w, _, length = find(R, cloth, u, v)
-        g = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
+        g = lit(R, cloth, shadow, u, v, Hit(which, thread, s, w, length), x, y, z)
         if shaded and shadow.method >= HORIZON and g > R(0):
             g /= mean_lit(R, shadow, which, x, y, z)
         out[k] = g

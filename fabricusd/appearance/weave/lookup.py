@@ -19,6 +19,7 @@ from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.bands import band_areas
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, coverage
+from fabricusd.appearance.weave.place import Places
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave
 from fabricusd.kernels.real import INLINE, KERNEL, PART, index
@@ -27,8 +28,8 @@ FARTHEST = 2.0**52
 """Weave coordinates beyond this have no fractional part in float64."""
 
 
-BLOCK = 512
-"""Number of places that a worker looks up at a time: their intermediate results stay in its
+_CHUNK = 512
+"""Number of places that a worker takes at a time: their intermediate results stay in its
 first-level cache."""
 
 
@@ -54,6 +55,11 @@ class WeaveHit(NamedTuple):
     height: NDArray[Any]
     crown: NDArray[Any]
     gap: NDArray[np.bool_]
+
+    @property
+    def places(self) -> Places:
+        """The hits as the kernels of the surface laws take them, in the precision of the lookup."""
+        return Places(self.set, self.thread, self.angle, self.across)
 
 
 @njit(**INLINE)
@@ -295,8 +301,8 @@ def split_block(R, cloth, uv, begin, cells, x, y):
 def find_all(R, cloth, uv, sets, threads, s, w, angle, length):
     """`find` at each of uv (n, 2) float64, into the (n,) arrays that follow."""
     n = uv.shape[0]
-    for b in prange((n + BLOCK - 1) // BLOCK):
-        begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
+    for chunk in prange((n + _CHUNK - 1) // _CHUNK):
+        begin, size = chunk * _CHUNK, min(_CHUNK, n - chunk * _CHUNK)
         cells = np.empty((4, size), np.int32)
         x, y = np.empty(size, s.dtype), np.empty(size, s.dtype)
         split_block(R, cloth, uv, begin, cells, x, y)

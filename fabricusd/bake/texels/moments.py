@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.shadow.methods import lit
 from fabricusd.appearance.weave.coverage import GAP, WARP
 from fabricusd.appearance.weave.lookup import crown_on, find, wrap
+from fabricusd.appearance.weave.place import Hit
 from fabricusd.bake.texels.angle_rows import HEIGHTS, STEPS
 from fabricusd.bake.texels.moment_indices import (
     AZIMUTHS,
@@ -141,7 +142,7 @@ def _add(made, u, v, out):  # type: ignore[no-untyped-def]
     out[HEIGHT] += length * rise + lift
     if made.light[2] > R(0):
         out[LIT] += lit(
-            R, made.cloth, made.shadow, u, v, which, thread, s, w, length,
+            R, made.cloth, made.shadow, u, v, Hit(which, thread, s, w, length),
             made.light[0], made.light[1], made.light[2],
         )  # fmt: skip
     _add_horizon(made, u, v, which, out)

@@ -62,7 +62,7 @@ def _repeat(fabric: Fabric, warp: bool) -> range:
 
 
 def _place_on_thread(on_top: list[bool], crossing: float, along: float) -> tuple[float, float]:
-    """(s, length in cells) of the visible run at `along`; crossing thread k covers k + 1/2 +- crossing/2.
+    """(s, length in cells) of the run at `along`; crossing thread k covers k + 1/2 +- crossing/2.
 
     What is seen of a thread is cut up by the threads that lie over it; the pieces that hold a cell
     where it is on top are runs. All other pieces of a hidden run are put together to one.
