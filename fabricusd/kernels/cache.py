@@ -19,8 +19,8 @@ from fabricusd.cache import KERNELS, cache_folder
 from fabricusd.kernels.internals import use_internals
 
 PACKAGE = Path(__file__).resolve().parents[1]
-FOLDERS = ("kernels", "appearance", "scene", "run", "reference", "bake")
-"""Folders of the package whose modules contain kernels, or constants that kernels read."""
+FOLDERS = ("kernels", "appearance", "scene", "run", "reference", "bake", "geometry")
+"""Folders of the package whose modules hold kernels, or constants that kernels read."""
 
 
 def sources(package: Path = PACKAGE) -> list[Path]:

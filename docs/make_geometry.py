@@ -1,0 +1,177 @@
+"""Write docs/geometry.md: the cloth's laws against tubes, from the shipped tables.
+
+python docs/make_geometry.py
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fabricusd.appearance import surface
+from fabricusd.errors import FabricError
+from fabricusd.fabric import Fabric
+from fabricusd.geometry import tubes
+from fabricusd.geometry.judge import judge
+from fabricusd.geometry.tables import (
+    AZIMUTHS,
+    COUNT,
+    PAIRS,
+    POLAR,
+    SHADES,
+    SKY_COUNT,
+    Table,
+    conserving,
+    table,
+    table_names,
+    views,
+)
+from fabricusd.schema import load, preset_names
+
+HERE = Path(__file__).resolve().parent
+SHOWN = (0.0, 45.0, 75.0, 85.0)
+
+HEAD = """# Geometry: what the laws are judged by
+
+Made by `make docs` (`python docs/make_geometry.py`) from the tables in `fabricusd/geometry/data`,
+which `python -m fabricusd.geometry.tables` remakes.
+
+The repeat is built as elliptical tubes and traced. Threads are the bands of
+`appearance.weave.bands`; the tangent curve lies once over each run that is seen, a cubic joins the
+runs underneath; sections are as high as threads that cross leave room. Volume light leaves a
+thread anywhere on its lit side, surface light at the mirror of where it came in. Published threads
+reflect more than they get, so their light scatters once; `conserving` threads let it go on until
+it leaves.
+"""
+
+LAW = """## The law of each preset at level `far`
+
+{pairs} pairs of directions a preset, {count} paths each: a third anywhere within 80° of the
+normal, a third near the mirror direction, a third lit from 3 to 15° above the cloth. *error* is
+the mean absolute difference over the tubes' mean, *bias* the mean difference, ΔE the CIE 2000
+difference of colours in which a white diffuser that faces the light is 1. *held out* is over the
+third of the pairs that nothing is fitted to.
+
+The last four columns are the tubes' own uncertainty: the noise, and how far their values move (mean
+absolute change over mean) when surface light leaves anywhere, when sections are .7 as high, and
+when light goes by the width that a thread shows.
+
+| preset | held out: error | bias | ΔE | all: error | ΔE | grazing | noise | exit | height | width |
+|---|---|---|---|---|---|---|---|---|---|---|"""
+
+SKY = """
+## A white sky
+
+Reflected of a white sky by the preset as it is, brightest channel, mean over azimuths of
+{azimuths}; tubes against the law. Tubes: {count} paths a view, standard error below {error:.3f}.
+
+| preset | {columns} |
+|---|{rule}"""
+
+SHARES = """
+## `conserving` threads
+
+Reflected, transmitted and passed by the gap, of a white sky, with the preset's threads in
+`conserving` at A = {shades}: first after one scattering, then after all, then the law. *lost* ends
+where tubes overlap, and on velvet's backing.
+
+| preset | angle | gap | once R | once T | R | T | law R | law T | lost |
+|---|---|---|---|---|---|---|---|---|---|"""
+
+REFUSED = """
+## What has no geometry
+
+| preset | why |
+|---|---|"""
+
+
+def law_row(name: str, found: Table) -> str:
+    """One preset's law against its tubes."""
+    value = surface.evaluate(load(name), found.wi, found.wo, level="far")
+    held, whole = judge(found, value), judge(found, value, np.ones(len(value), bool))
+    grazing = judge(found, value, np.arange(len(value)) % 3 == 2)
+    return (
+        f"| {name} | {held.error:.2f} | {held.bias:+.2f} | {held.delta_e:.1f} | {whole.error:.2f} "
+        f"| {whole.delta_e:.1f} | {grazing.error:.2f} | {whole.noise:.3f} "
+        f"| {float(found.exit):.2f} | {float(found.height):.2f} | {float(found.width):.2f} |"
+    )
+
+
+def by_angle(values: np.ndarray) -> np.ndarray:
+    """(polar, ...) means over the azimuths of a table's views."""
+    return values.reshape(-1, len(AZIMUTHS), *values.shape[1:]).mean(axis=1)
+
+
+def hemisphere(rings: int = 24, azimuths: int = 48) -> np.ndarray:
+    """(k, 3) directions above the cloth, each for the same solid angle."""
+    z = (np.arange(rings) + 0.5) / rings
+    turn = 2 * np.pi * (np.arange(azimuths) + 0.5) / azimuths
+    z, turn = (x.ravel() for x in np.meshgrid(z, turn, indexing="ij"))
+    r = np.sqrt(1 - z * z)
+    return np.stack((r * np.cos(turn), r * np.sin(turn), z), axis=1)
+
+
+def law_shares(fabric: Fabric, side: int, seen: np.ndarray) -> np.ndarray:
+    """(v, 3) of a white sky at `far` from `seen` (v, 3): from its side (1), from the other (-1)."""
+    sky = hemisphere() * (1, 1, side)
+    return np.array(
+        [
+            surface.evaluate(fabric, sky, np.tile(wo, (len(sky), 1))).mean(axis=0) * 2 * np.pi
+            for wo in seen
+        ]
+    )
+
+
+def share_rows(name: str, found: Table) -> list[str]:
+    """One preset's `conserving` shares, a row an angle and shade."""
+    fabric = conserving(load(name))
+    shown = views().reshape(len(POLAR), -1, 3)[[POLAR.index(a) for a in SHOWN]].reshape(-1, 3)
+    law = [by_angle(law_shares(fabric, side, shown)) for side in (1, -1)]
+    columns = [by_angle(x) for x in (found.once_up, found.once_down, found.up, found.down)]
+    gap, lost = by_angle(found.gap), by_angle(found.lost)
+    rows = []
+    for row, angle in enumerate(SHOWN):
+        k = POLAR.index(angle)
+        values = [x[k] for x in columns] + [x[row] for x in law]
+        cells = [" / ".join(f"{v:.2f}" for v in x) for x in values]
+        rows.append(
+            f"| {name} | {angle:g}° | {gap[k]:.3f} | {' | '.join(cells)} | {lost[k, 0]:.3f} |"
+        )
+    return rows
+
+
+def main() -> None:
+    """Write the page."""
+    found = {name: table(name) for name in table_names()}
+    lines = [HEAD, LAW.format(pairs=PAIRS, count=COUNT)]
+    lines += [law_row(name, t) for name, t in found.items()]
+    error = max(float(t.sky_error.max()) for t in found.values())
+    columns = " | ".join(f"{p:g}°" for p in POLAR)
+    lines.append(
+        SKY.format(
+            azimuths=", ".join(f"{a:g}°" for a in AZIMUTHS), count=SKY_COUNT, error=error + 5e-4,
+            columns=columns, rule="---|" * len(POLAR),
+        )
+    )  # fmt: skip
+    for name, t in found.items():
+        truth, law = by_angle(t.sky), by_angle(law_shares(load(name), 1, views()))
+        brightest = truth.mean(axis=0).argmax()
+        cells = [
+            f"{a:.2f} {b:.2f}" for a, b in zip(truth[:, brightest], law[:, brightest], strict=True)
+        ]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    lines.append(SHARES.format(shades=", ".join(f"{s:g}" for s in SHADES)))
+    for name, t in found.items():
+        lines += share_rows(name, t)
+    lines.append(REFUSED)
+    for name in sorted(set(preset_names()) - set(found)):
+        try:
+            tubes(load(name))
+        except FabricError as reason:
+            lines.append(f"| {name} | {reason} |")
+    (HERE / "geometry.md").write_text("\n".join(lines) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main()
