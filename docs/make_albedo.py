@@ -1,4 +1,4 @@
-"""Write docs/albedo.md: how much of a white sky each preset sends back, and the safe albedos.
+"""Write docs/albedo.md: the share of a white sky that each preset reflects, and its safe albedo.
 
 python docs/make_albedo.py
 """
@@ -37,7 +37,7 @@ For `conserving`, the value is reflection plus transmission, including multiple 
 
 
 def uniform_model(fabric: Fabric, model: str) -> Fabric:
-    """`fabric` with every thread in one model."""
+    """`fabric` with the same model for every thread."""
     threads = {name: replace(t, model="") for name, t in fabric.threads.items()}
     return replace(fabric, model=model, threads=threads, back=None)
 
@@ -60,7 +60,7 @@ def conserving(fabric: Fabric) -> list[float]:
 
 
 def row(name: str, values: list[float], safe: str) -> str:
-    """One line of a table."""
+    """One row of a table."""
     return f"| {name} | " + " | ".join(f"{v:.3f}" for v in values) + f" | {safe} |"
 
 

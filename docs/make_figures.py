@@ -1,4 +1,4 @@
-"""Write the figures of docs/appearance.md: threads and cylinders in polar plots, radius in decades.
+"""Draw the figures of docs/appearance.md: threads and cylinders in polar plots, radius in decades.
 
 python docs/make_figures.py
 """
@@ -29,13 +29,13 @@ WRAPS = {"vertical": 0.0, "diagonal": 45.0, "horizontal": 90.0}
 
 
 def decades(value: np.ndarray) -> np.ndarray:
-    """Radius of a value: its decade above the floor, 0 at and below it."""
+    """Radius of a value: its decades above the floor, and 0 at or below the floor."""
     floor, _ = DECADES
     return np.maximum(np.log10(np.maximum(value, 1e-12)) - floor, 0.0)
 
 
 def polar(axes: plt.Axes, title: str) -> None:
-    """A half disc with decades as rings."""
+    """Draw a half disc with a ring for each decade."""
     floor, top = DECADES
     axes.set_theta_zero_location("N")
     axes.set_theta_direction(-1)
@@ -51,7 +51,7 @@ def polar(axes: plt.Axes, title: str) -> None:
 
 
 def thread_plots() -> None:
-    """Each preset's threads in the plane of incidence, mean of the channels of f_s."""
+    """Draw f_s of each preset's threads in the plane of incidence, as the mean of the channels."""
     figure = plt.figure(figsize=(12, 3.6))
     view = np.radians(np.linspace(-89, 89, 713))
     wo = np.stack((np.sin(view), np.zeros_like(view), np.cos(view)), axis=-1)
@@ -74,12 +74,12 @@ def thread_plots() -> None:
 
 
 def cylinder(fabric: Fabric, wrap: float, lights: np.ndarray) -> np.ndarray:
-    """(lights, places) radiance across a cylinder's visible half, for a distant light each [rad].
+    """(lights, places) radiance across the visible half of a cylinder, per distant light [rad].
 
-    The cylinder's axis stands upright, the viewer looks along its normal plane, the light goes
-    round it in that plane; at `wrap` 0 degrees the warp runs along the axis.
+    The axis of the cylinder is upright. The viewer looks along its normal plane, and the light
+    goes round it in that plane. At `wrap` 0 degrees the warp runs along the axis.
     """
-    # Midpoints in the projected width of the visible half.
+    # Midpoints of equal parts of the projected width of the visible half.
     place = np.arcsin((np.arange(181) + 0.5) / 181 * 2 - 1)
     turn = math.radians(wrap)
     profile = np.empty((len(lights), len(place)))
@@ -98,7 +98,7 @@ def cylinder(fabric: Fabric, wrap: float, lights: np.ndarray) -> np.ndarray:
 
 
 def cylinder_plots() -> None:
-    """Each preset on a cylinder, wrapped three ways, against the angle between light and viewer."""
+    """Draw each preset on a cylinder, wrapped three ways, by the angle between light and viewer."""
     figure = plt.figure(figsize=(12, 3.4))
     lights = np.radians(np.linspace(-88, 88, 89))
     for column, name in enumerate(PRESETS):

@@ -1,4 +1,6 @@
-"""Render the samples' pictures of docs/path_tracer.md: python docs/make_pictures.py [--spp N]."""
+"""Render the pictures of the samples for docs/path_tracer.md.
+
+python docs/make_pictures.py [--spp N]"""
 
 from __future__ import annotations
 
@@ -18,7 +20,7 @@ SIZES = {"cylinders": (432, 240), "skirt": (288, 384), "drape": (432, 324)}
 
 
 def main() -> None:
-    """Make the pictures named, or all."""
+    """Render the pictures that are named, or all of them."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", default=list(SIZES))
     parser.add_argument("--spp", type=int, default=96)

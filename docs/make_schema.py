@@ -21,7 +21,7 @@ TYPES = (
 
 
 def table(name: str) -> list[str]:
-    """One row for each property of one schema type."""
+    """A table with a row for each property of a schema type."""
     registry = Usd.SchemaRegistry()
     definition = registry.FindConcretePrimDefinition(name)
     definition = definition or registry.FindAppliedAPIPrimDefinition(name)

@@ -1,8 +1,8 @@
 """What fabricusd keeps on disk to save time: compiled kernels, and tables that take long to make.
 
-Everything lies below one folder of the user, `FABRICUSD_CACHE_DIR` or the platform's cache folder,
-as `KIND/KEY/...`. A key names everything that its content depends on, so nothing in the cache is
-ever out of date; it is only no longer asked for. Losing all of it costs time and nothing else.
+Everything lies below one folder of the user's, `FABRICUSD_CACHE_DIR` or the platform's cache
+folder, as `KIND/KEY/...`. A key names everything that its content depends on, so an entry is never
+out of date; at most, nobody asks for it any more. Losing the whole cache costs time, nothing else.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ VARIABLE = "FABRICUSD_CACHE_DIR"
 KERNELS = "kernels"
 
 MOST_BYTES = 1 << 30
-"""Size above which the entries that were used least recently are removed: some 20 versions."""
+"""Size above which the least recently used entries are removed: room for some 20 versions."""
 
 KEPT_SECONDS = 24 * 3600.0
-"""Entries used within that time are never removed to make room: a running process may need them."""
+"""An entry used within this time is not removed to make room: a running process may need it."""
 
 _USED = ".used"
-"""File in an entry whose time tells when the entry was last asked for."""
+"""File in each entry; its modification time says when the entry was last asked for."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
     """One KIND/KEY of the cache.
 
-    used : seconds since the epoch when it was last asked for
+    used : when it was last asked for, in seconds since the epoch
     """
 
     kind: str
@@ -64,22 +64,22 @@ def root() -> Path:
 
 
 def cache_folder(kind: str, key: str) -> Path:
-    """The folder of an entry, made if need be, and marked as used now.
+    """The folder of an entry, created if necessary and marked as used now.
 
-    Making a new one first removes old entries, so that the cache stays below MOST_BYTES.
+    Before it creates an entry, old entries are removed to keep the cache below MOST_BYTES.
     """
     folder = root() / kind / key
     if not folder.is_dir():
         prune()
         folder.mkdir(parents=True, exist_ok=True)
-    # A cache that cannot be written still serves.
+    # A cache that cannot be written can still be read.
     with suppress(OSError):
         (folder / _USED).touch()
     return folder
 
 
 def entries() -> list[Entry]:
-    """All entries, the one used least recently first."""
+    """All entries, least recently used first."""
     found = []
     for kind in _folders(root()):
         for folder in _folders(kind):
@@ -91,7 +91,7 @@ def entries() -> list[Entry]:
 
 
 def prune(most: int = MOST_BYTES, now: float | None = None) -> list[Entry]:
-    """Remove the entries used least recently until at most `most` bytes are left; returns them."""
+    """Remove the least recently used entries until at most `most` bytes are left; return those."""
     now = time.time() if now is None else now
     known = entries()
     total = sum(entry.size for entry in known)
@@ -108,7 +108,7 @@ def prune(most: int = MOST_BYTES, now: float | None = None) -> list[Entry]:
 
 
 def clear() -> list[Entry]:
-    """Remove every entry; returns them."""
+    """Remove every entry; return what was removed."""
     known = entries()
     for entry in known:
         _remove(entry)

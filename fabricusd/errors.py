@@ -1,4 +1,4 @@
-"""The one exception that a caller of fabricusd has to catch, and what makes it of all others."""
+"""The one exception that a caller of fabricusd has to catch, and how other errors become it."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 BUGS = (TypeError, LookupError, AttributeError, AssertionError, NameError, ArithmeticError)
-"""What a program that is wrong raises. Readers of damaged files raise these too, but should have
-said what is damaged."""
+"""Exceptions that mean a bug in the program. Readers raise them for damaged files too, but should
+have said what is damaged."""
 
 REPORT = "fabricusd did not expect this: please report it with the file"
-"""What is added to an error that only a reader's bug explains."""
+"""Added to an error that only a bug in a reader explains."""
 
 
 def one_line(text: str, longest: int = 600) -> str:
-    """`text` on one line of at most `longest` characters, `?` for what would not print.
+    """`text` on one line of at most `longest` characters, with `?` for unprintable characters.
 
-    What libraries say of a damaged file holds line ends and bytes of that file.
+    Libraries quote a damaged file in their messages, line ends and raw bytes included.
     """
     line = "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
     return line if len(line) <= longest else line[: longest - 3] + "..."
 
 
 class FabricError(ValueError):
-    """Input that cannot be used: where it is, what it holds, what would be accepted.
+    """Unusable input: where it is, what it holds, what would be accepted.
 
-    Commands print it as one line and leave with status 2.
+    Commands print it as one line and exit with status 2.
     """
 
     def __init__(self, where: str, problem: str) -> None:
@@ -40,29 +40,33 @@ class FabricError(ValueError):
         super().__init__(f"{where} {problem}" if where else problem)
 
     def inside(self, where: str) -> FabricError:
-        """The same problem, with `where` put before its place."""
+        """The same problem, its place prefixed by `where`."""
         return FabricError(f"{where} {self.where}".strip(), self.problem)
+
+
+class FabricWarning(UserWarning):
+    """Input that is used, though not all of it as it stands: one line, as of a `FabricError`."""
 
 
 @contextmanager
 def reading(source: object, kind: str) -> Iterator[None]:
-    """Turn whatever a reader raises in the block into a FabricError with the file's name.
+    """Turn whatever a reader raises in the block into a FabricError that names the file.
 
-    source : the file, or what else is read; kind : what it is read as, "a WIF draft"
+    source : the file, or whatever else is read; kind : what it is read as, such as "a WIF draft"
 
-    A FabricError goes through as it is. Warnings that the caller has made errors go through too:
-    they are not the file's. What raised it is the FabricError's `__cause__`, which FABRICUSD_DEBUG
-    shows.
+    A FabricError passes through unchanged. So do a missing library and a warning that the caller has
+    turned into an error: neither is the file's fault. The original exception is the `__cause__`,
+    which FABRICUSD_DEBUG shows.
     """
     try:
         yield
-    except (FabricError, Warning):
+    except (FabricError, ImportError, Warning):
         raise
     except OSError as error:
         problem = f"cannot be read: {error.strerror or described(error)}"
         raise FabricError(_name(source), problem) from error
     except MemoryError as error:
-        problem = f"cannot be read as {kind}: there is not memory enough for it"
+        problem = f"cannot be read as {kind}: there is not enough memory for it"
         raise FabricError(_name(source), problem) from error
     except RecursionError as error:
         problem = f"cannot be read as {kind}: it is nested too deeply"
@@ -75,7 +79,7 @@ def reading(source: object, kind: str) -> Iterator[None]:
 
 
 def reads(kind: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """`reading` for a whole function, whose first text or path is the file."""
+    """`reading` around a whole function, whose first string or path argument is the file."""
 
     def decorate(read: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(read)
@@ -99,7 +103,7 @@ def described(error: BaseException) -> str:
 
 
 def debugging() -> bool:
-    """Whether FABRICUSD_DEBUG asks for tracebacks besides the one line."""
+    """Whether FABRICUSD_DEBUG asks for a traceback in addition to the one line."""
     return os.environ.get("FABRICUSD_DEBUG", "0") not in ("", "0")
 
 

@@ -1,7 +1,7 @@
 """What a woven fabric is: threads, the tangent curve along them, the weave, the thread sets.
 
-Plain immutable values in SI units and radians, with no USD in them. `fabricusd.schema` reads
-and writes them; `fabricusd.appearance` compiles them. Conventions: MODEL, sections 1 and 3
+Plain immutable values in SI units and radians, independent of USD. `fabricusd.schema` reads and
+writes them; `fabricusd.appearance` compiles them. Conventions are those of MODEL, sections 1 and 3
 (`docs/model.md`): end `i` counts along +U, pick `j` along +V, both from 0; warp runs along V.
 """
 
@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from fabricusd.errors import FabricError
 
 MODELS = ("thesis", "microcylinder", "conserving")
-"""Thread scattering models, each a module of that name in `appearance/scattering/models`; they are
-the schema's tokens. A model's number is its place here, so new ones go to the end."""
+"""Thread scattering models; each is a module of that name in `appearance/scattering/models` and a
+token of the schema. A model's number is its index here, so new models are appended."""
 
 DEFAULT_MODEL = "microcylinder"
 PILE_ANGLE = math.radians(85.0)
-"""A curve steeper than this stands up from the cloth and has no height field."""
+"""A curve steeper than this is pile: it stands up from the cloth and has no height field."""
 
 DEGREE = math.pi / 180.0
 
@@ -93,9 +93,9 @@ def _require_limits(owner: Any) -> None:
 class TangentCurve:
     """Tangent angle against position along one visible run of a thread.
 
-    positions : (n,) float, n >= 2 - never decreasing; two equal positions are a jump. Only their
-        proportions count: the whole curve is laid once over every run of equal cells.
-    angles : (n,) float - tangent angle psi0 [rad], from -pi/2 to pi/2, positive leaning the
+    positions : (n,) float, n >= 2 - never decreasing; two equal positions make a jump. Only their
+        proportions matter: each run of equal cells is spanned by the whole curve once.
+    angles : (n,) float - tangent angle psi0 [rad], from -pi/2 to pi/2; a positive angle leans the
         thread's normal forward along its axis. Linear between the points.
 
     Source: [Bisker2011] section 5.2.1.
@@ -110,7 +110,7 @@ class TangentCurve:
         p, a = self.positions, self.angles
         if len(p) != len(a):
             raise FabricError(
-                "curve", f"has {len(p)} positions and {len(a)} angles; there must be as many"
+                "curve", f"has {len(p)} positions and {len(a)} angles; it must have as many of each"
             )
         if len(p) < 2:
             raise FabricError("curve", f"has {len(p)} points; it must have at least 2")
@@ -119,7 +119,8 @@ class TangentCurve:
                 raise FabricError(f"curve position {k}", f"is {x}; it must be finite")
             if k and x < p[k - 1]:
                 raise FabricError(
-                    f"curve position {k}", f"is {x}; it must be at least the one before, {p[k - 1]}"
+                    f"curve position {k}",
+                    f"is {x}; it must be at least {p[k - 1]}, the position before it",
                 )
         if not p[-1] > p[0]:
             raise FabricError("curve", f"spans {p[0]} to {p[-1]}; it must have a length above 0")
@@ -132,7 +133,7 @@ class TangentCurve:
 
     @classmethod
     def from_lengths(cls, angles: Iterable[float], lengths: Iterable[float]) -> TangentCurve:
-        """From tangent angles [rad] and the lengths *between* them, as the literature prints it."""
+        """A curve from tangent angles [rad] and the lengths *between* them, as papers print it."""
         steps = [float(x) for x in lengths]
         if any(not x >= 0 for x in steps):
             raise FabricError("curve length", f"is {min(steps)}; it must be at least 0")
@@ -151,17 +152,17 @@ class TangentCurve:
 
 @dataclass(frozen=True, kw_only=True)
 class Thread:
-    """One type of thread: how it scatters, how thick it is, how it bends where it is on top.
+    """A type of thread: how it scatters, how thick it is, how it bends where it is on top.
 
-    albedo : (3,) float - MODEL's `A`, linear Rec. 709; an albedo only in the `conserving` model
+    albedo : (3,) float - MODEL's `A`, linear Rec. 709; a true albedo only in the `conserving` model
     ior : float - `eta`, at least 1
-    isotropic : float - `kd`, share of volume scattering without a direction, 0 to 1
+    isotropic : float - `kd`, isotropic share of the volume scattering, 0 to 1
     gamma_surface, gamma_volume : float - lobe standard deviations `gs`, `gv` [rad]
     surface_gain : float - `ks`, factor on the surface reflectance (`conserving` only)
-    thickness : float - visible width [m]; 0 where it is not known
+    thickness : float - visible width [m]; 0 if unknown
     curve : TangentCurve
-    model : str - one of MODELS, or "" for the fabric's
-    color : (3,) float - as a draft draws it, linear Rec. 709; rendering does not use it
+    model : str - one of MODELS, or "" for that of the fabric
+    color : (3,) float - its colour in a draft, linear Rec. 709; rendering does not use it
     documentation : str - where the numbers come from
     """
 
@@ -197,8 +198,8 @@ class Weave:
     """Which thread is on top at each crossing.
 
     cells : (m, n) bool - `cells[i, j]` is True where end `i` (along +U) lies over pick `j`
-        (along +V). A copy is kept, read-only; of an array that is so already, itself.
-    name : str - how it was made, for people: "satin 5 step 2", "8452.wif"
+        (along +V). Stored as a read-only copy, or as it is if the array is already read-only.
+    name : str - how it was made, for people to read: "satin 5 step 2", "8452.wif"
     """
 
     cells: NDArray[np.bool_]
@@ -244,24 +245,24 @@ class Weave:
 
     @cached_property
     def _hash(self) -> int:
-        # Kept, as are the shares: a jacquard of 4096 threads each way has 16 million cells.
+        # Cached, like the shares below: a 4096 x 4096 jacquard has 16 million cells.
         return hash((self.cells.shape, self.cells.tobytes(), self.name))
 
     @cached_property
     def shares_on_top(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(m,) share of each end's cells where it is on top, (n,) that of each pick's."""
+        """(m,) and (n,): the share of each end's, and of each pick's, cells where it is on top."""
         return self.cells.mean(axis=1), 1.0 - self.cells.mean(axis=0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ThreadSet:
-    """The warp or the weft: which thread each place takes, how close they lie, what they cover.
+    """The warp or the weft: the order of its threads, how close they lie, what they cover.
 
-    sequence : (k,) int - indices into `Fabric.threads`, repeated without end: end `i` of the cloth
-        is `sequence[i % k]`
+    sequence : (k,) int - indices into `Fabric.threads`, repeated across the cloth: end `i` has the
+        thread `sequence[i % k]`
     density : float - threads per metre
-    coverage : float or None - share `a` of the cloth's area that the set covers, None to derive it
-        from the weave and the threads' thickness
+    coverage : float or None - share `a` of the cloth's area that the set covers; None derives it
+        from the weave and the thickness of the threads
     """
 
     sequence: tuple[int, ...] = (0,)
@@ -279,7 +280,7 @@ class ThreadSet:
 
     @property
     def pitch(self) -> float:
-        """Distance from one thread to the next [m]."""
+        """Distance between the middles of neighbouring threads [m]."""
         return 1.0 / self.density
 
 
@@ -287,14 +288,14 @@ class ThreadSet:
 class Fabric:
     """A woven fabric.
 
-    threads : name -> Thread, in the order that `ThreadSet.sequence` counts
+    threads : name -> Thread, in the order in which `ThreadSet.sequence` counts them
     weave : Weave
     warp, weft : ThreadSet - warp runs along V, weft along U
-    model : str - one of MODELS, for every thread that names none
-    opaque : bool - no light passes: cloth with a backing, or pile
+    model : str - one of MODELS, for every thread that does not name one
+    opaque : bool - whether it lets no light through: cloth with a backing, or pile
     masking_width : float - standard deviation of `u`, the correlation of shadowing and masking in
         azimuth [rad]; 20 degrees in [Sadeghi2013]
-    back : Fabric or None - the other side where it is a fabric of its own; None mirrors this one
+    back : Fabric or None - the other side, if it is a fabric of its own; None mirrors this one
     documentation : str - where the numbers come from
     """
 
@@ -323,7 +324,7 @@ class Fabric:
                 if not 0 <= index < len(self.threads):
                     raise FabricError(
                         f"{label} thread {k}",
-                        f"is {index}; it must be from 0 to {len(self.threads) - 1}, "
+                        f"is {index}; it must be from 0 to {len(self.threads) - 1}, since "
                         f"the fabric has {len(self.threads)} thread(s)",
                     )
         total = (self.warp.coverage or 0.0) + (self.weft.coverage or 0.0)
@@ -332,7 +333,9 @@ class Fabric:
                 "coverage", f"of warp and weft together is {total:.6g}; it must be at most 1"
             )
         if self.back is not None and self.back.back is not None:
-            raise FabricError("back", "names a fabric that has a back itself; it must have none")
+            raise FabricError(
+                "back", "names a fabric that has a back of its own; it must name one that has none"
+            )
 
     @property
     def thread_list(self) -> tuple[Thread, ...]:
@@ -349,15 +352,15 @@ class Fabric:
 
 @dataclass(frozen=True, kw_only=True)
 class Binding:
-    """How a fabric lies on a mesh: which UVs, at which scale, turned and shifted by how much.
+    """How a fabric lies on a mesh: by which UVs, at which scale, with which rotation and offset.
 
     fabric : Fabric
     uv_set : str - name of the texture coordinate primvar
     metres_per_uv : float - length of one UV unit on the cloth [m]; 0 to measure it from the mesh
-    threads_per_uv : (2,) float - (ends per unit of u, picks per unit of v); where they are not 0
-        they take precedence over `metres_per_uv`
+    threads_per_uv : (2,) float - (ends per unit of u, picks per unit of v); if not 0, they take
+        precedence over `metres_per_uv`
     rotation : float - of the grain, from the mesh's u axis to the weft, counter-clockwise [rad]
-    offset : (2,) float - in UV units, added after the rotation
+    offset : (2,) float - in units of UV, added after the rotation
     """
 
     fabric: Fabric
@@ -379,11 +382,11 @@ class Binding:
     ) -> NDArray[np.float64]:
         """(n, 2) UV -> (n, 2) float64 weave coordinates in threads: (ends along U, picks along V).
 
-        `metres_per_uv` is the mesh's measured scale, used where the binding states none.
+        `metres_per_uv` is the scale measured on the mesh; it is used if the binding states none.
         """
         c, s = math.cos(self.rotation), math.sin(self.rotation)
         uv = np.asarray(uv, np.float64)
-        # Turning the grain by +rotation is reading the weave at the UV turned by -rotation.
+        # To turn the grain by +rotation, read the weave at the UV turned by -rotation.
         u = c * uv[..., 0] + s * uv[..., 1] + self.offset[0]
         v = -s * uv[..., 0] + c * uv[..., 1] + self.offset[1]
         scale_u, scale_v = self.threads_per_uv

@@ -14,27 +14,27 @@ from functools import cache
 _MARK = ".partial-"
 
 _OWNED = re.compile(r"\..*\.partial-([0-9a-f]{8})-([0-9]+)-([0-9]+)-")
-"""A partial file's name: whose machine, process, and start of that process it is."""
+"""Name of a partial file: its machine, its process, and when that process was started."""
 
 _LEFT_OVER = 86400.0
-"""Seconds after which a partial file is left over whose writer is on another machine, which cannot
-be asked: files are made elsewhere and only written under these names, in minutes at most."""
+"""Seconds after which a partial file from another machine, whose processes cannot be queried,
+counts as left over: files are computed elsewhere, and writing one takes minutes at most."""
 
 _LONGEST_STEM = 40
-"""Characters of the file's own name: with the rest they must fit into a file system's 255 bytes."""
+"""Most characters of the file's own name: the partial name must fit into 255 bytes."""
 
 
 def partial_prefix(stem: str) -> str:
-    """How the partial name of a file starts that this process writes."""
+    """Beginning of the partial name of a file that this process writes."""
     process = os.getpid()
     return f".{stem[:_LONGEST_STEM]}{_MARK}{_machine()}-{process}-{_start_of(process)[0]}-"
 
 
 def remove_partial_files(folder: str | os.PathLike[str]) -> None:
-    """Remove what `whole_file` left in `folder` when its process was killed.
+    """Remove files that `whole_file` left in `folder` when its process was killed.
 
-    Files of processes that live are left alone; so are those of another machine for a day. What
-    cannot be removed stays.
+    Files of running processes are left alone, and so are, for a day, those of another machine.
+    A file that cannot be removed stays.
     """
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
@@ -45,12 +45,12 @@ def remove_partial_files(folder: str | os.PathLike[str]) -> None:
 
 @cache
 def _folders() -> set[str]:
-    """Where this process has written."""
+    """Folders that this process has written to."""
     return set()
 
 
 def remove_partial_files_once(folder: str | os.PathLike[str]) -> None:
-    """`remove_partial_files`, the first time that this process writes into `folder`."""
+    """Call `remove_partial_files` the first time that this process writes into `folder`."""
     name = os.path.abspath(folder)
     if name not in _folders():
         _folders().add(name)
@@ -58,7 +58,7 @@ def remove_partial_files_once(folder: str | os.PathLike[str]) -> None:
 
 
 def remove_own_partial_files() -> None:
-    """Remove this process's own, of writers that an interrupt has stopped wherever they were."""
+    """Remove this process's own partial files: an interrupt may have stopped a writer anywhere."""
     own = partial_prefix("").removeprefix(".")
     for folder in _folders():
         with suppress(OSError), os.scandir(folder) as entries:
@@ -79,7 +79,7 @@ def _is_stale(entry: os.DirEntry[str]) -> bool:
 
 
 def _lives(process: int, start: str) -> bool:
-    """Whether that process lives, and is not a later one of the same number."""
+    """Whether that process is running, rather than a later one with the same number."""
     try:
         os.kill(process, 0)
     except (ProcessLookupError, OverflowError):
@@ -91,7 +91,7 @@ def _lives(process: int, start: str) -> bool:
 
 
 def _start_of(process: int) -> tuple[str, str]:
-    """(when a process was started, its state) as Linux tells them; ("0", "") elsewhere."""
+    """(when a process was started, its state), both as Linux reports them; ("0", "") elsewhere."""
     try:
         with open(f"/proc/{process}/stat", encoding="utf-8", errors="replace") as stream:
             words = stream.read().rpartition(")")[2].split()
@@ -102,7 +102,7 @@ def _start_of(process: int) -> tuple[str, str]:
 
 @cache
 def _machine() -> str:
-    """Eight hexadecimal digits for what numbers processes: a machine, since its start."""
+    """Eight hexadecimal digits for the namespace of process numbers: this boot of this machine."""
     words = [socket.gethostname()]
     with suppress(OSError), open("/proc/sys/kernel/random/boot_id", encoding="ascii") as stream:
         words.append(stream.read())

@@ -1,4 +1,4 @@
-"""What each number that a user gives may be: one table for the commands and the Python API."""
+"""The range of every number that a user can set: one table for the commands and the Python API."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from fabricusd.errors import FabricError, one_line
 
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """Least and most that a number may be.
+    """Smallest and largest value of a number.
 
-    whole : only whole numbers; above : more than `low`, not `low` itself
+    whole : only whole numbers; above : `low` itself is excluded
     """
 
     low: float
@@ -28,7 +28,7 @@ class Range:
         if not isinstance(value, kind) or isinstance(value, bool):
             return False
         given: Any = value
-        # NaN is in no range, since it compares with nothing.
+        # NaN is in no range, since every comparison with it is false.
         return bool(self.low < given if self.above else self.low <= given) and bool(
             given <= self.high
         )
@@ -40,12 +40,12 @@ class Range:
         return f"{noun}{words} {self.unit}".rstrip()
 
     def require(self, where: str, value: Any) -> None:
-        """Raise FabricError, naming `where`, the value and the range, for what is not in it."""
+        """Raise FabricError, naming `where`, the value and the range, if it is out of range."""
         if value not in self:
             raise FabricError(where, self.refusal(value))
 
     def refusal(self, value: Any) -> str:
-        """What is wrong with a value that is not in the range."""
+        """The problem with a value that is out of range."""
         return f"is {one_line(_text(value), 60)}; it must be {self}"
 
 
@@ -65,25 +65,26 @@ RANGES = {
     "thickness": Range(low=0, high=1000, unit="mm"),
     "color": Range(low=0, high=1000),
     "difference": Range(low=0, high=1000),
+    "significance": Range(low=0, high=0.5, above=True),
 }
-"""By the name of the setting. Beyond these a number is a slip, or asks for more than a machine has:
-each of the `workers` has buffers of up to 5 MB."""
+"""Name of the setting -> its range. A number beyond it is a slip, or asks for more than a machine
+has: each of the `workers` has buffers of up to 5 MB."""
 
 MOST_PIXELS = 2**28
-"""Pixels of one picture: at least 40 bytes of memory each."""
+"""Most pixels of one picture; each takes at least 40 bytes of memory."""
 
 
 def require_ranges(**settings: Any) -> None:
-    """Raise FabricError for the first setting that is not in its range."""
+    """Raise FabricError for the first setting that is out of its range."""
     for name, value in settings.items():
         RANGES[name].require(name, value)
 
 
 def require_picture(width: Any, height: Any) -> None:
-    """Raise FabricError where a picture of that size cannot be made."""
+    """Raise FabricError if a picture of that size cannot be made."""
     require_ranges(width=width, height=height)
     if width * height > MOST_PIXELS:
-        problem = f"is {width} x {height} pixels; it must be at most {MOST_PIXELS} in all"
+        problem = f"is {width} x {height} pixels; it must have at most {MOST_PIXELS} in all"
         raise FabricError("the picture", problem)
 
 
@@ -93,7 +94,7 @@ def _shown(bound: float, whole: bool) -> str:
 
 def _text(value: Any) -> str:
     if isinstance(value, numbers.Integral) and not isinstance(value, bool):
-        # Python refuses to write integers of more than some thousand digits.
+        # Python refuses to print integers of more than some thousand digits.
         return str(value) if abs(int(value)) < 10**30 else "a number of more than 30 digits"
     if isinstance(value, numbers.Real) and not isinstance(value, bool):
         return f"{float(value):g}" if math.isfinite(value) else str(float(value))

@@ -1,4 +1,4 @@
-"""The sRGB transfer functions, written here so that no colour library has to load."""
+"""The sRGB transfer functions, written out so that no colour library has to be loaded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ctrl-C, and the signals by which others ask for an end, without losing a picture."""
+"""Stopping on Ctrl-C and on termination signals without losing a picture."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from typing import Any
 SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-"""Ctrl-C, the end that other programs ask for, and that of the terminal. Windows has no SIGHUP."""
+"""Ctrl-C, a request to terminate, and the loss of the terminal. Windows has no SIGHUP."""
 
 
 class Stop:
-    """While it is entered, signals that ask for an end raise KeyboardInterrupt, as Ctrl-C does.
+    """A context in which termination signals raise KeyboardInterrupt, as Ctrl-C does.
 
-    Between `hold` and `release` they only set `asked`, however often they come: a picture is being
-    made or written, and whoever makes it looks at `asked`. Handlers that the caller has installed
-    are left alone, and so are signals that are ignored, as nohup ignores SIGHUP, and every thread
-    but the main one, which alone may have handlers. Inside another `Stop` the inner one hears.
+    Between `hold` and `release` they only set `asked`, however often they arrive: a picture is
+    being made or written, and its maker polls `asked`. Handlers that the caller has installed are
+    left alone, and so are signals that are ignored, as nohup ignores SIGHUP. In a thread other than
+    the main one, which alone may have handlers, nothing is installed. In nested contexts the inner
+    one receives the signal.
     """
 
     def __init__(self) -> None:
@@ -47,13 +48,13 @@ class Stop:
             signal.signal(number, before)
 
     def hold(self) -> None:
-        """From here on only set `asked`; raises what came before and was lost in a library."""
+        """From here on only set `asked`; raise now if a signal came before and a library ate it."""
         self._held = True
         if self.asked:
             raise KeyboardInterrupt
 
     def release(self) -> None:
-        """From here on raise again."""
+        """From here on, raise again."""
         self._held = False
 
     def _hear(self, number: int, frame: FrameType | None) -> None:

@@ -1,8 +1,8 @@
-"""A small cloth simulation: a grid of points held together by distances, falling on a body.
+"""A small cloth simulation: a grid of points with distance constraints falls onto a body.
 
-Position-based dynamics [Muller2007]: points move by gravity, then every distance is restored in
-turn and points inside the body are pushed out. Distances are sorted into groups that share no
-point, so that each group is one array operation.
+It uses position-based dynamics [Muller2007]: points move under gravity, then every distance is
+restored in turn, and points inside the body are pushed out. The distances are sorted into groups in
+which no two share a point, so that each group is one array operation.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ Body = Callable[[Points], Points]
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Pairs of points that share none, at their distance of rest, and how much of the error of
-    that distance one pass takes away."""
+    """Disjoint pairs of points, their rest distance, and the share of its error that one pass
+    removes."""
 
     first: NDArray[np.int64]
     second: NDArray[np.int64]
@@ -42,15 +42,16 @@ def simulate(
     bending: float = 0.03,
     thickness: float = 0.004,
 ) -> Points:
-    """Let a grid of cloth fall until it hangs.
+    """Let a grid of cloth fall until it hangs at rest.
 
-    points : (m, n, 3) [m] - where it starts; +y is up
+    points : (m, n, 3) [m] - initial positions; +y is up
     rest : (m, n, 2) or (m, n, 3) [m] - the same grid without tension, flat or as it starts
     pinned : (m, n) bool - points that do not move
     around : whether the grid closes on itself along its first axis
-    passes : how often distances are restored in a step, substeps : into how many a step is cut;
-        many steps of one pass keep the cloth from stretching, at the same cost [Macklin2019]
-    bending : stiffness between points two apart, 0 for a membrane, 1 for a board
+    passes : how often distances are restored per substep
+    substeps : number of substeps per step; for the same cost, many substeps of one pass keep the
+        cloth from stretching [Macklin2019]
+    bending : stiffness between points that are two apart, 0 for a membrane, 1 for a board
 
     Returns (m, n, 3) [m].
     """
@@ -74,7 +75,7 @@ def simulate(
             pushed = body(x)
             touching = np.abs(pushed - x).max(axis=1) > 0
             x = np.where(fixed[:, None], x, pushed)
-            # Friction: what touches the body loses most of its way along it.
+            # Friction: a point that touches the body loses most of its motion along it.
             held = touching & ~fixed
             before[held] += 0.6 * (x[held] - before[held])
         x[:, 1] = np.maximum(x[:, 1], thickness)
@@ -104,7 +105,8 @@ def _groups(
         i2, j2 = i + di, j + dj
         inside = (j2 >= 0) & (j2 < n) & ((i2 < m) | around)
         i2 = i2 % m
-        # Steps of two need four colours along their axis, steps of one two; a ring may need more.
+        # Pairs two apart need four groups along their axis, pairs one apart two; a ring may need
+        # more.
         period = 2 * max(di, abs(dj))
         color = (i if di else j) // max(di, abs(dj)) % 2
         for c in range(2):
@@ -112,7 +114,7 @@ def _groups(
                 along = (i if di else j) % max(period // 2, 1) == part
                 chosen = inside & (color == c) & along
                 a, b = index[chosen], index[i2[chosen], j2[chosen]]
-                # Where a ring has an odd number, its last pairs meet the first: one by itself.
+                # In a ring of odd length the last pairs meet the first, so they form a group.
                 unique = np.isin(b, a, invert=True)
                 for keep in (unique, ~unique):
                     if keep.any():

@@ -2,8 +2,8 @@
 
     python samples/make_samples.py [FOLDER]
 
-Writes `cylinders.usda`, `drape.usda` and `skirt.usda` with their geometry in `.usdc` files beside
-them. Lengths are in metres, +y is up. Everything is computed here: no file is read.
+Writes `cylinders.usda`, `drape.usda` and `skirt.usda`, with their geometry in `.usdc` files beside
+them. Lengths are in metres, +y is up. Everything is computed here; no file is read.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """A grid of points as quads with UVs in metres; `around` closes its first axis.
+    """A grid of points as quads, with UVs in metres; `around` closes its first axis.
 
-    cuts : columns of UVs with a seam behind them, where the next column has the same points again
+    cuts : columns of UVs that end at a seam; the next column has the same points again
     """
 
     points: Points
@@ -40,10 +40,10 @@ class Grid:
 
 
 def define_grid(stage: Usd.Stage, path: str, grid: Grid) -> UsdGeom.Mesh:
-    """A mesh of quads, counter-clockwise seen from where the first axis turns to the second."""
+    """Define a mesh of quads; its normals are the cross product of first and second axis."""
     m, n = grid.points.shape[:2]
     i = np.arange(m * n).reshape(m, n)
-    # UVs have one column more than points where the grid is closed: the seam has two.
+    # In a closed grid, the seam has two columns of UVs, so there is one more than of points.
     columns = grid.uv.shape[0]
     j = np.arange(columns * n).reshape(columns, n)
     ring = np.concatenate([i, i[:1]]) if grid.around else i
@@ -70,10 +70,10 @@ def _quads(i: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def finer(points: Points, factor: int, *, around: bool = False) -> Points:
-    """A grid with each cell cut into `factor` by `factor`, by cubic splines."""
+    """A grid whose cells are divided into `factor` by `factor`, by cubic splines."""
     m = points.shape[0]
     if around:
-        # Periodic: pad by whole columns, refine, and cut the padding off again.
+        # Periodic: pad by whole columns, refine, and remove the padding again.
         pad = 6
         points = np.concatenate([points[-pad:], points, points[: pad + 1]])
     fine = np.stack(
@@ -87,7 +87,7 @@ def finer(points: Points, factor: int, *, around: bool = False) -> Points:
 
 
 def new_scene(path: Path) -> Usd.Stage:
-    """A stage in metres with a floor, a soft sky, and a key light as a reviewer sets it."""
+    """A stage in metres with a floor, a soft sky, a key light and a rim light for look-dev."""
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
@@ -104,7 +104,7 @@ def new_scene(path: Path) -> Usd.Stage:
 
 
 def _backdrop() -> tuple[Points, NDArray[np.float64]]:
-    """A floor that bends up into a wall behind the subject."""
+    """Points and UVs of a floor that bends up into a wall behind the subject."""
     t = np.linspace(0, 1, 65)
     z = np.where(t < 0.55, 3.5 - t / 0.55 * 5.0, 0.0)
     y = np.zeros_like(t)
@@ -123,7 +123,7 @@ def rect_light(
     stage: Usd.Stage, name: str, at: tuple[float, float, float], size: float, intensity: float,
     temperature: float,
 ) -> None:  # fmt: skip
-    """A square light at `at` that shines on the middle of the scene."""
+    """Define a square light at `at` that shines on the middle of the scene."""
     light = UsdLux.RectLight.Define(stage, f"/World/Lights/{name}")
     light.CreateWidthAttr(size)
     light.CreateHeightAttr(size)
@@ -134,7 +134,7 @@ def rect_light(
 
 
 def look_at(eye: tuple[float, float, float], at: tuple[float, float, float]) -> Gf.Matrix4d:
-    """The transform of what stands at `eye` and looks along its -z to `at`."""
+    """The transform of an object at `eye` whose -z axis points at `at`."""
     view = Gf.Matrix4d().SetLookAt(Gf.Vec3d(*eye), Gf.Vec3d(*at), Gf.Vec3d(0, 1, 0))
     return view.GetInverse()
 
@@ -143,9 +143,9 @@ def camera(
     stage: Usd.Stage, eye: tuple[float, float, float], at: tuple[float, float, float],
     focal_length: float, name: str = "Camera",
 ) -> None:  # fmt: skip
-    """A full-frame camera; `focal_length` in millimetres."""
+    """Define a full-frame camera; `focal_length` is in millimetres."""
     prim = UsdGeom.Camera.Define(stage, f"/World/{name}")
-    # A camera's film is measured in tenths of a scene unit.
+    # USD measures focal length and aperture in tenths of a scene unit.
     prim.CreateFocalLengthAttr(focal_length * 0.01)
     prim.CreateHorizontalApertureAttr(36 * 0.01)
     prim.CreateVerticalApertureAttr(24 * 0.01)
@@ -156,7 +156,7 @@ def camera(
 
 
 def grey(stage: Usd.Stage, path: str, color: tuple[float, float, float], roughness: float) -> None:
-    """A plain UsdPreviewSurface."""
+    """Define a plain UsdPreviewSurface."""
     material = UsdShade.Material.Define(stage, path)
     shader = UsdShade.Shader.Define(stage, f"{path}/Surface")
     shader.CreateIdAttr("UsdPreviewSurface")
@@ -166,14 +166,14 @@ def grey(stage: Usd.Stage, path: str, color: tuple[float, float, float], roughne
 
 
 def bind(stage: Usd.Stage, mesh: Any, path: str) -> None:
-    """Give a mesh a plain material."""
+    """Bind a mesh to a plain material."""
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(
         UsdShade.Material(stage.GetPrimAtPath(path))
     )
 
 
 def dress(stage: Usd.Stage, mesh: UsdGeom.Mesh, preset: str, **binding: Any) -> None:
-    """Make a mesh of a preset's fabric, which the stage then holds; UVs are in metres."""
+    """Bind a mesh to a preset's fabric, which is written to the stage; UVs are in metres."""
     path = f"/World/Looks/{preset}"
     fabric = load(preset)
     if not stage.GetPrimAtPath(path):
@@ -182,7 +182,7 @@ def dress(stage: Usd.Stage, mesh: UsdGeom.Mesh, preset: str, **binding: Any) -> 
 
 
 def make_cylinders(folder: Path) -> Path:
-    """Three upright cylinders whose fabric runs upright, at 45 degrees, and round."""
+    """Three upright cylinders on which the warp runs upright, at 45 degrees, and round."""
     path = folder / "cylinders.usda"
     stage = new_scene(path)
     radius, height = 0.11, 0.5
@@ -201,7 +201,7 @@ def make_cylinders(folder: Path) -> Path:
 
 
 def _drum(stage: Usd.Stage, radius: float, height: float, edge: float) -> None:
-    """What the draped cloth lies on, 4 mm inside it."""
+    """Define the drum on which the cloth lies, 4 mm below the cloth."""
     gap = 0.004
     phi = np.linspace(0, 2 * math.pi, 65)[:-1, None]
     bend = np.linspace(0, math.pi / 2, 7)
@@ -262,7 +262,7 @@ def make_skirt(folder: Path, *, around: int = 120, down: int = 44, steps: int = 
     path = folder / "skirt.usda"
     stage = new_scene(path)
     waist, length, sweep = 1.05, 0.58, math.radians(105)
-    # Each panel is a sector of a ring: at the waist as long as half the figure there.
+    # Each panel is a sector of a ring; at the waist it is as long as half the girth of the figure.
     t = np.linspace(0, 2 * math.pi, around, endpoint=False)
     a, b = (np.interp(waist, BODY_HEIGHTS, BODY_RADII[:, k]) + 0.006 for k in range(2))
     girth = math.pi * (3 * (a + b) - math.sqrt((3 * a + b) * (a + 3 * b)))
@@ -280,7 +280,7 @@ def make_skirt(folder: Path, *, around: int = 120, down: int = 44, steps: int = 
     )
     start[..., 0] *= 1 + 0.02 * np.sin(9 * tt) * ss / length
     start[..., 2] *= 1 + 0.02 * np.cos(11 * tt) * ss / length
-    # Distances of rest are the pattern's: chords of rings, and straight lines down.
+    # Rest distances are those of the pattern: chords of rings, and straight lines down.
     flat = np.stack(
         [
             (inner + ss) * 2 * sweep / (2 * math.pi) * np.sin(tt),
@@ -289,7 +289,7 @@ def make_skirt(folder: Path, *, around: int = 120, down: int = 44, steps: int = 
         ],
         axis=-1,
     )
-    # On the cone that the pattern rolls into, a step down is also a step outwards.
+    # On the cone that the pattern forms, a step down is also a step outwards.
     flat[..., 1] = np.sqrt(np.maximum(1 - (2 * sweep / (2 * math.pi)) ** 2, 0.05)) * ss
     pinned = np.zeros(start.shape[:2], bool)
     pinned[:, 0] = True
@@ -309,15 +309,16 @@ def make_skirt(folder: Path, *, around: int = 120, down: int = 44, steps: int = 
 def _skirt_uv(
     shape: tuple[int, ...], inner: float, length: float, sweep: float
 ) -> tuple[NDArray[np.float64], tuple[int, int]]:
-    """(m + 3, n, 2) [m] the place of each point on its flat panel, and the columns before a seam.
+    """((m + 3, n, 2) [m] place of each point on its flat panel, columns before a seam).
 
-    v up, u to the wearer's left. The panels meet at the sides, a quarter and three quarters round;
-    each lies symmetric about its own centre line, which is the grain, the back beside the front.
+    v runs up, u to the wearer's left. The panels meet at the sides, a quarter and three quarters of
+    the way round. Each is symmetric about its own centre line, which is the grain; the back lies
+    beside the front.
     """
     m, n = shape[:2]
     column = np.sort(np.concatenate([np.arange(m + 1), [m // 4, 3 * m // 4]]))
     cuts = (m // 4, 3 * m // 4 + 1)
-    # 0 in front as far as the first seam, 1 behind, 2 in front again.
+    # 0 in front up to the first seam, 1 at the back, 2 in front again.
     panel = np.searchsorted(cuts, np.arange(m + 3))
     angle = (column / m * 2 - panel) * sweep
     outer = inner + length

@@ -62,7 +62,7 @@ def test_what_the_system_refuses_is_told_in_its_words():
         raised(PermissionError(13, "Permission denied"))
         == "a.xyz cannot be read: Permission denied"
     )
-    assert "there is not memory enough" in raised(MemoryError())
+    assert "there is not enough memory" in raised(MemoryError())
     assert "nested too deeply" in raised(RecursionError("maximum recursion depth exceeded"))
 
 

@@ -1,8 +1,8 @@
-"""The figures of docs/baking.md: time by texels, BTF error by megabytes, horizons against tracing.
+"""Measure the figures of docs/baking.md: time by texels, BTF error by size, horizons and tracing.
 
     python bench/bake/bake_charts.py [--texels 512 1024 2048 4096] [--btf] [--horizon] [--to DIR]
 
-Each is printed as a table, and drawn into DIR (docs/images).
+Each figure is printed as a table and drawn into DIR (default: docs/images).
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ print(seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6)
 
 
 def by_texels(resolutions: list[int], path: Path) -> None:
-    """Processor time and peak memory of a whole bake, each in a process of its own."""
+    """Processor time and peak memory of whole bakes, each in a process of its own."""
     rows = []
     for resolution in resolutions:
         shown = subprocess.run(
@@ -85,7 +85,7 @@ def by_texels(resolutions: list[int], path: Path) -> None:
 
 
 def btf_curve(path: Path) -> None:
-    """Error of the forms against their size, by rank."""
+    """Error of the BTF forms against their size, by rank."""
     plt, sides = axes(len(CLOTHS))
     for side, name in zip(sides, CLOTHS, strict=True):
         fabric = load(name)
@@ -121,7 +121,7 @@ def btf_curve(path: Path) -> None:
 
 
 def sizes(btf: Any, made: Any, one: Any, joint: bool) -> list[tuple[str, float]]:
-    """Form and megabytes of its files."""
+    """Form -> megabytes of its files."""
     with tempfile.TemporaryDirectory() as folder:
         stem = Path(folder) / "a"
         write_ubo(stem.with_suffix(".btf"), btf, made)
@@ -136,7 +136,7 @@ def sizes(btf: Any, made: Any, one: Any, joint: bool) -> list[tuple[str, float]]
 
 
 def horizons(path: Path) -> None:
-    """Share of places whose light a baked horizon map gets wrong, against marching."""
+    """Share of places whose light is wrong by a baked horizon map, compared with marching."""
     counts, densities = (4, 8, 16), (2, 4, 8, 16)
     plt, sides = axes(len(CLOTHS))
     for side, name in zip(sides, CLOTHS, strict=True):
@@ -155,7 +155,7 @@ def horizons(path: Path) -> None:
 
 
 def horizon_errors(fabric: Fabric, density: int, counts: tuple[int, ...]) -> Array:
-    """(counts, 2) share of places wrong and mean excess of light, over 24 lights."""
+    """(counts, 2) share of wrong places and mean excess of light, over 24 lights."""
     size = 256
     one = garments(square(fabric, size / density))[0]
     sheet = sheets_of(one, (recipe(fabric),), {1001: (0, 0)}, size, 0)[0]
@@ -179,7 +179,7 @@ def horizon_errors(fabric: Fabric, density: int, counts: tuple[int, ...]) -> Arr
 
 
 def between_azimuths(sine: Array, wi: Array) -> Array:
-    """(n,) sines (n, count) of the horizon towards wi, linear between azimuths."""
+    """(n,) sine of the horizon towards wi, linear between the azimuths of (n, count) sines."""
     count, reach = sine.shape[1], abs(wi[0]) + abs(wi[1])
     quarter = wi[1] / reach
     turn = quarter if wi[0] >= 0 else 2.0 - quarter
@@ -190,7 +190,7 @@ def between_azimuths(sine: Array, wi: Array) -> Array:
 
 
 def axes(count: int) -> tuple[Any, Any]:
-    """matplotlib's pyplot and `count` axes side by side."""
+    """(matplotlib's pyplot, `count` axes side by side)."""
     import matplotlib
 
     matplotlib.use("Agg")

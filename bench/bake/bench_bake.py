@@ -1,9 +1,9 @@
-"""How long a bake takes: against plain NumPy in one run, and as a whole.
+"""The time of a bake: compared with plain NumPy in one run, and as a whole.
 
     python bench/bake/bench_bake.py [--full SCENE]
 
-Ratios of processor time in one run, so that a busy machine does not matter. `--full` bakes the
-whole map set of SCENE at 4K and prints seconds and peak memory. See bench/bake/bake_charts.py too.
+The ratios are of processor time in one run, so that a busy machine does not matter. `--full` bakes
+every map of SCENE at 4K and prints seconds and peak memory. See also bench/bake/bake_charts.py.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from fabricusd.scene.scene import FabricSurface, Mesh, Scene
 from fabricusd.schema import load
 
 SIDE = 4
-"""Samples along a texel's side in NumPy, as the baker's own where it computes texels one by one."""
+"""Samples along the side of a texel in NumPy; the baker takes as many where it samples a texel."""
 
 
 def square(fabric: Fabric, threads: float) -> Scene:
@@ -119,7 +119,7 @@ def _heights(fabric: Fabric) -> tuple[np.ndarray, np.ndarray]:
 
 
 def against_numpy() -> None:
-    """Every map of a sheet's finest level, tables included, against the same in plain NumPy."""
+    """Compare every map of a sheet's finest level, tables included, with plain NumPy."""
     fabric = load("linen_plain")
     size, threads = 1024, 448.0
     one = garments(square(fabric, threads))[0]
@@ -166,7 +166,7 @@ def _timed(function, times: int = 3) -> float:  # type: ignore[no-untyped-def]
 
 
 def write_square(folder: str) -> str:
-    """An OBJ file of a square of 10 cm."""
+    """Write an OBJ file of a square of 10 cm."""
     path = Path(folder) / "square.obj"
     path.write_text(
         "v 0 0 0\nv .1 0 0\nv .1 .1 0\nv 0 .1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"

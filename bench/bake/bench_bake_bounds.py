@@ -1,9 +1,9 @@
-"""What a bake of great inputs takes: a million triangles, a jacquard of 4096 x 4096 cells.
+"""Time and memory of baking large inputs: a million triangles, a jacquard of 4096 x 4096 cells.
 
     python bench/bake/bench_bake_bounds.py [triangles | jacquard] [--texels 256]
 
-Each input is baked in a process of its own, by the command line; printed are its seconds, those of
-all processors, and the most memory that it held. Run it twice: the first run compiles kernels.
+Each input is baked by the command line, in a process of its own. Printed are its wall time, its
+processor time and its peak memory. Run it twice: the first run compiles kernels.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ import numpy as np
 from pxr import Sdf, Usd, UsdGeom, Vt
 
 POINTS = 708
-"""Along each side of the grid, of which each cell is two triangles: 999 698 of them."""
+"""Points along each side of the grid; its cells, of two triangles each, make 999 698 triangles."""
 
 CELLS = 4096
 """Ends and picks of the jacquard."""
 
 
 def write_wavy(path: Path) -> None:
-    """A wavy square of a million triangles with UVs in the unit square."""
+    """A wavy square of a million triangles, with UVs in the unit square."""
     line = np.linspace(0, 1, POINTS)
     x, z = np.meshgrid(line, line, indexing="ij")
     points = np.stack([x, 0.1 * np.sin(18 * x) * np.cos(14 * z), z], axis=-1).reshape(-1, 3)
@@ -61,7 +61,7 @@ def _write_mesh(path: Path, points: np.ndarray, triangles: np.ndarray, uv: np.nd
 
 
 def write_jacquard(path: Path) -> None:
-    """A fabric whose weave is an 8-end satin figured by large leaves: no two of its picks alike."""
+    """A fabric whose weave is an 8-end satin with a figure of large leaves; no picks are alike."""
     from fabricusd.fabric import Fabric, Weave
     from fabricusd.schema import save
 
@@ -72,7 +72,7 @@ def write_jacquard(path: Path) -> None:
 
 
 def measured(words: list[str]) -> str:
-    """What one run of the command line took."""
+    """Time and memory of one run of the command line."""
     began = time.perf_counter()
     subprocess.run(
         [sys.executable, "-m", "fabricusd", *words], check=True, stdout=subprocess.DEVNULL

@@ -1,4 +1,4 @@
-"""The weave grid as `uchar[]` against one string a row, docs/decisions/001.
+"""The weave grid as `uchar[]` compared with one string per row; see docs/decisions/001.
 
 python bench/bake/bench_rows.py
 """
@@ -30,7 +30,7 @@ print(f"read {time.perf_counter() - start:.2f} s, peak {peak:.0f} MB")
 
 
 def main() -> None:
-    """Write each form, read each in a new process, print a line."""
+    """Write each form, read it in a new process, and print a line."""
     grid = (np.random.default_rng(0).random((SIZE, SIZE)) < 0.5).astype(np.uint8)
     rows = [(row + ord("0")).tobytes().decode("ascii") for row in grid]
     forms = {

@@ -1,12 +1,13 @@
-"""How near a standard surface comes to each preset, with and without the fit.
+"""The error of standard surfaces for each preset, with and without the fit.
 
     python bench/materials/bench_fits.py [PRESET ...]
 
-A square of each preset is baked so that a texel spans whole repeats, and at 8 texels a thread; each
-surface is fitted to both, and where threads resolve also with each thread's own fit in the
-textures, as `fabricusd material` writes them. Delta E 2000 over pairs of directions of the
-hemisphere, in a light under which a white diffuser is white: mean, 95th percentile, and the mean
-relative difference of directional albedo; `threads` is OpenPBR's mean of each thread's own texels.
+A square of each preset is baked twice, so that a texel spans whole repeats and at 8 texels per
+thread. Each surface is fitted to both. Where threads are resolved, it is also fitted to each thread
+separately, with the fits in the textures, as `fabricusd material` writes them. Printed is delta E
+2000 over pairs of directions of the hemisphere, in a light under which a white diffuser is white:
+mean, 95th percentile, and the mean relative difference of directional albedo. `threads` is the mean
+of OpenPBR over the texels of each thread.
 """
 
 from __future__ import annotations

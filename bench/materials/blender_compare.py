@@ -1,12 +1,13 @@
-"""How near Cycles comes to the reference path tracer, for each preset and kind of material.
+"""Compare Cycles with the reference path tracer, for each preset and kind of material.
 
     python bench/materials/blender_compare.py --blender PYTHON [--out FOLDER] [--presets NAME ...]
 
-`PYTHON` is an interpreter that can `import bpy`; `make blender` makes one. Half a cylinder wrapped
-in the fabric and a draped cloth, under one distant light without bounces, are rendered by fabricusd
-at level far and, from the baked look, by Cycles: as UsdPreviewSurface, which is what Blender
-imports; through the hook of `fabricusd/materials/targets/blender`; with the OSL shader. Prints a
-table of delta E 2000 and writes the pictures side by side.
+`PYTHON` is an interpreter that can `import bpy`; `make blender` makes one. The subjects are half a
+cylinder wrapped in the fabric, and a draped cloth, under one distant light without bounces. They
+are rendered by fabricusd at level far and, from the baked look, by Cycles in three ways: as
+UsdPreviewSurface, which is what Blender imports; through the hook of
+`fabricusd/materials/targets/blender`; and with the OSL shader. The script prints a table of delta E
+2000 and writes the pictures side by side.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ ROW = ("reference", *KINDS)
 
 
 class Subject:
-    """A mesh and how it is seen."""
+    """A mesh, and the camera that sees it."""
 
     def __init__(self, name, eye, at, focal_length):
         self.name, self.eye, self.at, self.focal_length = name, eye, at, focal_length
@@ -64,7 +65,7 @@ GARMENT = Subject("garment", (0.55, 0.95, 1.75), (0.0, 0.24, 0.0), 60.0)
 
 
 def make_scene(subject, preset, folder):
-    """The scene as fabricusd renders it; the baked mesh is the same mesh."""
+    """The scene that fabricusd renders; its mesh is the one that is baked."""
     path = folder / f"{subject.name}.{preset}.usda"
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
@@ -87,7 +88,7 @@ def cylinder(stage):
     points = np.stack([0.11 * np.sin(p), h, 0.11 * np.cos(p)], axis=-1)
     uv = np.stack([0.11 * p, h], axis=-1)
     mesh = define_grid(stage, "/World/Cylinder", Grid(points, uv))
-    # Round in shading too: a facet of 1.4 degrees shows in a highlight of 2.5.
+    # Smooth normals: a facet of 1.4 degrees would show in a highlight of 2.5 degrees.
     normals = np.stack([np.sin(p), 0 * p, np.cos(p)], axis=-1)
     mesh.CreateNormalsAttr(normals.reshape(-1, 3).astype(np.float32))
     mesh.SetNormalsInterpolation("vertex")
@@ -111,7 +112,7 @@ def drape(stage, folder):
 
 
 def reference(scene, folder, spp):
-    """Direct light alone, as in Cycles without bounces, and Cycles's box filter."""
+    """Render direct light only, like Cycles without bounces, with the box filter of Cycles."""
     picture = folder / f"{scene.stem}.reference.exr"
     if not picture.exists():
         render(
@@ -148,7 +149,7 @@ def jobs_of(subject, preset, scene, folder, spp):
 
 
 def compare(picture, truth):
-    """The difference where both pictures are mostly cloth, and that of their mean radiance."""
+    """The difference where both pictures are mostly cloth, and that of their mean radiances."""
     ours, _ = read_exr_layers(picture)
     real, _ = read_exr_layers(truth)
     a, b = ours["beauty"], real["beauty"]
@@ -159,7 +160,7 @@ def compare(picture, truth):
 
 
 def stack(folder, names):
-    """All rows of pictures under one another at half size, as `side_by_side.png`."""
+    """Write all rows of pictures below one another, at half size, to `side_by_side.png`."""
     rows = [
         np.concatenate(
             [read_exr_layers(folder / f"{name}.{kind}.exr")[0]["beauty"][..., :3] for kind in ROW],

@@ -1,4 +1,4 @@
-"""Inside Blender's Python: render a look with Cycles, as `blender_compare.py` asks.
+"""Render a look with Cycles, inside Blender's Python; `blender_compare.py` runs this.
 
 python bench/materials/blender_render.py JOB.json
 """
@@ -33,8 +33,8 @@ def main() -> None:
 def render(job):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.usd_import(filepath=job["layer"], import_cameras=False, import_lights=False)
-    # The wheel's USD has no Python modules, so Blender cannot hand its stage to the hook's
-    # `on_import`; the stage that it would hand over comes from usd-core.
+    # The USD in Blender's wheel has no Python modules, so Blender cannot pass its stage to the
+    # hook's `on_import`. Open the same stage with usd-core instead.
     if job["material"] == "hook" and not load_hook().rebuild_all(Usd.Stage.Open(job["layer"])):
         raise SystemExit("the hook found no fabric material")
     if job["material"] == "osl":
@@ -53,7 +53,7 @@ def load_hook():
 
 
 def shade_by_osl(job):
-    """Give every mesh the OSL shader, with the parameters of the job."""
+    """Give every mesh the OSL shader with the parameters of the job."""
     material = bpy.data.materials.new("OSL")
     material.use_nodes = True
     tree = material.node_tree
@@ -61,7 +61,7 @@ def shade_by_osl(job):
     script = tree.nodes.new("ShaderNodeScript")
     script.mode = "EXTERNAL"
     script.filepath = compiled(job["shader"])
-    # Blender makes the sockets with a module that the wheel lacks; these are the shader's own.
+    # Blender creates the sockets with a module that the wheel lacks, so create the shader's here.
     for kind, name in SOCKETS:
         script.inputs.new(kind, name, identifier=name)
     script.outputs.new("NodeSocketShader", "Surface", identifier="Surface")
@@ -81,7 +81,7 @@ def shade_by_osl(job):
 
 
 def compiled(source):
-    """The shader compiled by the oslc that is part of Cycles."""
+    """The shader, compiled by the oslc that is part of Cycles."""
     import _cycles
 
     target = str(Path(source).with_suffix(".oso"))
@@ -105,7 +105,7 @@ def add_camera(job):
     camera.lens, camera.sensor_width, camera.sensor_fit = job["focal_length"], 36.0, "HORIZONTAL"
     camera.clip_start = 0.01
     one = bpy.data.objects.new("Camera", camera)
-    # USD writes matrices for row vectors.
+    # USD's matrices apply to row vectors.
     one.matrix_world = TO_Z_UP @ Matrix(job["camera"]).transposed()
     bpy.context.scene.collection.objects.link(one)
     bpy.context.scene.camera = one

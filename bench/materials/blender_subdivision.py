@@ -1,10 +1,11 @@
-"""How far our subdivision surfaces are from those of OpenSubdiv, which Blender uses.
+"""Compare our subdivision surfaces with those of OpenSubdiv, which Blender uses.
 
     python bench/materials/blender_subdivision.py --blender PYTHON
 
-`PYTHON` is an interpreter that can `import bpy`; `make blender` makes one in `build/bpy`. Prints
-the largest distance of our points from Blender's, for each cage of the tests, whose edges are 1 or
-2 long, and of our coordinates for each rule and layout of charts of a sheet.
+`PYTHON` is an interpreter that can `import bpy`; `make blender` makes one in `build/bpy`. The
+script prints the largest distance of our points from Blender's for each cage of the tests, whose
+edges have length 1 or 2, and that of our texture coordinates for each rule and each layout of UV
+charts on a sheet.
 """
 
 from __future__ import annotations
@@ -26,18 +27,18 @@ RULES = {
     "boundaries": "PRESERVE_BOUNDARIES",
     "all": "NONE",
 }
-"""USD's names and Blender's."""
+"""USD's name of a rule -> Blender's name."""
 
 
 def inside_blender(source: Path, target: Path) -> None:
-    """Refine every cage of `source`, in Blender's Python."""
+    """Refine every cage of `source`; runs in Blender's Python."""
     import bpy
 
     found = {}
     for name, case in json.loads(source.read_text()).items():
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(case["points"], [], case["faces"])
-        # Blender squares a crease of 0 to 1 and takes ten times that.
+        # Blender takes a crease from 0 to 1, squares it, and multiplies it by 10.
         crease = mesh.attributes.new("crease_edge", "FLOAT", "EDGE").data
         wanted = {tuple(sorted(e)): s for e, s in case["crease"]}
         for k, edge in enumerate(mesh.edges):
@@ -65,8 +66,8 @@ def inside_blender(source: Path, target: Path) -> None:
 
 
 def cases():
-    """(name, points, faces, creases and corners, UVs, rule): the tests' cages, and a sheet's charts
-    under every rule."""
+    """(name, points, faces, creases and corners, UVs, rule) of the tests' cages and of a sheet with
+    UV charts, the latter with every rule."""
     from tests.scene.surface.test_subdivision import CAGES, FLAPS, QUADS, SHEET, spot
 
     for name, (points, faces, rules, *_) in CAGES.items():
@@ -79,7 +80,7 @@ def cases():
 
 
 def blenders(every, blender, folder):
-    """What Blender makes of every cage."""
+    """Blender's refinement of every cage."""
     source, target = folder / "cages.json", folder / "refined.json"
     told = {
         name: {
@@ -100,8 +101,8 @@ def blenders(every, blender, folder):
 
 
 def distances(ours, theirs):
-    """(of points, of coordinates or None): the largest from one of our corners to the nearest of
-    theirs; coordinates are compared at the same point."""
+    """Largest distance (of points, of coordinates or None) from our corners to Blender's nearest;
+    coordinates are compared at the same point."""
     import numpy as np
     from scipy.spatial import cKDTree
 

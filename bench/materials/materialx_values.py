@@ -1,9 +1,9 @@
-"""What MaterialX's own shaders return, for `tests/materials/test_models.py`.
+"""Record the values of MaterialX's own shaders, for `tests/materials/test_models.py`.
 
     python bench/materials/materialx_values.py tests/materials/materialx_values.json
 
-Generates GLSL with MaterialX, runs it on one pixel a pair of directions under one distant light,
-and writes the values. Needs PyPI `materialx` and `moderngl`, and EGL (Mesa's llvmpipe will do).
+Generates GLSL with MaterialX, runs it on one pixel per pair of directions under one distant light,
+and writes the values. Needs PyPI `materialx` and `moderngl`, and EGL (Mesa's llvmpipe is enough).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SURFACES = [
 
 
 def inputs_of(kind, s):
-    """The node's category, and its inputs, with the alphas in its own terms."""
+    """The category of the node, and its inputs, with roughness as that node parameterises it."""
     ratio = s["smooth"] / s["rough"]
     if kind == "openpbr":
         mean = (0.5 * (s["rough"] ** 2 + s["smooth"] ** 2)) ** 0.25
@@ -65,7 +65,7 @@ def inputs_of(kind, s):
 
 
 def shaders(category, inputs):
-    """Vertex and fragment shader of one surface under a directional light, without a sky."""
+    """Vertex and fragment shader of a surface under a directional light, without a sky."""
     document, search = mx.createDocument(), mx.getDefaultDataSearchPath()
     mx.loadLibraries(mx.getDefaultDataLibraryFolders(), search, document)
     node = document.addNode(category, "shown", "surfaceshader")
@@ -84,14 +84,14 @@ def shaders(category, inputs):
     light = document.getNodeDef("ND_directional_light")
     PyMaterialXGenShader.HwShaderGenerator.bindLightShader(light, 1, context)
     made = generator.generate("shown", node, context)
-    # Without an environment the generator leaves this one undeclared.
+    # Without an environment, the generator does not declare this one.
     missing = "uniform bool u_refractionTwoSided = false;\nuniform int u_numActive"
     fragment = made.getSourceCode("pixel").replace("uniform int u_numActive", missing, 1)
     return made.getSourceCode("vertex"), fragment
 
 
 def evaluate(kind, surface, wi, wo):
-    """(n, 3) what the shader shows of a plane at the origin, x along the tangent."""
+    """(n, 3) values of the shader on a plane at the origin, x along the tangent."""
     vertex, fragment = shaders(*inputs_of(kind, surface))
     context = moderngl.create_standalone_context(backend="egl")
     program = context.program(vertex_shader=vertex, fragment_shader=fragment)

@@ -1,12 +1,12 @@
-"""How fast the surface law is, and how exact in single precision.
+"""Speed of the surface law, and its accuracy in single precision.
 
     python bench/model/bench_surface.py
 
-Everything runs in one process on the same directions, and time is that of the processor, all
-workers together: figures are per worker, and hold on a busy machine. NumPy's side is the law as it
-is written, `appearance.plain`; ratios compare nodes of the curves evaluated per second, since the
-two sides take different ones. Each figure is the best of several runs. `weave + horizon` looks up
-the place, its shadow by table, and the value.
+Everything runs in one process on the same directions. Time is processor time of all workers, so the
+figures are per worker and hold on a busy machine. The NumPy side is the plain implementation,
+`appearance.plain`. The two sides use different nodes on the curves, so ratios compare nodes per
+second. Each figure is the best of several runs. `weave + horizon` looks up the place, its shadow in
+the table, and the value.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ REFERENCE_NODES = 8
 
 
 def best(run: Callable[[], object], repeats: int) -> float:
-    """Processor seconds of the fastest of `repeats` runs, after one that is not counted."""
+    """Processor seconds of the fastest of `repeats` runs, after one run that is not counted."""
     run()
     times = []
     for _ in range(repeats):
@@ -51,7 +51,7 @@ def best(run: Callable[[], object], repeats: int) -> float:
 
 
 def measure(name: str, count: int, repeats: int) -> None:
-    """Print one preset's figures."""
+    """Print the figures of one preset."""
     R = np.float32
     fabric = load(name)
     wi64, wo64 = spread_pairs(count)

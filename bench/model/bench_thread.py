@@ -1,4 +1,4 @@
-"""How fast the vectorised thread models are against plain NumPy.
+"""Speed of the vectorised thread models, compared with plain NumPy.
 
     python bench/model/bench_thread.py
 
@@ -27,7 +27,7 @@ def directions(generator: np.random.Generator, n: int) -> np.ndarray:
 
 
 def microcylinder_in_numpy(t: Thread, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-    """The function as one would write it with NumPy arrays: float32, no angle computed twice."""
+    """The function, written in NumPy in float32, without computing any angle twice."""
     one = np.float32(1)
     eta, kd = np.float32(t.ior), np.float32(t.isotropic)
     gs, gv = np.float32(t.gamma_surface), np.float32(t.gamma_volume)
@@ -49,7 +49,7 @@ def microcylinder_in_numpy(t: Thread, wi: np.ndarray, wo: np.ndarray) -> np.ndar
 
 
 def best(run: Callable[[], object], repeats: int) -> float:
-    """Seconds of the fastest of `repeats` runs, after one that is not counted."""
+    """Seconds of the fastest of `repeats` runs, after one run that is not counted."""
     run()
     times = []
     for _ in range(repeats):
@@ -102,7 +102,7 @@ def main() -> None:
                 label = f"{model}, {precision.__name__}, {count} worker(s)"
                 ratios = f"{rate / numpy_rate:8.1f}{rate / plain_rate[model]:8.1f}"
                 print(f"{label:44}{rate / 1e6:8.1f}{ratios}")
-    # The least that such a loop can do with the same memory: read both directions, write the value.
+    # A lower bound for any loop over the same memory: read both directions and write the value.
     floor = n / best(lambda: np.add(wi, wo, out=out), options.repeats)
     print(f"{'only reading and writing that memory':44}{floor / 1e6:8.1f}{floor / numpy_rate:8.1f}")
     bound = "memory" if fastest > floor / 2 else "arithmetic"

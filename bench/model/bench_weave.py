@@ -1,9 +1,11 @@
-"""The weave under a point, its shadow and level `weave`: `python bench/model/bench_weave.py`.
+"""Speed of finding the weave under a point, its shadow, and level `weave`.
+
+    python bench/model/bench_weave.py
 
 Everything runs in one process on the same places and directions, so that the ratios to plain NumPy
-hold on a busy machine. Each figure is the best of several runs. A satin: five picks, a set that is
-seen underneath, a curve of five pieces; weave coordinates reach to 10^4 threads. NumPy's side does
-less: the thread's BSDF without masking and `Q`.
+hold on a busy machine. Each figure is the best of several runs. The cloth is a satin of five picks
+in which the lower set shows, with a curve of five pieces; weave coordinates reach 10^4 threads. The
+NumPy side does less: it evaluates the thread's BSDF without masking and `Q`.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ Array = np.ndarray
 
 
 def satin() -> Fabric:
-    """Nearly the published satin: the sets' own cells leave something to show underneath."""
+    """Nearly the published satin, with gaps through which the lower set shows."""
     i, j = np.indices((5, 5))
     angles = (-32, -32, -18, 0, 0, 18, 32, 32)
     flat = TangentCurve.from_lengths(
@@ -64,7 +66,7 @@ def satin() -> Fabric:
 
 
 def lookup_in_numpy(cloth: CompiledFabric, uv: Array) -> dict[str, Array]:
-    """The lookup as one would write it with NumPy arrays, in the precision of `cloth`."""
+    """The lookup, written in NumPy in the precision of `cloth`."""
     cell = np.floor(uv)
     xy = (uv - cell).astype(cloth.width.dtype)
     i, j = np.mod(cell, cloth.grid.shape).astype(np.int32).T
@@ -120,7 +122,7 @@ def runs_in_numpy(
 
 
 def horizon_in_numpy(shadow: Shadow, hit: dict[str, Array], wi: Array) -> Array:
-    """The horizon table, interpolated with NumPy arrays."""
+    """The lookup in the horizon table, written in NumPy."""
     table = shadow.table
     part = wi[0] / (np.abs(wi[0]) + np.abs(wi[1]))
     turn = np.where(wi[1] >= 0, 1 - part, 3 + part) * (table.shape[5] / 4)
@@ -160,7 +162,7 @@ def all_in_numpy(
 
 
 def best(function: Callable[[], Any], repeats: int) -> float:
-    """Seconds of the fastest of `repeats` calls, after one that compiles."""
+    """Seconds of the fastest of `repeats` calls, after a first one that compiles."""
     function()
     seconds = []
     for _ in range(repeats):
@@ -177,7 +179,7 @@ def upper(generator: np.random.Generator, n: int) -> Array:
 
 
 def errors(fabric: Fabric, uv: Array) -> None:
-    """How far the float32 lookup is from the float64 one."""
+    """Print the differences of the float32 lookup from the float64 one."""
     exact = lookup(compile_fabric(fabric, precision=np.float64), uv)
     quick = lookup(compile_fabric(fabric, precision=np.float32), uv)
     same = exact.set == quick.set

@@ -1,10 +1,11 @@
-"""Where `auto` should go from level `weave` to `far`: what each is off by, by the width of a pixel.
+"""Where `auto` should change from level `weave` to `far`: the error of each by width of a pixel.
 
     python bench/model/level_change.py [PRESET ...]
 
-Flat cloth, the camera rolled; errors over the cloth's mean, root mean squares over three lights,
-against the cloth's spectrum below the picture's Nyquist frequency (`chart.cloth_picture`). `weave`
-is the mean over 8 x 8 places a pixel, and, second, with the noise that 64 samples leave.
+The cloth is flat and the camera rolled. Errors are relative to the cloth's mean, root mean squares
+over three lights, and measured against the cloth's spectrum below the picture's Nyquist frequency
+(`chart.cloth_picture`). `weave` is given twice: as the mean over 8 x 8 places per pixel, and with
+the noise that 64 samples leave.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ SAMPLES = 64
 
 
 def main() -> None:
-    """A table for every preset: repeats a pixel, and what the levels are off by."""
+    """Print a table for every preset: repeats per pixel, and the errors of the levels."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("presets", nargs="*", default=preset_names())
     names = parser.parse_args().presets

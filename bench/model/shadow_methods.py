@@ -1,9 +1,9 @@
-"""The shadowing methods against the marched height field: the tables and figure of
-docs/shadowing.md.
+"""Compare the shadowing methods with the marched height field, for docs/shadowing.md.
 
     python bench/model/shadow_methods.py [--figure docs/images/shadowing.png]
 
-Every number is over places spread evenly on the threads of one repeat, and 16 azimuths of light.
+Every number is taken over places spread evenly on the threads of one repeat and over 16 azimuths of
+the light.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def all_shares(fabric: Fabric, level: str, uv: Array) -> dict[str, Array]:
 
 
 def by_elevation(name: str, level: str, uv: Array, found: dict[str, Array]) -> None:
-    """Mean share of light, and root mean square difference from `traced`, by elevation."""
+    """Print the mean share of light and its rms difference from `traced`, by elevation."""
     print(f"\n**{name}, level {level}** (mean `g`; in brackets rms difference from `traced`)\n")
     print("| elevation | traced | none | peak | horizon |")
     print("|---|---|---|---|---|")
@@ -70,7 +70,7 @@ def by_elevation(name: str, level: str, uv: Array, found: dict[str, Array]) -> N
 
 
 def by_azimuth(fabric: Fabric, uv: Array, found: dict[str, Array]) -> None:
-    """Mean `g` at 20 degrees by azimuth: traced/horizon/peak."""
+    """Print the mean `g` at 20 degrees by azimuth: traced/horizon/peak."""
     k = ELEVATIONS.index(20)
     print(f"\n**{fabric.name}: light at 20°, by azimuth** (traced / horizon / peak)\n")
     chosen = range(0, AZIMUTHS // 2, 2)
@@ -84,7 +84,7 @@ def by_azimuth(fabric: Fabric, uv: Array, found: dict[str, Array]) -> None:
 
 
 def by_table(level: str, count: int) -> None:
-    """What a finer table brings, over all woven presets."""
+    """Print the error of finer tables, over all woven presets."""
     print(f"\n**Size of the table, level {level}** (rms difference from `traced`, 2° to 70°)\n")
     print("| azimuths, texels | bytes a cell | " + " | ".join(WOVEN) + " |")
     print("|---|---|" + "---|" * len(WOVEN))
@@ -107,7 +107,7 @@ def by_table(level: str, count: int) -> None:
 
 
 def speed(count: int) -> None:
-    """Shadows a second of each method, one worker, and the time to fill the table."""
+    """Print the time of a shadow by each method, with one worker, and that to fill the table."""
     numba.set_num_threads(1)
     print("\n**Time**, float32, one worker (ns a shadow, lookup included; ms for the table)\n")
     print("| preset | none | peak | horizon | traced | table |")
@@ -132,7 +132,7 @@ def speed(count: int) -> None:
 
 
 def figure(path: Path) -> None:
-    """Maps of `g` over a repeat of the crepe and the satin, light from the left at 15 degrees."""
+    """Draw maps of `g` over a repeat of crepe and of satin, lit from the left at 15 degrees."""
     import matplotlib
 
     matplotlib.use("Agg")

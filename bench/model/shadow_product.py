@@ -1,14 +1,14 @@
-"""Is masking times shadowing nearer to the cloth's geometry than either alone?
+"""Whether masking times shadowing is nearer to the geometry of the cloth than either factor alone.
 
     python bench/model/shadow_product.py
 
-The geometry is the height field with round threads, light passing once. From the viewer's side a
-place on a thread counts by the area that it shows, `max(n.wo, 0)/n.N` times whether the march finds
-it visible; it sends `f_s cos theta_i` where the march finds it lit (a thread's own dark side is in
-`f_s`). The model sends `f_s P cos theta_i / Q` times M, times g, or times both, at the same places;
+The geometry is the height field with round threads and single scattering. A place on a thread is
+weighted by the area that it shows to the viewer, `max(n.wo, 0)/n.N`, or by 0 if the march finds it
+hidden. It sends `f_s cos theta_i` if the march finds it lit (`f_s` accounts for the dark side of a
+thread). At the same places the model sends `f_s P cos theta_i / Q` times M, times g, or times both;
 g is marched over round threads (level `thread`) or flat ones (level `weave`). `<g>` is its mean
-over the threads, or over those of its own set, each place counted by the light that its slope would
-catch.
+over all threads, or over those of the same set, each place weighted by the light that its slope
+would catch.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def directions(rng: np.random.Generator, count: int) -> Array:
 
 
 def compare(fabric: Fabric, pairs: int, count: int) -> Array:
-    """(pairs, 1 + variants) brightness: the geometry's, then the model's."""
+    """(pairs, 1 + variants) brightness: first of the geometry, then of the model's variants."""
     rng = np.random.default_rng(1)
     cloth = compile_fabric(fabric, precision=np.float64)
     traced, ribbons = (
@@ -54,7 +54,7 @@ def compare(fabric: Fabric, pairs: int, count: int) -> Array:
     uv = (k * np.array([0.7548776662466927, 0.5698402909980532])) % 1.0 * fabric.weave.cells.shape
     hit = lookup(cloth, uv)
     on = ~hit.gap
-    # Rows of the answer: one for each pair of directions.
+    # One row of the result for each pair of directions.
     rows = []
     for wi, wo in zip(directions(rng, pairs), directions(rng, pairs), strict=True):
         lit, seen = (
@@ -78,7 +78,7 @@ def compare(fabric: Fabric, pairs: int, count: int) -> Array:
             m[here] = plain.masked(a.phi, b.phi, fabric.masking_width)
             p[here] = plain.masked(a.psi, b.psi, fabric.masking_width)
             caught[here] = np.maximum(i[:, 2], 0)
-            # The tube's normal, sqrt(1 - w^2) n_t + w b, against the viewer and against N.
+            # Cosines of the tube's normal, sqrt(1 - w^2) n_t + w b, with the viewer and with N.
             w = np.clip(hit.across[here], -0.999, 0.999)
             up = np.sqrt(1 - w * w) * np.cos(hit.angle[here])
             facing = np.sqrt(1 - w * w) * o[:, 2] + w * o[:, 1]

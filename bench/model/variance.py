@@ -1,8 +1,11 @@
-"""What importance sampling saves: `python bench/model/variance.py [--write docs/sampling.md]`.
+"""The variance that importance sampling saves.
 
-Variance over mean^2 of one view's estimate under an even sky, by directions drawn uniformly and by
-`surface.sample`; uniform over the sphere where cloth lets light through, else over the hemisphere.
-Averaged over views at 10 to 80 degrees, and at `weave` and `thread` over places on threads.
+    python bench/model/variance.py [--write docs/sampling.md]
+
+Printed is variance over mean^2 of the estimate for one view under an even sky, with directions
+drawn uniformly and by `surface.sample`. Uniform directions cover the sphere if the cloth lets light
+through, and else the hemisphere. The figures are averaged over views at 10 to 80 degrees, and at
+levels `weave` and `thread` over places on threads.
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ def unit(theta: float, phi: float) -> np.ndarray:
 
 
 def relative_variances(fabric: Fabric, level: str, wo: np.ndarray, uv: np.ndarray) -> list[float]:
-    """[uniform, drawn], or [] where the view sees nothing."""
+    """[uniform, drawn], or [] if the view sees nothing."""
     rng = np.random.default_rng(5)
     n = DIRECTIONS
     drawn = surface.sample(fabric, wo, rng.random((n, 3)), uv=uv, level=level)

@@ -2,7 +2,7 @@
 
     python bench/scene/bench_mesh_files.py [SIDE]
 
-Beside them trimesh and tinyobjloader, where they are installed.
+trimesh and tinyobjloader are timed beside our readers, if they are installed.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def write(folder: Path) -> list[Path]:
 
 
 def others(path: Path):
-    """(name, what reads the file) of the libraries that are here."""
+    """(name, reader) for each library that is installed."""
     try:
         trimesh = import_module("trimesh")
         yield "trimesh", lambda: trimesh.load_scene(path, process=False)

@@ -1,12 +1,12 @@
-"""A machine's first picture, and the next ones: seconds of wall and of processors.
+"""Wall time and processor time of the first picture on a machine, and of later ones.
 
     python bench/tracer/bench_first.py [--runs 5] [--size 256] [--spp 4]
 
-Runs `fabricusd render` on the draped cloth of `samples`, first with an empty folder for numba's
-compiled kernels, as after an installation, then with what that run left there; and once more from
-an empty folder at level `weave`, as for a close-up, which needs more kernels. Processor time is
-that of the command with all processes that it started. The first figure needs two idle processors;
-the load is printed beside it.
+Runs `fabricusd render` on the draped cloth of `samples`: first with an empty cache of compiled
+kernels, as after an installation, then with the cache that this run filled, and once more with an
+empty cache at level `weave`, as for a close-up, which needs more kernels. Processor time is that of
+the command and all processes that it started. The first figure is valid only with two idle
+processors; the load is printed beside it.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ ROOT = Path(__file__).resolve().parents[2]
 def run(
     scene: Path, size: int, spp: int, kernels: Path, level: str = "auto"
 ) -> tuple[float, float]:
-    """(wall, processors) [s] of one picture, with compiled kernels kept in `kernels`."""
+    """(wall time, processor time) [s] of one picture, with compiled kernels cached in `kernels`."""
     command = [
         sys.executable, "-m", "fabricusd", "render", str(scene), "-o", f"{scene}.exr",
         "--width", str(size), "--height", str(size), "--spp", str(spp), "-q",
         "--level", level,
     ]  # fmt: skip
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(kernels), "PYTHONPATH": str(ROOT)}
-    # An installer compiles modules too.
+    # Let Python cache its modules, as an installer would.
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     begun = time.perf_counter()
@@ -46,7 +46,7 @@ def run(
 
 
 def main() -> None:
-    """Print both figures."""
+    """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=5, help="of the next pictures")
     parser.add_argument("--size", type=int, default=256)
@@ -54,7 +54,7 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        # In a process of its own: this one's children are what is measured.
+        # Make the scene in a subprocess, before the children of this process are measured.
         make = f"import sys; sys.path.insert(0, {str(ROOT / 'samples')!r})\n"
         make += "from pathlib import Path; from make_samples import make_drape\n"
         make += f"make_drape(Path({name!r}))"

@@ -1,9 +1,9 @@
-"""Memory that a picture of a million triangles takes at 2048 x 2048.
+"""Peak memory of a picture of a million triangles at 2048 x 2048.
 
     python bench/tracer/bench_memory.py [SAMPLES]
 
-Printed: the most memory that the process held, before and after rendering. Run it twice: the first
-run compiles kernels, which takes memory of its own.
+Printed is the peak memory of the process before and after rendering. Run it twice: the first run
+compiles kernels, which takes memory of its own.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from fabricusd.scene.scene import FabricSurface, Light, Mesh, Scene
 from fabricusd.schema import load
 
 POINTS = 708
-"""Along each side of the grid, of which each cell is two triangles."""
+"""Points along each side of the grid; each of its cells is two triangles."""
 
 
 def wavy() -> Mesh:
@@ -39,7 +39,7 @@ def wavy() -> Mesh:
 
 
 def most() -> float:
-    """Megabytes of memory held at most so far."""
+    """Peak memory of this process so far [MB]."""
     unit = 1 if sys.platform == "darwin" else 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
 

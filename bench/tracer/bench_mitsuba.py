@@ -1,17 +1,19 @@
-"""The path tracer against Mitsuba 3 (`llvm_ad_rgb`), the same law as a Python plugin, in one run.
+"""Compare the path tracer with Mitsuba 3 (`llvm_ad_rgb`), which gets the law as a Python plugin.
 
     pip install 'fabricusd[mitsuba]'; apt-get install libllvm19
     python bench/tracer/bench_mitsuba.py [--size 512] [--spp 16]
 
-The draped cloth of `samples` with the microcylinder model at level `far` over a diffuse floor, the
-same lights, camera, box filter and depth. The plugin evaluates the same nodes of the same tables
-and samples by cosine, as users write it; Mitsuba draws with `multijitter`. Both clocks run while
-pictures are sampled: scenes are built and kernels compiled before. Printed: times, medians of as
-many pictures; relative MSE against the mean of twice as many others by the same renderer, on the
-cloth alone and on the whole picture, medians likewise, as a single firefly of the plugin's may be a
-hundred times the rest; and the time to the same error, which goes by their product. Then the ratio
-of the pictures' means, under each kind of light by itself too. To Mitsuba a lamp is an obstacle,
-which hides part of the sky; to us none is.
+The scene is the draped cloth of `samples` in the microcylinder model at level `far`, over a diffuse
+floor, with the same lights, camera, box filter and depth for both. The plugin evaluates the same
+nodes of the same tables and samples by cosine, as users would write it; Mitsuba uses the sampler
+`multijitter`. Only sampling is timed: scenes are built and kernels compiled before.
+
+Printed are the times, as medians over pictures; relative MSE against the mean of twice as many
+other pictures by the same renderer, on the cloth alone and on the whole picture, also as medians,
+since a single firefly of the plugin may be a hundred times the rest; and the time to the same
+error, which is proportional to the product of the two. Last comes the ratio of the pictures' means,
+also under each kind of light alone. In Mitsuba, a lamp is an obstacle that hides part of the sky;
+in our renderer it is not.
 """
 
 from __future__ import annotations
@@ -44,11 +46,11 @@ from fabricusd.scene.scene import FabricSurface, Light, PreviewSurface, Scene
 DEPTH = 4
 PICTURES = 9
 SMALL = 96
-"""Width of the pictures that means are taken of."""
+"""Width of the pictures whose means are compared."""
 
 
 def far_law(fabric: Any, dr: Any, mi: Any) -> Any:
-    """`far.far_value` as a function of two directions, one term a node: `model.md` section 4."""
+    """`far.far_value` as a function of two directions, one term per node: `model.md` section 4."""
     tables = surface_tables(fabric, precision=np.float32)
     if tables.nodes[:, 3].any():
         raise SystemExit("the plugin has nodes that are points only")
@@ -157,7 +159,7 @@ def define_plugin(mi: Any, dr: Any, fabric: Any) -> None:
 
 
 def mitsuba_scene(mi: Any, scene: Scene, size: int, folder: Path) -> Any:
-    """The same triangles, lights and camera."""
+    """Mitsuba's scene with the same triangles, lights and camera."""
     tables = build_tables(scene)
     parts: dict[str, Any] = {"type": "scene"}
     parts["integrator"] = {"type": "path", "max_depth": DEPTH + 2}
@@ -246,7 +248,7 @@ def cloth_mask(scene: Scene, size: int) -> Any:
 
 
 def ours(scene: Scene, size: int, workers: int, seed: int, spp: int) -> tuple[Any, float, float]:
-    """A picture by fabricusd, and the seconds of wall and of processors that sampling it took."""
+    """(picture by fabricusd, wall time, processor time of sampling it) [s]."""
     result = render_scene(
         scene, width=size, height=size, spp=spp, max_bounces=DEPTH, level="far", seed=seed,
         workers=workers, pixel_filter="box",
@@ -256,14 +258,14 @@ def ours(scene: Scene, size: int, workers: int, seed: int, spp: int) -> tuple[An
 
 
 def theirs(mi: Any, loaded: Any, seed: int, spp: int) -> tuple[Any, float, float]:
-    """The same by Mitsuba, of a scene that it has loaded."""
+    """The same by Mitsuba, for a scene that is loaded."""
     begun, used = time.perf_counter(), time.process_time()
     picture = np.array(mi.render(loaded, spp=spp, seed=seed)).astype(float)
     return picture, time.perf_counter() - begun, time.process_time() - used
 
 
 def mean_ratio(mi: Any, scene: Scene, workers: int) -> float:
-    """Mean of our picture over that of Mitsuba's, small ones of many samples."""
+    """Mean of our picture over the mean of Mitsuba's, for small pictures of many samples."""
     with tempfile.TemporaryDirectory() as folder:
         loaded = mitsuba_scene(mi, scene, SMALL, Path(folder))
     mean = np.mean([theirs(mi, loaded, seed, 64)[0].mean() for seed in range(8)])
@@ -271,7 +273,7 @@ def mean_ratio(mi: Any, scene: Scene, workers: int) -> float:
 
 
 def relative_errors(picture: Any, exact: Any) -> Any:
-    """(h, w) squared error over the squared picture, floored at a hundredth of its mean."""
+    """(h, w) squared error over the squared picture, which is at least a hundredth of its mean."""
     return ((picture - exact) ** 2 / (exact**2 + (0.01 * exact.mean()) ** 2)).mean(axis=-1)
 
 

@@ -1,11 +1,11 @@
-"""What the Sobol' numbers of the path tracer save, what `variance` says, and when `--noise` stops.
+"""Error saved by the path tracer's Sobol' numbers, accuracy of `variance`, and effect of `--noise`.
 
     python bench/tracer/bench_numbers.py [--reference 4096]
 
-The samples' draped cloth and cylinders at 120 x 80. Relative MSE is the squared error over the
-squared picture, which has a floor of a hundredth of its mean; `stated` is the variance that the
-picture states of itself over the squared error that it has. The second table is what `--noise`
-takes, and the error that it leaves, the root of the mean over all pixels.
+The scenes are the draped cloth and the cylinders of `samples` at 120 x 80. Relative MSE is the
+squared error over the squared picture, which is at least a hundredth of its mean. `stated` is the
+variance in the picture's own layer over its actual squared error. The second table gives the
+samples that `--noise` takes, and the error that it leaves, rms over all pixels.
 """
 
 from __future__ import annotations

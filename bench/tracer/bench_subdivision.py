@@ -1,9 +1,9 @@
-"""Time and memory that refining a subdivision surface of 100 000 faces takes.
+"""Time and memory of refining a subdivision surface of 100 000 faces.
 
     python bench/tracer/bench_subdivision.py [quads|triangles] [auto|low|medium|high] [render]
 
-Printed: seconds on the clock and of the processor to read the stage, and the most memory held; with
-`render` also the most that a picture of 2048 x 2048 takes.
+Printed are the wall time and processor time to read the stage, and the peak memory; with `render`
+also the peak memory of a picture of 2048 x 2048.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SIDES = {"quads": 317, "triangles": 225}
 
 
 def write_stage(path: Path, shape: str) -> None:
-    """A wavy square with UVs, of a fabric's seams none."""
+    """A wavy square with UVs and without seams."""
     count = SIDES[shape]
     line = np.linspace(-1, 1, count)
     x, z = np.meshgrid(line, line, indexing="ij")

@@ -1,13 +1,13 @@
-"""Wall time of the path tracer over that of Embree alone with the same rays, in one run.
+"""Time of the path tracer relative to that of Embree alone with the same rays, in one run.
 
     python bench/tracer/bench_tracer.py [--level auto] [--spp 16] [--size 1024] [--workers 2]
 
-The draped cloth of `samples`, about 100 k triangles, four bounces. Of every sixteenth batch all
-packets of rays are kept; afterwards Embree traces them again with nothing in between, by as many
-workers, and its time is scaled to the number of rays of the whole picture: once as the tracer asks
-for them, camera rays side by side, and once by Embree's default, every ray on its own. Processor
-time, summed over workers and with the building of the scene, is the figure to trust on a busy
-machine.
+The scene is the draped cloth of `samples`, about 100 k triangles, with four bounces. All packets of
+rays of every sixteenth batch are kept. Afterwards Embree traces them again with nothing in between,
+with as many workers, and its time is scaled to the number of rays of the whole picture: once with
+the flags of the tracer, which trace camera rays coherently, and once with Embree's default, which
+traces every ray on its own. On a busy machine, trust the processor time, which is summed over
+workers and includes building the scene.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ EVERY = 16
 
 
 class _Keeper:
-    """Keeps copies of the packets of every EVERY-th batch on their way to Embree."""
+    """Keeps copies of the packets that go to Embree, for one batch in EVERY."""
 
     def __init__(self) -> None:
         self.kept: list[tuple[str, Any, int, dict[str, bool]]] = []
@@ -67,15 +67,17 @@ class _Keeper:
 
 
 def aligned_copy(rays: Any) -> Any:
-    """A copy where Embree can read it."""
+    """A copy, aligned so that Embree can read it."""
     copy = aligned_empty(rays.shape)
     copy[:] = rays
     return copy
 
 
 def embree_alone(keeper: _Keeper, workers: int, *, as_asked: bool) -> tuple[float, float]:
-    """Seconds of wall and of processors that Embree takes for the packets kept, shared among
-    workers as they come; `as_asked` with the tracer's flags, else with none."""
+    """(wall time, processor time) [s] of Embree for the packets kept, shared among the workers.
+
+    as_asked : trace with the flags of the tracer, else with none
+    """
     accelerator = keeper.accelerator
     assert accelerator is not None
     best = (float("inf"), float("inf"))
@@ -102,7 +104,7 @@ def embree_alone(keeper: _Keeper, workers: int, *, as_asked: bool) -> tuple[floa
 
 
 def drape(fabric: str) -> Scene:
-    """The sample's scene; `fabric` "lambert" replaces the cloth by a diffuse surface."""
+    """The scene of the sample; if `fabric` is "lambert", the cloth is a diffuse surface."""
     sys.path.insert(0, str(SAMPLES))
     from make_samples import make_drape
 

@@ -1,5 +1,5 @@
-"""Speed against accuracy: every method measured beside its rivals, and the choice made from that.
+"""Charts of speed against accuracy: every method is measured beside its rivals.
 
-A panel is one function that measures, and a line in `registry.PANELS`. Everything is measured in
-one process on one machine, in turns, so that ratios hold where absolute times do not.
+A panel is a function that measures, and a line in `registry.PANELS`. Everything is measured in one
+process on one machine, in turns, so that ratios hold even where absolute times do not.
 """

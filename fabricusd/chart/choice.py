@@ -1,8 +1,8 @@
-"""The method that a bound on the error asks for, from a table of measured fronts.
+"""Measuring the table from which `render --max-error` chooses its methods.
 
-The table, `choice.json`, ships with the package: costs are of the machine it was made on, so only
-their ratios count. `fabricusd chart --choice FILE` makes another. Cloth that is no preset is taken
-to be as hard as the hardest one.
+The table ships with the package. Its costs are those of the machine that it was made on, so only
+their ratios matter. `fabricusd chart --choice FILE` makes another one. Cloth that is not a preset
+is taken to be as hard as the hardest preset.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fabricusd.reference.choice import BOUNDS
 
 
 def write_table(path: Path, quick: bool = True) -> None:
-    """Measure every woven preset's shadowing methods and every preset's levels; write the table."""
+    """Measure the shadowing methods on every woven preset and the levels on every preset."""
     from fabricusd.appearance.shadow.methods import METHODS
     from fabricusd.chart.level_errors import coarsest
     from fabricusd.chart.panel import Row
@@ -28,7 +28,7 @@ def write_table(path: Path, quick: bool = True) -> None:
         if row.method in METHODS:
             cost, error = float(f"{row.cost:.3g}"), float(f"{row.error:.3g}")
             found.setdefault(row.group, {})[row.method] = (cost, error)
-    # On pile every method gives 1.
+    # On pile, every method returns 1.
     found["velvet"] = {m: (found[shadows.WOVEN[0]][m][0], 0.0) for m in METHODS}
     levels = {name: coarsest(load(name), BOUNDS) for name in preset_names()}
     text = json.dumps({"shadows": found, "levels": levels}, indent=1)

@@ -1,9 +1,11 @@
-"""Pictures of flat cloth whose pixels and threads have a common period, so that every frequency of
-the cloth falls into one bin of the picture's Fourier transform and moiré can be told from detail.
+"""Pictures of flat cloth in which pixels and threads have a common period.
+
+Every frequency of the cloth then falls into one bin of the picture's Fourier transform, so that
+moiré can be told from detail.
 
 The picture is SIZE pixels a side and covers `a, b` repeats: its x axis goes `a` repeats along U and
 `b` along V, its y axis `-b` and `a`. A pixel is then `hypot(a, b)/SIZE` repeats wide, turned by
-`atan2(b, a)`, and the picture repeats without a seam.
+`atan2(b, a)`, and the picture tiles without a seam.
 """
 
 from __future__ import annotations
@@ -23,21 +25,21 @@ from fabricusd.fabric import Fabric
 Floats = NDArray[np.float64]
 
 SIZE = 64
-"""Pixels a side."""
+"""Pixels per side."""
 
 FINE = 768
-"""Samples along a repeat from which the cloth's own spectrum is taken."""
+"""Samples along a repeat for the spectrum of the cloth itself."""
 
 TURN = math.radians(12.0)
-"""How far the camera is rolled against the weave, about."""
+"""Approximate roll of the camera against the weave [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """A fabric, seen and lit from fixed directions, and a pixel's width.
+    """A fabric, seen and lit from fixed directions, and the width of a pixel on it.
 
     wi, wo : unit vectors in the surface frame
-    a, b : repeats along U and V that the picture's x axis crosses
+    a, b : repeats along U and V that the x axis of the picture crosses
     """
 
     fabric: Fabric
@@ -49,7 +51,7 @@ class View:
 
     @property
     def repeat(self) -> int:
-        """Threads along the square that the weave repeats in."""
+        """Threads along a side of the square in which the weave repeats."""
         return math.lcm(*true_repeat(self.fabric))
 
     @property
@@ -88,14 +90,15 @@ def view_of(
     wo: tuple[float, float, float] = (0.0, -0.28, 0.96),
     shadow: str = "horizon",
 ) -> View:
-    """The view whose pixel comes nearest to being `threads_per_pixel` wide."""
+    """The view whose pixel is as near as possible to `threads_per_pixel` wide."""
     repeat = math.lcm(*true_repeat(fabric))
     across = threads_per_pixel * SIZE / repeat
     a, b = round(across * math.cos(TURN)), round(across * math.sin(TURN))
     if max(a, b) < 1:
         raise FabricError(
             "threads_per_pixel",
-            f"is {threads_per_pixel:g}; a picture of {SIZE} pixels must hold a repeat of {repeat}",
+            f"is {threads_per_pixel:g}; it must be large enough that {SIZE} pixels span a repeat "
+            f"of {repeat} threads",
         )
     return View(fabric=fabric, wi=wi, wo=wo, a=a, b=b, shadow=shadow)
 
@@ -103,7 +106,7 @@ def view_of(
 def ideal_spectrum(view: View, level: str = "weave") -> NDArray[np.complex128]:
     """(SIZE, SIZE) Fourier coefficients of the cloth below the picture's Nyquist frequency, rows y.
 
-    What a camera without aliasing and without blur would record.
+    This is what a camera without aliasing and without blur would record.
     """
     cloth = cloth_spectrum(view, level)
     k = np.fft.fftfreq(FINE, 1.0 / FINE).astype(np.int64)
@@ -121,14 +124,14 @@ def cloth_spectrum(view: View, level: str) -> NDArray[np.complex128]:
     v, u = np.meshgrid(line, line, indexing="ij")
     uv = np.stack((u.ravel(), v.ravel()), axis=1)
     found = np.fft.fft2(view.value(uv, level).reshape(FINE, FINE)) / FINE**2
-    # The samples lie in the middle of their cells.
+    # Account for the samples, which lie in the middle of their cells.
     k = np.fft.fftfreq(FINE, 1.0 / FINE)
     shift = np.exp(-1j * np.pi * k / FINE)
     return np.asarray(found * shift[:, None] * shift[None, :])
 
 
 def picture(view: View, level: str, across: int) -> Floats:
-    """(SIZE, SIZE) means of `across` by `across` samples in each pixel."""
+    """(SIZE, SIZE) pixels, each the mean of `across` by `across` samples."""
     line = (np.arange(SIZE * across) + 0.5) / across
     y, x = np.meshgrid(line, line, indexing="ij")
     value = view.value(view.uv(x.ravel(), y.ravel()), level)
@@ -136,8 +139,14 @@ def picture(view: View, level: str, across: int) -> Floats:
 
 
 class Difference(NamedTuple):
-    """What a picture (SIZE, SIZE) has and should not, lacks and should have, and how far its mean
-    is off: root mean squares over the mean, whose squares add up to the whole difference's."""
+    """The difference of a picture (SIZE, SIZE) from the ideal, in three parts.
+
+    alias : what it has and should not have
+    blur : what it should have and lacks
+    shift : how far its mean is off
+
+    Each is a root mean square over the mean; the squares add up to that of the whole difference.
+    """
 
     alias: float
     blur: float
@@ -145,14 +154,15 @@ class Difference(NamedTuple):
 
     @property
     def total(self) -> float:
-        """The whole difference."""
+        """Root mean square of the whole difference."""
         return math.hypot(*self)
 
 
 def difference(found: Floats, ideal: NDArray[np.complex128]) -> Difference:
-    """The difference of a picture from `ideal_spectrum`, split bin by bin.
+    """The difference of a picture from `ideal_spectrum`, divided bin by bin.
 
-    What shortens the ideal's coefficient is blur, all else, folded frequencies above all, alias.
+    Whatever shortens a coefficient of the ideal is blur. All else is alias, mostly folded
+    frequencies.
     """
     k = np.fft.fftfreq(SIZE, 1.0 / SIZE)
     shift = np.exp(-1j * np.pi * k / SIZE)

@@ -1,4 +1,4 @@
-"""Panels as pictures. Drawing needs matplotlib, which only the extra `docs` installs."""
+"""Drawing panels. This needs matplotlib, which only the extra `docs` installs."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ COLUMNS = 3
 
 
 def pyplot() -> Any:
-    """matplotlib's pyplot, drawing without a display; FabricError where it is not installed."""
+    """matplotlib's pyplot, without a display; raises FabricError if it is not installed."""
     try:
         import matplotlib
     except ImportError:
         raise FabricError(
-            "matplotlib", "is not installed; pip install 'fabricusd[docs]' draws charts"
+            "matplotlib", "is not installed; to draw charts, run pip install 'fabricusd[docs]'"
         ) from None
     matplotlib.use("Agg")
-    # The same drawing gives the same file.
+    # Makes the same drawing produce the same file.
     matplotlib.rcParams["svg.hashsalt"] = "fabricusd"
     import matplotlib.pyplot
 
@@ -30,18 +30,18 @@ def pyplot() -> Any:
 
 
 def adjuster() -> Any:
-    """adjustText, which comes with matplotlib in the extra `docs`."""
+    """The module adjustText, which the extra `docs` installs along with matplotlib."""
     try:
         import adjustText
     except ImportError:
         raise FabricError(
-            "adjustText", "is not installed; pip install 'fabricusd[docs]' draws charts"
+            "adjustText", "is not installed; to draw charts, run pip install 'fabricusd[docs]'"
         ) from None
     return adjustText
 
 
 def draw_panel(panel: Panel, rows: Sequence[Row], stem: Path) -> list[Path]:
-    """`<stem>.png` and `<stem>.svg` of a panel's rows."""
+    """Draw a panel's rows as `<stem>.png` and `<stem>.svg`; return the files."""
     plt = pyplot()
     groups = list(dict.fromkeys(row.group for row in rows))
     lines = 2 if panel.draw else -(-len(groups) // COLUMNS)
@@ -55,7 +55,7 @@ def draw_panel(panel: Panel, rows: Sequence[Row], stem: Path) -> list[Path]:
 
 
 def save(figure: Any, stem: Path, suffixes: Sequence[str] = (".png", ".svg")) -> list[Path]:
-    """Write a figure whole in each format, and close it; returns the files."""
+    """Write a figure in each format, whole or not at all, and close it; return the files."""
     written = []
     for suffix in suffixes:
         path = stem.with_suffix(suffix)
@@ -70,7 +70,7 @@ def save(figure: Any, stem: Path, suffixes: Sequence[str] = (".png", ".svg")) ->
 def _scatter(
     figure: Any, panel: Panel, rows: Sequence[Row], groups: Sequence[str], lines: int
 ) -> None:
-    """Error against cost, logarithmic, a small plot a group; the front joined and named."""
+    """Plot error against cost, logarithmic, one small plot per group, the front joined by lines."""
     plots = figure.subplots(lines, COLUMNS, squeeze=False).ravel()
     names = []
     for axes, group in zip(plots, groups, strict=False):
@@ -93,7 +93,7 @@ def _scatter(
             where="post", lw=0.8,
         )  # fmt: skip
         axes.set(xscale="log", yscale="log", xlabel=panel.cost, ylabel=panel.error)
-        # Numbers between powers of ten, plain and small: in scientific notation they overlap.
+        # Numbers between powers of ten are plain and small: in scientific notation they overlap.
         axes.xaxis.set_minor_formatter("{x:g}")
         if axes.get_xlim()[1] > 20 * axes.get_xlim()[0]:
             axes.xaxis.set_minor_formatter("")
@@ -107,9 +107,9 @@ def _scatter(
 
 
 def _part(figure: Any, names: Sequence[tuple[Any, list[Any]]]) -> None:
-    """Move each plot's names off one another and off the points, with a line to the point."""
-    # Names have places on paper only once the plots have, which then stay where they are: the
-    # figure is drawn again for every plot.
+    """Move the names in each plot apart and off the points, and draw lines to the points."""
+    # The places of names on paper are known only once the layout of the plots is fixed, so freeze
+    # the layout: the figure is drawn again for every plot.
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for axes, texts in names:
@@ -120,5 +120,5 @@ def _part(figure: Any, names: Sequence[tuple[Any, list[Any]]]) -> None:
 
 
 def _below(row: Row) -> float:
-    # A spread as large as the error itself has no place on a logarithmic axis.
+    # A bar down to 0 cannot be drawn on a logarithmic axis.
     return min(row.error_spread, 0.9 * max(row.error, 1e-9))

@@ -1,11 +1,13 @@
-"""Highlights of cloth wrapped round a cylinder: where its tangent curve says, and where they are.
+"""Highlights of cloth wrapped round a cylinder: where its tangent curve puts them, and where they
+appear.
 
-The cylinder stands upright, the viewer looks along +z from far away, the light is far away too. A
-place is the angle `p` [rad] from the viewer's side to the right; across the picture that is
-`sin p` radii. Threads round the cylinder have at `p`, where their curve has the angle `psi0`, the
-tangent `(cos(p + psi0), 0, -sin(p + psi0))`. A highlight lies where `theta_i = -theta_o`, that is
-where the tangent is at right angles to `wi + wo`. A curve that stays at one angle for a while makes
-one of its own; the stretches between are too short at any angle to be seen.
+The cylinder stands upright; the viewer looks at it along the z axis from far away, and the light is
+far away, too. A place is the angle `p` [rad] to the right of the viewer's side, which is `sin p`
+radii across in the picture. A thread that runs round the cylinder and has the tangent angle `psi0`
+at `p` has the tangent `(cos(p + psi0), 0, -sin(p + psi0))`. A highlight lies where
+`theta_i = -theta_o`, that is, where the tangent is perpendicular to `wi + wo`. Each angle at which
+the curve stays for a while makes a highlight of its own; in between, the curve spends too little
+length at any angle for a highlight to be seen.
 """
 
 from __future__ import annotations
@@ -22,18 +24,18 @@ from fabricusd.fabric import TangentCurve
 Floats = NDArray[np.float64]
 
 PROMINENCE = 0.02
-"""How far a highlight must rise above both its sides, over the profile's greatest value."""
+"""How far a highlight must rise above both its sides, relative to the maximum of the profile."""
 
 
 def dwells(curve: TangentCurve) -> tuple[float, ...]:
-    """Tangent angles [rad] at which a curve stays for some length, in order of size."""
+    """Tangent angles [rad] at which a curve stays for some length, in ascending order."""
     p, a = np.array(curve.positions), np.array(curve.angles)
     still = (np.diff(p) > 0) & (np.diff(a) == 0)
     return tuple(sorted({float(x) for x in a[:-1][still]}))
 
 
 def predicted(curve: TangentCurve, to_light: Floats) -> tuple[float, ...]:
-    """Places `p` [rad] of the highlights of a thread that runs round the cylinder, left to right.
+    """Places `p` [rad] of the highlights of a thread round the cylinder, from left to right.
 
     to_light : (3,) unit vector; the viewer looks from (0, 0, 1)
     """
@@ -44,9 +46,9 @@ def predicted(curve: TangentCurve, to_light: Floats) -> tuple[float, ...]:
 
 
 def found(profile: Floats, noise: float = 0.0) -> tuple[float, ...]:
-    """Places [rad] of the highlights in radiance (n,) across a cylinder's whole width.
+    """Places [rad] of the highlights in the radiance (n,) across the width of a cylinder.
 
-    noise : standard deviation of a filter over the columns, in columns
+    noise : standard deviation of a smoothing filter, in columns
     """
     smooth = gaussian_filter1d(profile, noise) if noise else profile
     peaks, _ = find_peaks(smooth, prominence=PROMINENCE * float(smooth.max()))

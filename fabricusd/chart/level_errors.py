@@ -1,8 +1,8 @@
-"""How wrong each level is at each width of a pixel: what level `auto` has to choose between.
+"""The error of each level by the width of a pixel, from which level `auto` has to choose.
 
-The truth is level `thread` averaged over the pixel, a square turned against the weave. A pixel's
-mean is the cloth's spectrum times that of the square, so that errors are sums over the spectrum,
-exact for pixels that lie anywhere: root mean squares over all places, over the cloth's mean.
+The truth is level `thread`, averaged over the pixel, a square rotated against the weave. Averaging
+multiplies the spectrum of the cloth by that of the square, so errors are sums over the spectrum and
+exact for pixels at any place: root mean squares over all places, relative to the cloth's mean.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ Floats = NDArray[np.float64]
 Direction = tuple[float, float, float]
 
 WIDTHS = np.geomspace(0.02, 20.0, 121)
-"""Of a pixel in threads: from 50 pixels on a thread to 20 threads under a pixel."""
+"""Widths of a pixel in threads: from 50 pixels per thread to 20 threads per pixel."""
 
 LIGHTS: tuple[Direction, ...] = ((0.48, 0.36, 0.8), (-0.6, 0.0, 0.8), (0.0, 0.8, 0.6))
-"""Directions to the light that a cloth is measured under."""
+"""Directions to the lights under which a cloth is measured."""
 
 TO_EYE: Direction = (0.0, -0.28, 0.96)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Zoom:
-    """A cloth at a row of distances.
+    """A cloth at a series of distances.
 
-    widths : (k,) - of a pixel [threads]
-    products : (k, 3, 3) - mean over all places of the product of two levels' pixels, each less the
-        truth, over the square of the cloth's mean
+    widths : (k,) - width of a pixel [threads]
+    products : (k, 3, 3) - for each pair of levels, the mean over all places of the product of their
+        errors in a pixel, over the square of the cloth's mean
     inside : (k, 3) - standard deviation of a level's values within a pixel, over the cloth's mean
-    weights : (k, 3) - with which `auto` takes the levels
+    weights : (k, 3) - probabilities with which `auto` takes the levels
     """
 
     widths: Floats
@@ -49,12 +49,12 @@ class Zoom:
 
     @property
     def errors(self) -> Floats:
-        """(k, 3) of the levels alone, in the order of LEVELS; `thread` has none."""
+        """(k, 3) errors of the levels, in the order of LEVELS; that of `thread` is 0."""
         return np.asarray(np.sqrt(np.einsum("kll->kl", self.products)), np.float64)
 
     @property
     def auto_errors(self) -> Floats:
-        """(k,) of what `auto` shows, in the mean over its choices."""
+        """(k,) errors of the expectation of `auto`, the mean over its choices."""
         square = np.einsum("kl,klm,km->k", self.weights, self.products, self.weights)
         return np.asarray(np.sqrt(np.maximum(square, 0.0)), np.float64)
 
@@ -67,7 +67,7 @@ def zoom(
     shadow: str = "horizon",
     limits: Limits = DEFAULT,
 ) -> Zoom:
-    """Levels and `auto` at pixels of `widths` [threads], lit from wi and seen from wo."""
+    """The levels and `auto` at pixels of `widths` [threads], lit from wi and seen from wo."""
     view = View(fabric=fabric, wi=wi, wo=wo, a=1, b=0, shadow=shadow)
     spectra = np.stack([_spectrum(view, level) for level in LEVELS])
     mean = float(spectra[2, 0, 0].real)
@@ -88,17 +88,17 @@ def zoom(
 
 
 def coarsest(fabric: Fabric, bounds: Sequence[float]) -> dict[str, list[list[float]]]:
-    """How coarse each level may be taken: "far" and "weave" -> [bound, limit], the widest first.
+    """Where each level may begin: "far" and "weave" -> list of [bound, limit], largest bound first.
 
-    The limit of `far` is in repeats under a pixel, of `weave` in pixels on a thread; there and at
-    every coarser width the error is within the bound under all LIGHTS. Without shadows. A bound
-    that is not met at any of WIDTHS is left out.
+    The limit of `far` is in repeats per pixel, that of `weave` in pixels per thread. At the limit
+    and at every wider pixel, the error is within the bound under all LIGHTS, without shadows. A
+    bound that is not met at any of WIDTHS is left out.
     """
     found = [zoom(fabric, WIDTHS, wi, TO_EYE, "none") for wi in LIGHTS]
     worst = np.max([z.errors for z in found], axis=0)
     repeat = max(true_repeat(fabric))
     limits: dict[str, list[list[float]]] = {"far": [], "weave": []}
-    # A hair beyond the width itself, so that this one is on the coarser side.
+    # Move a limit slightly beyond its width, so that the width itself is on the coarser side.
     in_units = {"far": 0.999 * WIDTHS / repeat, "weave": 1.001 / WIDTHS}
     for bound in sorted(bounds, reverse=True):
         for level, unit in in_units.items():

@@ -1,4 +1,4 @@
-"""The chart command's work: measure the panels, write tables, pictures and the page."""
+"""The work of the command `chart`: measure the panels, write tables, pictures and the page."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fabricusd.files import whole_file
 
 
 def chosen_panels(names: Sequence[str] | None) -> list[Panel]:
-    """The panels of these names, all without any; FabricError for a name that there is not."""
+    """The panels of these names, or all panels; raises FabricError for an unknown name."""
     known = {panel.name: panel for panel in PANELS}
     for name in names or ():
         if name not in known:
@@ -25,7 +25,7 @@ def chosen_panels(names: Sequence[str] | None) -> list[Panel]:
 
 
 def chosen_sheets(names: Sequence[str] | None, everything: bool) -> list[str]:
-    """The sheets of these names; without any all or none."""
+    """The sheets of these names; without names, all or none of them."""
     for name in names or ():
         if name not in SHEETS:
             raise FabricError("--sheet", f"is '{name}'; it must be one of {', '.join(SHEETS)}")
@@ -41,10 +41,11 @@ def make_charts(
     page: Path | None = None,
     say: Callable[[str], None] = lambda _line: None,
 ) -> list[Path]:
-    """Write `charts.csv`, `charts.json`, a PNG and an SVG a panel, the sheets, and `charts.md`.
+    """Write `charts.csv`, `charts.json`, `charts.md`, a PNG and an SVG per panel, and the sheets.
 
-    names, sheets : those alone; without either everything, or when quick the panels
-    page : where the page goes, if not into `folder`; its pictures stay there
+    names, sheets : the panels and sheets to make; without either, all panels and, unless `quick`,
+        all sheets
+    page : file for the page, if not `charts.md` in `folder`; the pictures are in `folder` anyway
 
     Returns the files.
     """
@@ -73,7 +74,7 @@ def _write(
     folder: Path, charts: Charts, sheets: Sequence[str], page: Path | None, quick: bool,
     seconds: float,
 ) -> list[Path]:  # fmt: skip
-    """Tables, pictures and the page."""
+    """Write the tables, the pictures and the page."""
     written = [folder / "charts.csv", folder / "charts.json", page or folder / "charts.md"]
     write_csv(written[0], [row for _, rows in charts.values() for row in rows])
     write_json(written[1], charts, seconds, quick)

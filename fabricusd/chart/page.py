@@ -1,4 +1,4 @@
-"""Panels as CSV, JSON and Markdown."""
+"""Writing panels as CSV, JSON and Markdown."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def write_csv(path: Path, rows: Sequence[Row]) -> None:
 
 
 def write_json(path: Path, charts: Charts, seconds: float, quick: bool) -> None:
-    """Every panel with its axes and rows, and what they were measured with."""
+    """Write every panel with its axes and rows, and the software and machine of the measurement."""
     content = {
         "software": f"fabricusd {fabricusd.__version__}",
         "python": platform.python_version(),
@@ -55,7 +55,7 @@ def write_json(path: Path, charts: Charts, seconds: float, quick: bool) -> None:
 
 
 def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: str) -> str:
-    """The page: a picture, the front, and who is dominated by whom, for each panel; the sheets."""
+    """The page: for each panel a picture, the front, and the dominated methods; then the sheets."""
     parts = [
         "# Speed against accuracy\n",
         f"`{command}` makes this page. It runs every method in one process on one machine, in "
@@ -84,7 +84,7 @@ def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: st
 
 
 def _tables(rows: Sequence[Row]) -> list[str]:
-    """The front's rows as a table, the others in a line a group."""
+    """The rows of the front as a table, and the other rows as a list with a line per group."""
     relative = relative_costs(rows)
     lines = [
         "<details><summary>The front</summary>\n",
@@ -116,7 +116,7 @@ BOUNDS = (1.0, 0.5, 0.3, 0.1, 0.05, 0.01)
 
 
 def _choices() -> list[str]:
-    """The shadowing that each preset gets at some bounds, from the table that is in use."""
+    """The shadowing that each preset gets at some bounds, from the table in use."""
     table = read_table()
     lines = [
         "`fabricusd render --max-error` chooses the cheapest shadowing whose error is within the "
@@ -139,7 +139,7 @@ def _choices() -> list[str]:
 
 
 def _limits() -> list[str]:
-    """Where level `auto` changes for each preset at some bounds, from the table that is in use."""
+    """Where level `auto` changes for each preset at some bounds, from the table in use."""
     lines = [
         "The next table is for level `auto` with a bound. A cell holds two limits. `auto` uses "
         "`far` when a pixel spans at least as many repeats as the first limit, and `thread` when a "
@@ -162,7 +162,7 @@ def _limits() -> list[str]:
 
 
 def number(x: float) -> str:
-    """Two digits, without an exponent where that reads well."""
+    """Two significant digits, without an exponent for numbers of moderate size."""
     return (
         "0"
         if x == 0

@@ -1,4 +1,4 @@
-"""What a chart is made of: rows of method, cost and error, and which of them are worth having."""
+"""Panels of a chart: rows of method, cost and error, and which of the methods are dominated."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Any
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One method, measured.
+    """The measurement of one method.
 
     group : what it was measured on; only rows of one group are compared
     cost, error : in the units of the panel's axes
     cost_spread, error_spread : half the range between the quartiles over repeats
     figures : further numbers, by name
-    dominated_by : the method of the group that is cheaper and nearer; "" on the front
+    dominated_by : a method of the same group that is cheaper and more accurate; "" on the front
     """
 
     group: str
@@ -52,10 +52,10 @@ class Row:
 class Panel:
     """One chart.
 
-    cost, error : what the axes say, units included
+    cost, error : labels of the axes, with units
     about : what is measured and against which reference, in a sentence or two
-    run : quick -> rows, dominated or not; `measure` marks them
-    draw : (figure, rows) -> None where the usual scatter does not show it
+    run : quick -> all rows; `measure` marks the dominated ones
+    draw : (figure, rows) -> None, for a panel that the usual scatter plot does not suit
     """
 
     name: str
@@ -68,7 +68,7 @@ class Panel:
 
 
 def measure(panel: Panel, quick: bool) -> list[Row]:
-    """The panel's rows with the dominated ones named, cheapest first within each group."""
+    """The panel's rows, the dominated ones marked, cheapest first within each group."""
     rows = panel.run(quick)
     found: list[Row] = []
     for group in dict.fromkeys(row.group for row in rows):
@@ -79,8 +79,8 @@ def measure(panel: Panel, quick: bool) -> list[Row]:
 def mark(rows: Sequence[Row]) -> list[Row]:
     """Rows of one group with `dominated_by` filled in.
 
-    A method is dominated by one that is at most as dear and at most as wrong, and better in either
-    by more than both spreads together: what lies within the noise is not held against it.
+    A method is dominated by another that costs no more and errs no more, and that is better in
+    either by more than both spreads together. A difference within the noise does not count.
     """
     return [replace(row, dominated_by=_rival(row, rows)) for row in rows]
 
@@ -96,14 +96,14 @@ def _rival(row: Row, rows: Sequence[Row]) -> str:
             or row.error - r.error > row.error_spread + r.error_spread
         )
     ]
-    # Of several, the one that gains most in the product of both.
+    # Of several, take the one with the smallest product of cost and error.
     return (
         min(better, key=lambda r: (r.cost * max(r.error, 1e-300), r.cost)).method if better else ""
     )
 
 
 def relative_costs(rows: Sequence[Row]) -> list[float]:
-    """Cost over that of the cheapest row of the same group."""
+    """Cost of each row, relative to the cheapest row of its group."""
     least: dict[str, float] = {}
     for row in rows:
         least[row.group] = min(row.cost, least.get(row.group, math.inf))

@@ -1,4 +1,4 @@
-"""Scenes in memory that charts render: a cylinder of cloth, lights, an orthographic camera."""
+"""Scenes for the charts, made in memory: a cylinder of cloth, lights, an orthographic camera."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from fabricusd.scene.light_kinds import DISTANT, DOME
 from fabricusd.scene.scene import Camera, FabricSurface, Light, Mesh, Scene
 
 RADIUS = 0.05
-"""Of a cylinder [m]."""
+"""Radius of a cylinder [m]."""
 
 SIDES = 180
 
 
 def frame_at(towards: Any, distance: float = 0.0) -> NDArray[np.float64]:
-    """(4, 4) frame whose z axis points along `towards`, y upwards, `distance` [m] from the origin.
+    """(4, 4) frame with z along `towards` and y upwards, at `distance` [m] from the origin.
 
-    A camera there looks at the origin; a distant light shines from there.
+    A camera in this frame looks at the origin, and a distant light shines at it.
     """
     z = np.asarray(towards, np.float64) / np.linalg.norm(towards)
     x = np.cross([0.0, 1.0, 0.0], z)
@@ -32,7 +32,7 @@ def frame_at(towards: Any, distance: float = 0.0) -> NDArray[np.float64]:
 
 
 def cylinder(centre: float = 0.0, height: float = 2 * RADIUS, material: int = 0) -> Mesh:
-    """The front half of an upright cylinder at x = `centre`, u round it and v up it in metres."""
+    """The front half of an upright cylinder at x = `centre`; u runs round it, v up, in metres."""
     phi = np.linspace(-0.5 * math.pi, 0.5 * math.pi, SIDES + 1)
     y = np.array([-0.5 * height, 0.5 * height])
     p, h = np.meshgrid(phi, y, indexing="ij")
@@ -61,7 +61,7 @@ def cloth(fabric: Fabric, degrees: float = 0.0, metres_per_uv: float = 1.0) -> F
 
 
 def sun(towards: Any, irradiance: float, width: float = 0.0) -> Light:
-    """A distant light of `width` degrees across that would give `irradiance` on a facing plane."""
+    """A distant light, `width` degrees across, that causes `irradiance` on a plane facing it."""
     angle = math.radians(width)
     solid = 2 * math.pi * (1 - math.cos(0.5 * angle)) if angle else 1.0
     return Light(
@@ -71,17 +71,17 @@ def sun(towards: Any, irradiance: float, width: float = 0.0) -> Light:
 
 
 def sky(radiance: float) -> Light:
-    """Even light from everywhere."""
+    """A dome light of the same radiance in all directions."""
     return Light(path="/sky", kind=DOME, radiance=(radiance,) * 3)
 
 
 def facing(width: float, height: float, towards: Any = (0.0, 0.0, 1.0)) -> Camera:
-    """An orthographic camera that sees `width` by `height` metres about the origin."""
+    """An orthographic camera that sees `width` by `height` metres around the origin."""
     return Camera(frame=frame_at(towards, 1.0), orthographic=True, aperture=(width, height))
 
 
 def one_cylinder(fabric: Fabric) -> Scene:
-    """A cylinder of cloth that fills a square picture, under a sky and a sun of 5 degrees."""
+    """A cylinder of cloth that fills a square picture, under a sky and a sun 5 degrees across."""
     return Scene(
         meshes=[cylinder()],
         materials=[cloth(fabric)],
@@ -91,7 +91,7 @@ def one_cylinder(fabric: Fabric) -> Scene:
 
 
 def curtain(size: float = 0.42, cells: int = 120) -> Mesh:
-    """A square of cloth that hangs from its upper edge in folds that deepen downwards, facing +z.
+    """A square of cloth facing +z that hangs from its upper edge in folds that deepen downwards.
 
     u runs along the folded width and v upwards, in metres on the cloth.
     """

@@ -1,4 +1,4 @@
-"""The thesis's pictures remade: [Bisker2011] Figures 5.3, 5.4 and 5.6."""
+"""Sheets that remake pictures of the thesis: [Bisker2011] Figures 5.3, 5.4 and 5.6."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from fabricusd.schema import load
 Picture = NDArray[np.float32]
 
 WRAPS = ("vertical", "horizontal", "diagonal")
-"""How the filament threads run on the cylinder, left to right on the sheet."""
+"""How the filament threads run on the cylinders, from left to right on the sheet."""
 
 FILAMENT = {
     "linen_plain": "warp",
     "silk_crepe_de_chine": "weft",
     "polyester_satin_charmeuse": "warp",
 }
-"""Which set of each fabric's threads is the one that the wraps are named after."""
+"""The set of each fabric's threads by which the wraps are named."""
 
 TO_LIGHT = np.array([0.0, 0.35, 1.0]) / math.hypot(0.35, 1.0)
 SUN = 1.5
-"""Width of the light [degrees]."""
+"""Angular diameter of the light [degrees]."""
 
 SIX = (
     "polyester_satin_charmeuse", "silk_crepe_de_chine", "silk_shot", "velvet", "linen_plain",
@@ -45,19 +45,19 @@ SIX = (
 
 
 def wrap_degrees(name: str, wrap: str) -> float:
-    """Rotation of the grain at which a fabric's filament threads run as `wrap` says."""
+    """Rotation of the grain [degrees] at which the filament threads run as `wrap` says."""
     turn = {"vertical": 0.0, "horizontal": 90.0, "diagonal": 45.0}[wrap]
     return turn if FILAMENT[name] == "warp" else turn + 90.0
 
 
 def filament(name: str, fabric: Fabric) -> Thread:
-    """The thread that the wraps are named after."""
+    """The filament thread of a fabric, by which the wraps are named."""
     threads = fabric.warp if FILAMENT[name] == "warp" else fabric.weft
     return fabric.thread_list[threads.sequence[0]]
 
 
 def cylinders(fabric: Fabric, degrees: tuple[float, ...], ambient: float = 0.08) -> Scene:
-    """Upright cylinders side by side, the grain turned by `degrees`, lit from over the viewer."""
+    """Upright cylinders side by side, the grain turned by `degrees`, lit from above the viewer."""
     apart = 2.2 * RADIUS
     middle = 0.5 * (len(degrees) - 1)
     return Scene(
@@ -69,7 +69,7 @@ def cylinders(fabric: Fabric, degrees: tuple[float, ...], ambient: float = 0.08)
 
 
 def cylinder_sheet(folder: Path, quick: bool) -> list[Path]:
-    """Figure 5.6: three fabrics on cylinders wrapped three ways; ticks where highlights must be."""
+    """Figure 5.6: three fabrics on cylinders, wrapped three ways; ticks mark the highlights due."""
     plt = pyplot()
     across, samples = (99, 8) if quick else (480, 64)
     figure, rows = plt.subplots(3, 1, figsize=(8, 8.2), layout="constrained")
@@ -89,7 +89,7 @@ def cylinder_sheet(folder: Path, quick: bool) -> list[Path]:
 
 
 def shadow_sheet(folder: Path, quick: bool) -> list[Path]:
-    """Figure 5.3: crepe from above, light from the left: unshadowed, shadowed, the mask."""
+    """Figure 5.3: crepe from above, light from the left: unshadowed, shadowed, and the mask."""
     plt = pyplot()
     size = 60 if quick else 360
     fabric = load("silk_crepe_de_chine")
@@ -137,7 +137,7 @@ def drape_sheet(folder: Path, quick: bool) -> list[Path]:
 
 
 def _bright(beauty: NDArray[Any]) -> Any:
-    """A picture exposed so that all but its brightest hundredth shows."""
+    """A display picture, exposed so that only its brightest hundredth is clipped."""
     light = beauty[..., :3]
     top = float(np.quantile(light.max(axis=-1), 0.99))
     return view(light, -math.log2(max(top, 1e-6)))
@@ -156,4 +156,4 @@ SHEETS: dict[str, tuple[str, Callable[[Path, bool], list[Path]]]] = {
     ),
     "draped": ("Figure 5.4: six fabrics on a hanging cloth", drape_sheet),
 }
-"""Name -> (what it shows, what draws it into a folder, quick or not)."""
+"""Name -> (caption, function that draws it into a folder, quick or not)."""

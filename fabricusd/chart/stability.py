@@ -1,6 +1,6 @@
-"""Where the published formulas fail and what is computed there instead: `docs/model.md` section 10.
+"""Where the published formulas fail, and what is computed instead: `docs/model.md` section 10.
 
-A case is one row: a sweep, the formula as it is printed along it, and ours.
+A case is a sweep of one variable, with the values of the published formula and of ours along it.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """One way to fail.
+    """One kind of failure.
 
-    axis : what the sweep x is; unit : what the values are
-    published, ours : (n,) along it; NaN and infinity are left in
-    said : what happens to the published formula, and what ours does
+    axis : label of the sweep `x`; unit : label of the values
+    published, ours : (n,) values along the sweep; NaN and infinity are left in
+    said : what happens to the published formula, and what ours does instead
     """
 
     where: str
@@ -60,7 +60,7 @@ def _up(theta: Floats, phi: Floats | float = 0.0) -> Floats:
 
 
 def mirror_at_grazing() -> Case:
-    """`theta_o = -theta_i` towards 90 degrees."""
+    """`theta_o = -theta_i`, approaching 90 degrees."""
     away = np.geomspace(0.01, 45.0, 60)
     theta = np.radians(90.0 - away)
     wi, wo = _up(theta), _up(-theta)
@@ -77,13 +77,13 @@ def mirror_at_grazing() -> Case:
 
 
 def along_the_thread() -> Case:
-    """A direction that closes in on the thread's axis."""
+    """A direction that approaches the axis of the thread."""
     off = np.geomspace(1e-20, 1e-1, 60)
     wi = np.stack((np.ones_like(off), 0.6 * off, 0.8 * off), axis=-1)
     wi[0, 1:] = 0.0
     wo = np.tile([-0.6, 0.0, 0.8], (len(off), 1))
     with np.errstate(invalid="ignore", divide="ignore"):
-        # As printed: the azimuth of the normalised projection on the normal plane.
+        # As printed: the azimuth of the normalised projection onto the normal plane.
         length = np.sqrt(np.maximum(1.0 - (wi[:, 0] / np.linalg.norm(wi, axis=1)) ** 2, 0.0))
         azimuth = np.degrees(np.arccos(np.clip(0.8 * off / length, -9, 9)))
     exact = np.degrees(plain_lobes.angles(wi).phi)
@@ -99,7 +99,7 @@ def along_the_thread() -> Case:
 
 
 def wide_lobes() -> Case:
-    """Area of a longitudinal lobe, from needle to more than a hemisphere."""
+    """Area of a longitudinal lobe, from a needle to more than a hemisphere."""
     widths = np.geomspace(0.05, 180.0, 50)
     lobes = np.radians(widths)
     published, ours = np.empty(50), np.empty(50)
@@ -119,9 +119,9 @@ def wide_lobes() -> Case:
 
 
 def _albedo(fabric: Fabric, degrees: float, count: int = 1500) -> float:
-    """Reflected share of an even sky, towards a viewer so many degrees from the normal.
+    """Reflected share of an even sky, towards a viewer `degrees` from the normal.
 
-    Single scattering, by the laws as they are written.
+    Single scattering, by the plain implementation of the laws.
     """
     rng = np.random.default_rng(0)
     wi = _up(np.arccos(rng.random(count)), 2 * math.pi * rng.random(count))
@@ -131,7 +131,7 @@ def _albedo(fabric: Fabric, degrees: float, count: int = 1500) -> float:
 
 
 def white_furnace() -> Case:
-    """Reflected share of an even sky by linen of `A` = 1."""
+    """Share of an even sky that linen with `A` = 1 reflects."""
     degrees = np.linspace(0.0, 88.0, 12)
     values = {
         model: np.array(
@@ -150,7 +150,7 @@ def white_furnace() -> Case:
 
 
 def steep_curves() -> Case:
-    """Height of a hump whose sides get steeper."""
+    """Height of a hump whose sides become steeper."""
     steepest = np.linspace(10.0, 90.0, 81)
     with np.errstate(divide="ignore"):
         published = 0.25 * np.tan(np.radians(steepest))
@@ -164,7 +164,7 @@ def steep_curves() -> Case:
 
 
 def far_uv() -> Case:
-    """The place inside a thread, at UVs further and further from 0."""
+    """The place inside a thread, at UVs farther and farther from 0."""
     offsets = np.asarray(2.0 ** np.arange(0, 40), np.float64)
     fabric = load("linen_plain")
     place = np.array([[0.6180, 0.3]])
@@ -173,7 +173,7 @@ def far_uv() -> Case:
     for k, shift in enumerate(offsets):
         moved = place + 2.0 * shift
         ours[k] = abs(float(lookup(fabric, moved).across[0]) - exact)
-        # As a renderer that keeps UVs in single precision finds it.
+        # As found by a renderer that stores UVs in single precision.
         rounded = (moved.astype(np.float32) - np.float32(2.0 * shift)).astype(np.float64)
         single[k] = float(np.abs(rounded - place).max()) * 2.0
     return Case(
@@ -209,7 +209,7 @@ def middle_distance() -> Case:
 
 
 def growing_energy() -> Case:
-    """Energy after bounces between two linen walls at the worst view, by `A`."""
+    """Energy after bounces between two linen walls, for the worst view, by `A`."""
     scale = np.linspace(0.25, 3.0, 8)
     found = {
         model: np.array(
@@ -230,7 +230,7 @@ def growing_energy() -> Case:
 
 
 def below_the_cloth() -> Case:
-    """A viewer that sinks below velvet."""
+    """A viewer that sinks below the surface of velvet."""
     elevation = np.linspace(20.0, -20.0, 81)
     fabric = load("velvet")
     wo = _up(np.radians(90.0 - elevation))
@@ -253,7 +253,7 @@ def below_the_cloth() -> Case:
 
 
 def upright_threads() -> Case:
-    """Weight of a facet that turns away from the surface's normal."""
+    """Weight of a facet that turns away from the normal of the surface."""
     angle = np.linspace(60.0, 89.99, 80)
     cosine = np.cos(np.radians(angle))
     return Case(
@@ -266,7 +266,7 @@ def upright_threads() -> Case:
 
 
 def light_at_the_surface() -> Case:
-    """A ball of light that sinks into the cloth, its centre from a metre away to within it."""
+    """A ball of light that sinks into the cloth, from a metre away until its centre is below it."""
     heights = np.concatenate(([0.001, 0.003, 0.006, 0.009], np.geomspace(0.0101, 1.0, 20)))
     radius, linen = 0.01, load("linen_plain")
     side = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
@@ -313,11 +313,11 @@ ELSEWHERE = {
     "grazing camera on a thin fold": "rays start beside the shading point; "
     "tests/reference/test_terminator.py",
 }
-"""Rows of section 10 that are no formula of one variable, and what is done about them."""
+"""Rows of section 10 that are not formulas of one variable, and what is done about them."""
 
 
 def write_stability(page: Path, images: Path) -> list[Path]:
-    """The page, and one picture with a plot a case in `images`."""
+    """Write the page, and into `images` one picture with a plot per case; return the files."""
     cases = [make() for make in CASES]
     plt = pyplot()
     figure, grid = plt.subplots(4, 3, figsize=(13, 13), layout="constrained")

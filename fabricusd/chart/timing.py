@@ -1,4 +1,4 @@
-"""Processor time of rival methods, taken in turns so that a busy machine slows all alike."""
+"""Processor time of rival methods, measured in turns so that a busy machine slows all alike."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 SHORTEST = 0.01
-"""A method is called again until a turn took as many seconds, so that cold caches do not count."""
+"""Least seconds of a turn: a method is called repeatedly, so that cold caches do not count."""
 
 
 def in_turns(methods: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
-    """Processor seconds of a call of each method, in each of `rounds` turns.
+    """Processor seconds per call of each method, in each of `rounds` turns.
 
-    All workers' time is added up. A first turn that is not counted compiles, and tells how often a
-    method is called in the others.
+    The time of all workers is added up. A first turn, which is not counted, compiles the methods
+    and determines how often each is called in the other turns.
     """
     calls: dict[str, int] = {}
     for name, method in methods.items():
@@ -37,6 +37,6 @@ def _seconds(method: Callable[[], object], calls: int) -> float:
 
 
 def typical(values: ArrayLike) -> tuple[float, float]:
-    """Median, and half the range between the quartiles."""
+    """(median, half the range between the quartiles)."""
     low, middle, high = np.quantile(np.asarray(values, np.float64), (0.25, 0.5, 0.75))
     return float(middle), float(0.5 * (high - low))

@@ -17,58 +17,82 @@ EPILOG = """example:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to bake, how finely, into which maps."""
-    parser.add_argument("scene", metavar="SCENE", nargs="?", help="USD, OBJ, GLB or PLY file")
-    parser.add_argument("--fabric", metavar="FILE[:/PRIM]", help="for meshes that name none")
+    """What to bake, at which resolution, into which maps."""
+    parser.add_argument("scene", metavar="SCENE", nargs="?", help="USD, OBJ, glTF or PLY file")
+    parser.add_argument(
+        "--fabric", metavar="FILE[:/PRIM]", help="fabric for meshes that are bound to none"
+    )
     add_units(parser)
-    parser.add_argument("--mesh", metavar="PATH", help="bake this mesh alone")
+    parser.add_argument("--mesh", metavar="PATH", help="bake only this mesh")
     parser.add_argument("-o", "--output", metavar="DIR", help="folder for the textures")
     finely = parser.add_mutually_exclusive_group()
-    finely.add_argument("--resolution", type=int, metavar="N", help="texels a side (default 1024)")
-    finely.add_argument("--texels-per-thread", type=float, metavar="X", help="resolution by this")
-    parser.add_argument("--maps", nargs="+", metavar="MAP", help="these alone (default: all)")
-    parser.add_argument("--list-maps", action="store_true", help="print their names and stop")
-    parser.add_argument("--udim", action="store_true", help="UVs lie in tiles 1001 to 1109")
+    finely.add_argument(
+        "--resolution", type=int, metavar="N", help="texels per side (default: 1024)"
+    )
+    finely.add_argument(
+        "--texels-per-thread",
+        type=float,
+        metavar="X",
+        help="choose the resolution that gives a thread this many texels",
+    )
+    parser.add_argument("--maps", nargs="+", metavar="MAP", help="maps to bake (default: all)")
+    parser.add_argument("--list-maps", action="store_true", help="list the maps and exit")
+    parser.add_argument(
+        "--udim", action="store_true", help="bake one texture per UDIM tile, 1001 to 1109"
+    )
     layout = parser.add_mutually_exclusive_group()
     layout.add_argument("--fit", action="store_true", help="scale the UVs into the unit square")
     layout.add_argument(
-        "--unwrap", choices=("x", "y", "z"), help="make new UVs, the warp along this world axis"
-    )
-    parser.add_argument("--light", metavar="X,Y,Z", help="direction to a light, for map 'shadow'")
-    parser.add_argument(
-        "--shadow", default="peak", choices=("peak", "horizon", "traced"), help="of that light"
+        "--unwrap",
+        choices=("x", "y", "z"),
+        help="make new UVs, with the warp along this world axis",
     )
     parser.add_argument(
-        "--level", default="weave", choices=("weave", "thread"), help="threads flat or round"
+        "--light", metavar="X,Y,Z", help="direction to the light of the map 'shadow'"
+    )
+    parser.add_argument(
+        "--shadow",
+        default="peak",
+        choices=("peak", "horizon", "traced"),
+        help="shadowing method of the map 'shadow' (default: peak)",
+    )
+    parser.add_argument(
+        "--level",
+        default="weave",
+        choices=("weave", "thread"),
+        help="weave: flat threads, thread: round threads (default: weave)",
     )
     parser.add_argument(
         "--max-error",
         type=float,
         metavar="DE",
-        help="mean delta E 2000 to reach; --resolution is then the most (default 4096)",
+        help="increase the resolution until the mean delta E 2000 is at most this; --resolution "
+        "is then the upper limit (default: 4096)",
     )
     parser.add_argument(
         "--btf",
         nargs="+",
         metavar="FORM",
-        help="also the fabrics' BTF: ubo, ubo-joint, factored, atlas",
+        help="also write a BTF of each fabric: ubo, ubo-joint, factored, atlas",
     )
     parser.add_argument(
         "--format",
         default="exr",
         choices=("exr", "png", "tiff"),
-        help="EXR with half floats and mip levels; PNG and TIFF hold 16-bit integers",
+        help="exr: half floats with mip levels; png, tiff: 16-bit integers (default: exr)",
     )
-    parser.add_argument("--resume", action="store_true", help="go on with a bake that was stopped")
+    parser.add_argument("--resume", action="store_true", help="continue a bake that was stopped")
     parser.add_argument(
-        "--workers", type=number("workers"), metavar="N", help="default: all processors"
+        "--workers", type=number("workers"), metavar="N", help="CPU threads (default: all)"
     )
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
-    parser.add_argument("--no-clobber", action="store_true", help="never bake into a full folder")
+    parser.add_argument(
+        "--no-clobber", action="store_true", help="refuse a folder that holds a bake already"
+    )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Bake; print the names of the files."""
+    """Bake, and print the names of the files."""
     from pathlib import Path
 
     from fabricusd.bake.bake import bake, plan
@@ -85,7 +109,7 @@ def run(options: argparse.Namespace) -> int:
     out = Path(options.output)
     if options.no_clobber and (out / "manifest.json").exists():
         raise FabricError(str(out), "holds a bake; it must be a new folder with --no-clobber")
-    # 0 stands for nothing asked in Settings; on the command line it is a number out of range.
+    # In Settings, 0 means that nothing was asked for; on the command line it is out of range.
     per_thread, max_error = options.texels_per_thread, options.max_error
     if per_thread is not None:
         positive("--texels-per-thread", per_thread)
@@ -127,7 +151,7 @@ def run(options: argparse.Namespace) -> int:
         for note in result.notes:
             print(f"fabricusd: {note}", file=sys.stderr)
     if not result.finished:
-        print("fabricusd: stopped; --resume goes on from here", file=sys.stderr)
+        print("fabricusd: stopped; continue with --resume", file=sys.stderr)
         return 130
     for maps in result.files.values():
         for files in maps.values():
@@ -140,8 +164,8 @@ def run(options: argparse.Namespace) -> int:
     if settings.max_error and not result.reached(settings.max_error):
         worst = max(e.point for e in result.errors.values())
         print(
-            f"fabricusd: reaches delta E {worst:.3g} at {result.resolution} texels; "
-            f"{settings.max_error:g} was asked for",
+            f"fabricusd: the error at {result.resolution} texels is delta E {worst:.3g}; "
+            f"--max-error asks for {settings.max_error:g}",
             file=sys.stderr,
         )
         return 1
@@ -155,13 +179,13 @@ def _light(text: str | None) -> tuple[float, float, float] | None:
         x, y, z = (float(word) for word in text.split(","))
     except ValueError:
         raise FabricError(
-            f"--light '{text}'", "is no direction; write three numbers: X,Y,Z"
+            f"--light '{text}'", "is not a direction; write three numbers: X,Y,Z"
         ) from None
     return x, y, z
 
 
 def _progress(options: argparse.Namespace) -> Any:
-    """A line that is written over, on a terminal only."""
+    """Show progress in one line, on a terminal only."""
     if options.quiet or not sys.stderr.isatty():
         return None
 

@@ -6,8 +6,9 @@ import argparse
 import sys
 import time
 
-EPILOG = """The folder, printed first, holds compiled kernels and tables that take long to make. Set
-FABRICUSD_CACHE_DIR to have another. Removing what it holds costs time and nothing else.
+EPILOG = """The first line printed is the cache folder; set FABRICUSD_CACHE_DIR to use another.
+The cache holds compiled kernels and tables that take long to make. Clearing it costs time and
+nothing else.
 
 example:
   fabricusd cache
@@ -15,12 +16,12 @@ example:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Whether to remove."""
+    """Whether to clear the cache."""
     parser.add_argument("--clear", action="store_true", help="remove everything in the cache")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the folder and what is in it, or remove that."""
+    """List the folder and its entries, or remove them."""
     from fabricusd import cache
 
     if options.clear:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from fabricusd.cli.stdout import can_show, write_utf8
 
-EPILOG = """FILE is a USD file, FILE:/PRIM, a WIF draft, an image of a weave, or a preset
+EPILOG = """FILE is a USD file, FILE:/PRIM, a WIF draft, an image of a weave, or a preset.
 
 example:
   fabricusd cat silk_crepe_de_chine
@@ -20,19 +20,21 @@ example:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """A fabric, and the form to print it in."""
+    """A fabric, and the form in which to print it."""
     parser.add_argument("file", metavar="FILE", help="USD file, FILE:/PRIM, draft or preset")
     parser.add_argument("prim", metavar="PRIM", nargs="?", help="path of the WovenFabric prim")
     form = parser.add_mutually_exclusive_group()
-    form.add_argument("--json", action="store_true", help="everything as JSON, in SI and degrees")
-    form.add_argument("--flatten", action="store_true", help="the composed stage as USD text")
-    form.add_argument("--wif", action="store_true", help="the draft as a WIF file")
-    parser.add_argument("--no-draft", action="store_true", help="leave the drawing out")
+    form.add_argument(
+        "--json", action="store_true", help="print everything as JSON, in SI units and degrees"
+    )
+    form.add_argument("--flatten", action="store_true", help="print the composed stage as USD text")
+    form.add_argument("--wif", action="store_true", help="print the draft as a WIF file")
+    parser.add_argument("--no-draft", action="store_true", help="do not draw the draft")
     parser.add_argument(
         "--color",
         choices=("auto", "always", "never"),
         default="auto",
-        help="colour in the drawing (default: on a terminal)",
+        help="draw the draft in colour (default: auto, on a terminal)",
     )
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from fabricusd.errors import FabricError
 from fabricusd.files import require_writable
 
-EPILOG = """writes charts.csv, charts.json, charts.md, and a PNG and an SVG of each panel into DIR;
-sheets are the thesis's pictures remade, and part of a chart that is neither quick nor partial
+EPILOG = """Writes charts.csv, charts.json, charts.md, and a PNG and an SVG of each panel into DIR.
+Sheets remake the pictures of the thesis; they are left out with --quick and with --panel.
 
 example:
   fabricusd chart -o charts --quick
@@ -19,22 +19,34 @@ example:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Where to, and how much."""
+    """Where to write, and what to measure."""
     parser.add_argument("-o", "--output", metavar="DIR", help="folder for the charts")
-    parser.add_argument("--quick", action="store_true", help="fewer presets, methods and repeats")
-    parser.add_argument("--panel", action="append", metavar="NAME", help="this one alone, or these")
-    parser.add_argument("--sheet", action="append", metavar="NAME", help="this sheet, or these")
-    parser.add_argument("--list-panels", action="store_true", help="print their names and stop")
-    parser.add_argument("--stability", metavar="MD", help="where formulas fail, instead of charts")
     parser.add_argument(
-        "--choice", metavar="JSON", help="make this machine's table that render --max-error reads"
+        "--quick", action="store_true", help="measure fewer presets and methods, less often"
     )
-    parser.add_argument("--page", metavar="MD", help="write the page here instead")
+    parser.add_argument(
+        "--panel", action="append", metavar="NAME", help="measure only this panel (repeatable)"
+    )
+    parser.add_argument(
+        "--sheet", action="append", metavar="NAME", help="draw only this sheet (repeatable)"
+    )
+    parser.add_argument(
+        "--list-panels", action="store_true", help="list the panels and sheets, and exit"
+    )
+    parser.add_argument(
+        "--stability", metavar="MD", help="instead of charts, write the page on where formulas fail"
+    )
+    parser.add_argument(
+        "--choice",
+        metavar="JSON",
+        help="instead of charts, measure the table that render --max-error reads, on this machine",
+    )
+    parser.add_argument("--page", metavar="MD", help="file for the page (default: DIR/charts.md)")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure; print the names of the files."""
-    # Hours of measuring lie between here and the first file.
+    """Measure, and print the names of the files."""
+    # Check now: measuring may take hours before the first file is written.
     for target in filter(None, (options.choice, options.stability, options.page)):
         require_writable(target)
     from fabricusd.chart.make import make_charts

@@ -9,7 +9,7 @@ from typing import Any
 
 from fabricusd.errors import FabricError, one_line
 
-EPILOG = """status: 0 clean, 1 findings, 2 a file cannot be read
+EPILOG = """exit status: 0 no errors, 1 errors were found, 2 a file cannot be read
 
 example:
   fabricusd check garment.usda fabrics/*.usda
@@ -17,17 +17,17 @@ example:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Files, and how to judge and print."""
+    """Which files to check, and how to judge and print the findings."""
     parser.add_argument(
         "files", nargs="*", metavar="FILE", help="USD file, FILE:/PRIM, draft or preset"
     )
-    parser.add_argument("--strict", action="store_true", help="warnings count as findings")
-    parser.add_argument("--json", action="store_true", help="findings as JSON on stdout")
-    parser.add_argument("--list-rules", action="store_true", help="print every rule and stop")
+    parser.add_argument("--strict", action="store_true", help="exit with status 1 on warnings, too")
+    parser.add_argument("--json", action="store_true", help="print the findings as JSON")
+    parser.add_argument("--list-rules", action="store_true", help="list the rules and exit")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the findings of every file, unreadable ones last."""
+    """Print the findings for every file, and then the files that cannot be read."""
     from fabricusd.schema.check import check
     from fabricusd.schema.rules.rules import RULES
 

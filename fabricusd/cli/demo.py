@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Author every preset as a layer, check it, read it back, and write its draft as WIF."""
+    """Write every preset as a layer, check it, read it back, and write its draft as WIF."""
     from fabricusd.schema import check, load, preset_names, save
     from fabricusd.schema.describe import in_words
     from fabricusd.weaves import draw, from_fabric, write_wif
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
         for finding in found:
             print(f"{finding.severity}: {finding}")
         if load(layer) != fabric:
-            print(f"{layer} does not read back as it was written")
+            print(f"{layer} reads back as a different fabric")
             findings += 1
         if not options.quiet:
             print(in_words(fabric))

@@ -1,10 +1,12 @@
-"""`fabricusd`: finds the command, runs it, turns its result into an exit status.
+"""`fabricusd`: find the command, run it, and turn its result into an exit status.
 
-0 done, 1 findings or short of the bound that was asked for, 2 bad input, in one line on stderr; 130
-interrupted. An error of fabricusd itself is one line and status 2 as well, and begins with the
-words "internal error"; FABRICUSD_DEBUG=1 shows where. Data goes to stdout, everything else to
-stderr. To add a command: a module in this folder with `HELP`, `add_arguments`
-and `run`, and its name in COMMANDS. Only the module of the command that is asked for is imported.
+The status is 0 when done, 1 for findings or for a bound that was not reached, 2 for bad input, and
+130 when interrupted. Bad input is reported in one line on stderr. So is an error in fabricusd
+itself, with status 2 as well; its line begins with "internal error", and FABRICUSD_DEBUG=1 shows a
+traceback. Data goes to stdout, everything else to stderr.
+
+To add a command, write a module in this folder with `EPILOG`, `add_arguments` and `run`, and add
+its name to COMMANDS. Only the module of the command that is run is imported.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
@@ -19,7 +22,8 @@ from typing import NoReturn
 
 from fabricusd import __version__
 from fabricusd.cli.stdout import drop_stdout, ready_stdout
-from fabricusd.errors import FabricError, debugging, described, one_line
+from fabricusd.errors import FabricError, FabricWarning, debugging, described, one_line
+from fabricusd.host import MISSING
 from fabricusd.partial_files import remove_own_partial_files
 from fabricusd.stop import Stop
 
@@ -27,32 +31,32 @@ INTERNAL = "internal error"
 
 COMMANDS = {
     "new": "make a fabric from a preset, a weave, an image or a WIF draft",
-    "cat": "say what a fabric is, in a weaver's words, and draw its draft",
+    "cat": "describe a fabric in a weaver's words, and draw its draft",
     "check": "find faults in fabrics, threads and bindings",
-    "bake": "make textures of a fabric on a garment",
-    "material": "write the materials of a bake for USD and MaterialX",
+    "bake": "bake a fabric on a garment into textures",
+    "material": "turn a bake into materials for USD, MaterialX and other tools",
     "render": "path-trace a scene for look-dev review",
-    "compare": "measure how far one picture is from another",
-    "chart": "measure speed against accuracy, and draw it",
-    "cache": "show or clear what is kept on disk to save time",
-    "plugin-path": "print the folder that PXR_PLUGINPATH_NAME needs",
-    "demo": "author, check and print every preset into a folder",
+    "compare": "measure the difference between two pictures",
+    "chart": "measure and plot the speed and accuracy of every method",
+    "cache": "list or clear the files that are cached on disk",
+    "plugin-path": "print the folder to set PXR_PLUGINPATH_NAME to",
+    "demo": "write every preset into a folder, check it and print it",
 }
 
 
 class _Parser(argparse.ArgumentParser):
-    """Complains in one line."""
+    """A parser that reports an error in one line."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {one_line(message, 400)}; see '{self.prog} --help'\n")
 
 
 def build_parser(command: str | None) -> argparse.ArgumentParser:
-    """The parser, with the arguments of `command` alone filled in."""
+    """The parser, with the arguments of `command` only."""
     parser = _Parser(
         prog="fabricusd",
         description="Woven cloth as USD prims: author, check, render, bake.",
-        epilog="'fabricusd COMMAND --help' tells more, with an example.",
+        epilog="'fabricusd COMMAND --help' describes a command, with examples.",
     )
     parser.add_argument("--version", action="version", version=f"fabricusd {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
@@ -70,28 +74,29 @@ def build_parser(command: str | None) -> argparse.ArgumentParser:
         )
         module.add_arguments(one)
         volume = one.add_mutually_exclusive_group()
-        volume.add_argument("-q", "--quiet", action="store_true", help="no messages but errors")
-        volume.add_argument("-v", "--verbose", action="store_true", help="more messages")
+        volume.add_argument("-q", "--quiet", action="store_true", help="print errors only")
+        volume.add_argument("-v", "--verbose", action="store_true", help="print more messages")
         one.set_defaults(run=module.run)
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command, and return its exit status."""
+    """Run one command and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     command = next((word for word in given if word in COMMANDS), None)
     options, unknown = build_parser(command).parse_known_args(given)
     if unknown:
-        # argparse would point at the help that lists the commands.
+        # argparse itself would refer to the help that lists the commands.
         _Parser(prog=f"fabricusd {command}").error(f"unrecognized arguments: {' '.join(unknown)}")
     ready_stdout()
+    warnings.formatwarning = _format_warning
     try:
         with Stop():
             status: int = options.run(options)
             sys.stdout.flush()
             return status
     except KeyboardInterrupt:
-        # An interrupt may have come between a file's beginning and the first chance to remove it.
+        # The interrupt may have come before the code that removes a partial file was entered.
         remove_own_partial_files()
         _say("interrupted")
         return 130
@@ -101,12 +106,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _status_of(error)
 
 
+_python_format = warnings.formatwarning
+
+
+def _format_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    line: str | None = None,
+) -> str:
+    """One line for a warning of fabricusd's; any other with its place, as Python prints it."""
+    if issubclass(category, FabricWarning):
+        return f"fabricusd: {one_line(str(message))}\n"
+    return _python_format(message, category, filename, lineno, line)
+
+
 def _status_of(error: Exception) -> int:
-    """Say in one line what a command raised; returns the status for it."""
+    """Report in one line what a command raised, and return the status for it."""
     if isinstance(error, FabricError):
         return refused(str(error))
+    if isinstance(error, ModuleNotFoundError) and error.name == "pxr":
+        return refused(MISSING)
     if isinstance(error, BrokenPipeError):
-        # A reader such as `head` has had enough.
+        # The reader of the output, such as `head`, has closed it.
         drop_stdout()
         return 0
     if isinstance(error, OSError):
@@ -114,18 +137,18 @@ def _status_of(error: Exception) -> int:
         where = error.filename or "the output"
         return refused(f"{where} cannot be read or written: {error.strerror or described(error)}")
     if isinstance(error, MemoryError):
-        return refused("there is not memory enough for that")
-    hint = "" if debugging() else " with what FABRICUSD_DEBUG=1 shows of it"
+        return refused("there is not enough memory for that")
+    hint = "" if debugging() else " with the traceback that FABRICUSD_DEBUG=1 shows"
     return refused(f"{INTERNAL}: {described(error)}; please report it{hint}")
 
 
 def refused(line: str) -> int:
-    """Say what was refused; returns the status for it."""
+    """Report what was refused, and return the status for it."""
     _say(line)
     return 2
 
 
 def _say(line: str) -> None:
-    # The terminal may be gone.
+    # The terminal may have been closed.
     with suppress(OSError, ValueError):
         print(f"fabricusd: {one_line(line)}", file=sys.stderr)

@@ -16,30 +16,34 @@ EPILOG = """example:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which bake, over what, as which surfaces."""
+    """Which bake, over which scene, as which surfaces and targets."""
     parser.add_argument("bake", metavar="DIR", help="folder that 'fabricusd bake' made")
     parser.add_argument(
-        "--scene", metavar="SCENE", help="put the look over this USD scene, which was baked"
+        "--scene", metavar="SCENE", help="the USD scene that was baked; the look is a layer over it"
     )
-    parser.add_argument("-o", "--output", metavar="LOOK", help="layer (default: DIR/look.usda)")
+    parser.add_argument(
+        "-o", "--output", metavar="LOOK", help="layer to write (default: DIR/look.usda)"
+    )
     parser.add_argument(
         "--surface",
         nargs="+",
         default=["openpbr"],
         metavar="NAME",
-        help="openpbr, standard_surface, gltf_pbr, hair; USD takes the first",
+        help="openpbr, standard_surface, gltf_pbr, hair; USD gets the first (default: openpbr)",
     )
     for target in TARGETS:
         given: dict[str, Any] = {"metavar": target.metavar}
         given = given if target.metavar else {"action": "store_true"}
         parser.add_argument(f"--{target.name}", help=target.help, **given)
-    parser.add_argument("--no-fit", action="store_true", help="leave the textures as they are")
+    parser.add_argument(
+        "--no-fit", action="store_true", help="use the textures as baked, without fitting"
+    )
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
-    parser.add_argument("--no-clobber", action="store_true", help="never overwrite a look")
+    parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
 
 
 def _targets(options: argparse.Namespace) -> dict[str, Path | None]:
-    """The targets that are asked for, and where; refused before the work where they cannot be."""
+    """The requested targets and their files; refused before the work if they cannot be written."""
     wanted: dict[str, Path | None] = {}
     for target in TARGETS:
         given = getattr(options, target.name)
@@ -50,7 +54,7 @@ def _targets(options: argparse.Namespace) -> dict[str, Path | None]:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the look; print the names of the files."""
+    """Write the look, and print the names of the files."""
     targets = _targets(options)
     from fabricusd.materials.materials import write_materials
     from fabricusd.materials.recipes import Settings

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from fabricusd.weaves import Draft
 
 LONGEST_ORDER = 16384
-"""Most threads of one colour in a row; also the largest draft that is read."""
+"""Most threads of one colour in a row; equal to the most threads of a draft."""
 
 EPILOG = """WEAVE is a name (plain, basket 2/2, twill 2/1 S, satin 8 step 3, herringbone 2/2 8,
-houndstooth, ...) or an expression in end i and pick j (mod(2*i + j, 5) < 4).
+houndstooth, ...) or an expression in the end i and the pick j (mod(2*i + j, 5) < 4).
 
 example:
   fabricusd new --preset velvet -o velvet.usda
@@ -29,27 +29,27 @@ example:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """A source, what threads to weave it of, and where to write."""
+    """The source of the weave, its threads, and where to write."""
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument("--preset", metavar="NAME", help="a fabric that comes with fabricusd")
     source.add_argument("--weave", metavar="WEAVE", help="a named weave or an expression")
     source.add_argument(
-        "--from", dest="source", metavar="FILE", help="a draft or an image, by its suffix"
+        "--from", dest="source", metavar="FILE", help="a WIF draft or an image, told by its suffix"
     )
-    source.add_argument("--wif", metavar="FILE", help="a WIF draft, whatever its suffix")
-    source.add_argument("--image", metavar="FILE", help="an image, black where warp is on top")
-    source.add_argument("--list-presets", action="store_true", help="print their names and stop")
+    source.add_argument("--wif", metavar="FILE", help="a WIF draft, with any suffix")
+    source.add_argument("--image", metavar="FILE", help="an image, black where the warp is on top")
+    source.add_argument("--list-presets", action="store_true", help="list the presets and exit")
     parser.add_argument(
         "-o",
         "--output",
         metavar="FILE",
-        help=".usda, .usdc, .usd or .wif (default: USD text on stdout)",
+        help=".usda, .usdc, .usd or .wif file (default: print USD text)",
     )
-    parser.add_argument("--name", help="of the prim (default: from the output file)")
+    parser.add_argument("--name", help="name of the prim (default: from the output file)")
     parser.add_argument(
         "--thread",
         metavar="FABRIC[:THREAD]",
-        help="take the threads' scattering from a fabric file or preset",
+        help="make the threads scatter like those of this fabric file or preset",
     )
     for which, noun in (("warp", "ends"), ("weft", "picks")):
         parser.add_argument(
@@ -60,13 +60,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         )
         density = f"{noun}_per_cm"
         parser.add_argument(
-            f"--{noun}-per-cm", type=number(density), metavar="N", help=f"{which} density"
+            f"--{noun}-per-cm", type=number(density), metavar="N", help=f"density of the {which}"
         )
     parser.add_argument(
-        "--thickness", type=number("thickness"), metavar="MM", help="of the threads"
+        "--thickness", type=number("thickness"), metavar="MM", help="thickness of the threads"
     )
-    parser.add_argument("--invert", action="store_true", help="image: white is warp on top")
-    parser.add_argument("-n", "--dry-run", action="store_true", help="write nothing")
+    parser.add_argument(
+        "--invert", action="store_true", help="in an image, white means warp on top"
+    )
+    parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
     parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
 
 
@@ -92,16 +94,19 @@ def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
     if options.preset is not None:
         from fabricusd.schema.read import load
         from fabricusd.schema.source import preset_names
+        from fabricusd.weaves.draft import quoted
 
         if options.preset not in preset_names():
             raise FabricError(
-                f"--preset '{options.preset}'",
-                f"is no preset; it must be one of {', '.join(preset_names())}",
+                "",
+                f"there is no preset {quoted(options.preset)}; see 'fabricusd new --list-presets'",
             )
         for option in ("thread", "warp_color", "weft_color", "thickness", "invert"):
-            # Not by equality: 0 equals False.
+            # Compare by identity, since 0 == False.
             if not any(getattr(options, option) is unset for unset in (None, False)):
-                raise FabricError(_flag(option), "does not go with --preset; edit the layer")
+                raise FabricError(
+                    _flag(option), "cannot be used with --preset; edit the layer that new writes"
+                )
         return load(options.preset), ()
     from dataclasses import replace
 
@@ -128,7 +133,7 @@ def _draft(options: argparse.Namespace) -> Draft:
     weft = _color_order(options.weft_color, "--weft-color")
     if options.weave is not None:
         if options.invert:
-            raise FabricError("--invert", "goes with images only")
+            raise FabricError("--invert", "can only be used with an image")
         draft = parse_weave(options.weave)
         return with_colors(draft, warp, weft) if warp or weft else draft
     told = DraftOptions(warp=warp, weft=weft, invert=options.invert)
@@ -137,7 +142,8 @@ def _draft(options: argparse.Namespace) -> Draft:
         return read_draft(getattr(options, reader), told, reader)
     if not reader_name(options.source):
         raise FabricError(
-            f"--from '{options.source}'", f"is no draft; it must end in {', '.join(suffixes())}"
+            f"--from '{options.source}'",
+            f"is not a draft; its name must end in {', '.join(suffixes())}",
         )
     return read_draft(options.source, told)
 
@@ -176,7 +182,7 @@ def _base_thread(options: argparse.Namespace) -> Thread:
         if wanted and wanted not in fabric.threads:
             raise FabricError(
                 f"--thread '{options.thread}'",
-                f"names no thread of {file}; it must be one of {', '.join(fabric.threads)}",
+                f"is not a thread of {file}; it must be one of {', '.join(fabric.threads)}",
             )
         thread = fabric.threads[wanted or next(iter(fabric.threads))]
     if options.thickness is not None:
@@ -212,7 +218,7 @@ def _write(fabric: Fabric, options: argparse.Namespace) -> None:
     wif = output is not None and output.lower().endswith(".wif")
     if output is not None and not wif and not output.lower().endswith(EXTENSIONS):
         raise FabricError(
-            f"-o '{output}'", f"has another suffix than {', '.join((*EXTENSIONS, '.wif'))}"
+            f"-o '{output}'", f"must end in one of {', '.join((*EXTENSIONS, '.wif'))}"
         )
     if options.dry_run:
         print(f"fabricusd: would write {fabric.name} to {output or 'stdout'}", file=sys.stderr)

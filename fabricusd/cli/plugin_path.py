@@ -14,17 +14,18 @@ EPILOG = """example:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Whether the rules are wanted too."""
+    """Whether to add the folder of the validators."""
     parser.add_argument(
         "--validators",
         action="store_true",
-        help="also the rules' folder, for programs whose Python has fabricusd",
+        help="add the folder of the rules, for programs of USD 26.5 or newer whose Python can "
+        "import fabricusd",
     )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the folder, or both."""
-    # Not by way of fabricusd.schema: that would load USD to print a path.
+    """Print the folder, or both folders."""
+    # Not through fabricusd.schema, which would load USD just to print a path.
     folder = Path(fabricusd.__file__).resolve().parent / "schema" / "plugin"
     folders = [folder, folder / "validators"] if options.validators else [folder]
     print(os.pathsep.join(map(str, folders)))

@@ -1,4 +1,4 @@
-"""The program `fabricusd`: `main`, without what Python does for programs that live longer."""
+"""The program `fabricusd`: `main`, without the work that Python does for long-running programs."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from fabricusd.cli.main import main, refused
 from fabricusd.cli.stdout import drop_stdout
 
 GARBAGE = (100_000, 20, 100)
-"""When Python looks for cycles. Importing USD and numba makes objects by the hundred thousand, none
-of them garbage; looking through them time and again takes as long as importing NumPy."""
+"""Thresholds of Python's garbage collector. Importing USD and numba creates hundreds of thousands
+of objects, none of them garbage; scanning them repeatedly takes as long as importing NumPy."""
 
 
 def program() -> NoReturn:
-    """Run the command line; the console entry point."""
+    """Run the command line. This is the console entry point."""
     gc.set_threshold(*GARBAGE)
     try:
         status = main()
@@ -27,26 +27,26 @@ def program() -> NoReturn:
 
 
 def leave(status: int) -> NoReturn:
-    """End the program with all that was written.
+    """End the program once all output is written.
 
-    Python would first take apart every module, which for USD and numba takes a third of a second:
-    a fifth of the time of a small picture.
+    A normal exit would first tear down every module, which for USD and numba takes a third of a
+    second: a fifth of the time of a small picture.
     """
     full = _flush()
-    # Temporary folders, logs: whatever asked to be told of the end.
+    # Handlers that libraries registered for the exit, such as those of temporary folders and logs.
     atexit._run_exitfuncs()
     full = full or _flush()
     os._exit(refused(f"the output cannot be written: {full}") if full else status)
 
 
 def _flush() -> str | None:
-    """Write what is still held back; the reason where that cannot be."""
-    # Streams that were closed when the program was started are None.
+    """Flush the output; return the reason if that fails."""
+    # A stream that was closed when the program started is None.
     for stream in filter(None, (sys.stdout, sys.stderr)):
         try:
             stream.flush()
         except BrokenPipeError:
-            # A reader such as `head` has had enough.
+            # The reader of the output, such as `head`, has closed it.
             drop_stdout()
         except OSError as error:
             drop_stdout()

@@ -18,9 +18,11 @@ from fabricusd.ranges import RANGES, require_picture
 if TYPE_CHECKING:
     from fabricusd.fabric import Fabric
 
-EPILOG = """SCENE is .usd, .usda, .usdc or .usdz, or with --fabric an .obj, .glb, .gltf or .ply
+EPILOG = """SCENE is a .usd, .usda, .usdc or .usdz file, or, with --fabric, an .obj, .glb, .gltf
+or .ply file.
 
-OUT.exr gets beauty and each --aov, and a .png beside it; Ctrl-C keeps what is done
+OUT.exr holds the beauty and every --aov; a .png of the beauty is written beside it. Ctrl-C stops
+the render and keeps the samples taken so far.
 
 example:
   fabricusd render garment.usda -o review.exr
@@ -30,59 +32,100 @@ example:
 MOST_FRAMES = 100_000
 
 MOST_TOLD = 50
-"""Meshes whose sizes a dry run prints."""
+"""Most meshes whose sizes a dry run prints."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to render, how well, and where to."""
-    parser.add_argument("scene", metavar="SCENE")
-    parser.add_argument("-o", "--output", metavar="OUT", required=True, help=".exr or .png")
-    parser.add_argument("--fabric", metavar="FILE[:/PRIM]", help="fabric file, draft or preset")
+    """What to render, how well, and where to write it."""
+    parser.add_argument("scene", metavar="SCENE", help="USD file, or a mesh file with --fabric")
+    parser.add_argument("-o", "--output", metavar="OUT", required=True, help=".exr or .png file")
+    parser.add_argument(
+        "--fabric",
+        metavar="FILE[:/PRIM]",
+        help="fabric file, draft or preset for meshes without a fabric",
+    )
     add_units(parser)
-    parser.add_argument("--camera", metavar="PATH", help="prim path (default: the first camera)")
+    parser.add_argument(
+        "--camera", metavar="PATH", help="prim path of the camera (default: the first one)"
+    )
     parser.add_argument(
         "--width",
         type=number("width"),
         default=960,
-        help="the camera's horizontal aperture fills it",
-    )
-    parser.add_argument("--height", type=number("height"), default=540)
-    parser.add_argument(
-        "--spp", type=number("spp"), metavar="N", help="samples a pixel (default: 64)"
+        help="pixels across, which the camera's horizontal aperture fills (default: 960)",
     )
     parser.add_argument(
-        "--noise", type=number("noise"), metavar="E", help="stop a pixel at this relative error"
+        "--height", type=number("height"), default=540, help="pixels down (default: 540)"
     )
-    parser.add_argument("--max-bounces", type=number("max_bounces"), default=4, metavar="N")
-    parser.add_argument("--level", choices=("auto", "far", "weave", "thread"), default="auto")
     parser.add_argument(
-        "--shadow", choices=("none", "peak", "horizon", "traced"), help="default: horizon"
+        "--spp", type=number("spp"), metavar="N", help="samples per pixel (default: 64)"
+    )
+    parser.add_argument(
+        "--noise",
+        type=number("noise"),
+        metavar="E",
+        help="stop sampling a pixel at this relative error",
+    )
+    parser.add_argument(
+        "--max-bounces",
+        type=number("max_bounces"),
+        default=4,
+        metavar="N",
+        help="maximum number of bounces (default: 4)",
+    )
+    parser.add_argument(
+        "--level",
+        choices=("auto", "far", "weave", "thread"),
+        default="auto",
+        help="detail of the cloth; auto: by the size of a pixel on it (default: auto)",
+    )
+    parser.add_argument(
+        "--shadow",
+        choices=("none", "peak", "horizon", "traced"),
+        help="how threads shadow one another (default: horizon)",
     )
     parser.add_argument(
         "--max-error",
         type=number("max_error"),
         metavar="E",
-        help="choose --shadow, and --noise, by this bound",
+        help="choose --shadow, --noise and the level for an error of at most this",
     )
     parser.add_argument(
         "--complexity", choices=("auto", "low", "medium", "high", "veryhigh"), default="auto",
-        help="of subdivision surfaces; low: their cages; auto: as the picture shows",
+        help="refinement of subdivision surfaces; low: none; auto: as fine as the picture shows",
     )  # fmt: skip
-    parser.add_argument("--aov", action="append", default=[], metavar="LAYER", help="or 'all'")
-    parser.add_argument("--frames", metavar="A-B", help="time codes: 7, 1-10, 1-10x2, or a list")
     parser.add_argument(
-        "--exposure", type=number("exposure"), default=0.0, metavar="STOPS", help="of the .png"
+        "--aov",
+        action="append",
+        default=[],
+        metavar="LAYER",
+        help="also write this layer, or 'all' (repeatable)",
     )
-    parser.add_argument("--seed", type=number("seed"), default=0)
+    parser.add_argument(
+        "--frames", metavar="A-B", help="time codes to render: 7, 1-10, 1-10x2, or a list of these"
+    )
+    parser.add_argument(
+        "--exposure",
+        type=number("exposure"),
+        default=0.0,
+        metavar="STOPS",
+        help="exposure of the .png (default: 0)",
+    )
+    parser.add_argument("--seed", type=number("seed"), default=0, help="random seed (default: 0)")
     parser.add_argument(
         "--workers", type=number("workers"), metavar="N", help="CPU threads (default: all)"
     )
-    parser.add_argument("-n", "--dry-run", action="store_true", help="read the scene only")
+    parser.add_argument(
+        "-n",
+        "--dry-run",
+        action="store_true",
+        help="read and describe the scene, but render nothing",
+    )
     parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Render, and say what was left out."""
+    """Render, and report what was left out."""
     require_picture(options.width, options.height)
     from fabricusd.reference import AOVS, read_scene, render
     from fabricusd.scene.size import mesh_words
@@ -132,12 +175,12 @@ def run(options: argparse.Namespace) -> int:
     if not options.quiet:
         rate = result.rays / max(result.seconds, 1e-9) / 1e6
         print(
-            f"fabricusd: {', '.join(result.paths)}: {result.samples:.4g} samples a pixel, "
+            f"fabricusd: {', '.join(result.paths)}: {result.samples:.4g} samples per pixel, "
             f"{result.rays / 1e6:.3g} M rays in {result.seconds:.3g} s ({rate:.3g} M/s)",
             file=sys.stderr,
         )
     if not result.complete:
-        print("fabricusd: interrupted; what was done is kept", file=sys.stderr)
+        print("fabricusd: interrupted; the samples taken so far are kept", file=sys.stderr)
         return 130
     too_noisy = options.noise and result.noise > options.noise
     return 1 if too_noisy or not result.met else 0
@@ -153,7 +196,7 @@ def _refuse_existing(output: Path, frames: tuple[float, ...] | None) -> None:
 
 
 def _choose(options: argparse.Namespace, fabric: Fabric | None) -> None:
-    """Fill in what --max-error leaves open, and say why."""
+    """Choose the settings that --max-error leaves open, and say why."""
     from fabricusd.appearance.weave.footprint import DEFAULT
 
     options.limits = DEFAULT
@@ -185,7 +228,7 @@ def _tell(notes: object, options: argparse.Namespace) -> None:
 def _progress(
     options: argparse.Namespace,
 ) -> tuple[Callable[[], None], Callable[[float, float], None] | None]:
-    """(what to call at the end, what to call meanwhile): a bar on a terminal, else nothing."""
+    """(function to call at the end, function to report progress to): a bar, on a terminal only."""
     if options.quiet or not sys.stderr.isatty():
         return (lambda: None), None
     from tqdm import tqdm
@@ -210,11 +253,15 @@ def parse_frames(text: str) -> tuple[float, ...]:
             first, last, step = found.groups()
             a, b, stride = float(first), float(last or first), float(step or 1)
         except ValueError:
-            raise FabricError("--frames", f"is '{text}'; it must be as in 1-10 or 1-10x2") from None
+            raise FabricError(
+                "--frames", f"is '{text}'; write it as in 7, 1-10 or 1-10x2"
+            ) from None
         for code in (a, b):
             RANGES["frame"].require(f"--frames '{one_line(text, 60)}':", code)
         if not (stride > 0 and b >= a):
-            raise FabricError("--frames", f"is '{text}'; it must rise, by steps above 0")
+            raise FabricError(
+                "--frames", f"is '{text}'; a range must be ascending, with a step above 0"
+            )
         if len(codes) + (b - a) / stride >= MOST_FRAMES:
             raise FabricError(
                 "--frames", f"is '{text}'; it must be at most {MOST_FRAMES} frames in all"

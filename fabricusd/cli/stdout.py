@@ -1,4 +1,4 @@
-"""Standard output: whatever it is, no command ends in a traceback for it."""
+"""Handling of standard output, so that no kind of output makes a command end in a traceback."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import suppress
 
 
 def ready_stdout() -> None:
-    """Let text that the terminal's encoding lacks come out as `?`; a closed output takes all."""
+    """Print characters that the encoding lacks as `?`; let a closed output discard its text."""
     if sys.stdout is None:
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     if hasattr(sys.stdout, "reconfigure"):
@@ -16,14 +16,14 @@ def ready_stdout() -> None:
 
 
 def drop_stdout() -> None:
-    """Keep Python from complaining at exit of an output that takes no more."""
-    # What a program has put in its place may have no descriptor.
+    """Keep Python from complaining at exit about an output that was closed."""
+    # A program may have replaced stdout by an object without a descriptor.
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def can_show(text: str) -> bool:
-    """Whether the encoding of standard output has the characters of `text`."""
+    """Whether the encoding of standard output has all characters of `text`."""
     try:
         text.encode(sys.stdout.encoding or "ascii")
     except UnicodeEncodeError:
@@ -32,7 +32,7 @@ def can_show(text: str) -> bool:
 
 
 def write_utf8(text: str) -> None:
-    """A USD layer or a WIF file, which are UTF-8 wherever they are printed."""
+    """Print a USD layer or a WIF file, which are always UTF-8."""
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(encoding="utf-8")
     sys.stdout.write(text)

@@ -1,5 +1,5 @@
-"""Pictures in files: EXR with layers and metadata, PNG, textures. Only here and in `flat_image` is
-OpenImageIO used."""
+"""Reading and writing picture files: EXR with layers and metadata, PNG, textures. OpenImageIO is
+used only here and in `images.flat`."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from fabricusd.files import readable_file, whole_file
 from fabricusd.srgb import linear_from_srgb
 
 REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-"""x and y of red, green, blue and white: the colours in which everything is rendered."""
+"""Chromaticities x and y of red, green, blue and white: the colour space of every rendering."""
 
 OPENIMAGEIO: str = oiio.VERSION_STRING
-"""Which version of the library reads and writes."""
+"""Version of the library that reads and writes."""
 
 
 def reason_of(source: Any) -> str:
-    """What `source`, or OpenImageIO itself, has to complain of; it quotes damaged files."""
+    """The error of `source`, or of OpenImageIO itself, on one line: it may quote a damaged file."""
     try:
         return one_line(str(source.geterror()), 200)
     except UnicodeDecodeError:
-        return "its header is no text"
+        return "its header is not text"
 
 
 @contextmanager
 def quietly() -> Iterator[None]:
-    """libpng and its like write their own lines past Python, to file descriptor 2."""
+    """Silence libraries such as libpng, which print to file descriptor 2 without Python."""
     try:
         kept = os.dup(2)
     except OSError:  # closed
@@ -55,9 +55,11 @@ def write_exr(
     channels: Mapping[str, tuple[str, ...]],
     metadata: Mapping[str, Any],
 ) -> None:
-    """One EXR of float32 layers (h, w, c): `beauty` as R, G, B, A, others as `layer.channel`.
+    """Write float32 layers (h, w, c) to one EXR: `beauty` as R, G, B, A, others as `layer.channel`.
 
-    metadata : str, int and float values. Written whole or not at all; `FabricError` if it cannot.
+    metadata : name -> str, int or float
+
+    The file is written whole or not at all; raises FabricError if it cannot be written.
     """
     names, planes = [], []
     for layer, pixels in layers.items():
@@ -71,7 +73,7 @@ def write_exr(
     spec.attribute("oiio:ColorSpace", "lin_rec709")
     spec.attribute("chromaticities", "float[8]", REC_709)
     for key, value in metadata.items():
-        # Its integers have 32 bits.
+        # Integers in an EXR header have 32 bits.
         fits = not isinstance(value, int) or -(2**31) <= value < 2**31
         kept = isinstance(value, int | float | str) and fits
         spec.attribute(key, value if kept else str(value))
@@ -84,11 +86,14 @@ def write_png(
     *,
     color_space: str = "sRGB",
 ) -> None:
-    """(h, w, c) uint8 or uint16 code values to a PNG, whole or not at all; "raw" for data."""
+    """Write (h, w, c) uint8 or uint16 code values to a PNG, whole or not at all.
+
+    color_space : "sRGB" for colours, "raw" for data
+    """
     kind = oiio.UINT16 if pixels.dtype == np.uint16 else oiio.UINT8
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind)
     spec.attribute("oiio:ColorSpace", color_space)
-    # The code values are the file's: nothing is to be divided by a fourth channel.
+    # Store the code values as they are: keep OpenImageIO from dividing by the fourth channel.
     spec.attribute("oiio:UnassociatedAlpha", 1)
     _write(path, spec, np.ascontiguousarray(pixels))
 
@@ -97,12 +102,15 @@ def _write(path: str | os.PathLike[str], spec: Any, data: NDArray[Any]) -> None:
     with whole_file(path) as temporary:
         output = oiio.ImageOutput.create(str(temporary))
         if output is None:
-            raise FabricError(str(path), "is no picture format; it must end in .exr or .png")
+            raise FabricError(
+                str(path), "does not name a picture format; it must end in .exr or .png"
+            )
         try:
             good = output.open(str(temporary), spec) and output.write_image(data) and output.close()
             reason = reason_of(output)
         finally:
-            # The file is complete only once the writer is gone. Of an interrupt libpng complains.
+            # The writer completes the file when it is destroyed. After an interrupt, libpng prints
+            # a complaint then.
             with quietly():
                 del output
         if not good:
@@ -110,21 +118,21 @@ def _write(path: str | os.PathLike[str], spec: Any, data: NDArray[Any]) -> None:
 
 
 MOST_GROWTH = 2000
-"""Most times that a picture may be larger than its file; no usual compression reaches it."""
+"""Largest ratio of a picture's size to that of its file; no usual compression reaches it."""
 
 SPARE = 32 * 1024 * 1024
-"""Bytes that a picture may have however small its file is."""
+"""Bytes that a picture may have, however small its file is."""
 
 
 def require_plausible(where: str, spec: Any) -> None:
-    """Raise where a picture is out of all proportion to its file, before memory is taken for it."""
+    """Raise if a picture is out of proportion to its file, before memory is allocated for it."""
     size = float(spec.image_bytes(True))
     most = SPARE + MOST_GROWTH * os.path.getsize(where)
     if not 0 < size <= most:
         raise FabricError(
             where,
-            f"says that it has {spec.width} x {spec.height} pixels of {spec.nchannels} channels, "
-            f"{size:.4g} bytes; a whole file of its size has at most {most}",
+            f"claims {spec.width} x {spec.height} pixels of {spec.nchannels} channels, "
+            f"{size:.4g} bytes; a complete file of its size has at most {most}",
         )
 
 
@@ -132,12 +140,12 @@ def require_plausible(where: str, spec: Any) -> None:
 def read_image(
     path: str | os.PathLike[str], *, color_space: str = "auto", most: int = 0
 ) -> NDArray[np.float32]:
-    """(h, w, c) float32, linear, c being 1 or 3; raises `FabricError` where it cannot be read.
+    """(h, w, c) float32, linear, c being 1 or 3; raises FabricError if it cannot be read.
 
-    Colours are those of the file: a picture's opacity neither multiplies nor divides them.
+    Colours are returned as stored: they are neither multiplied nor divided by opacity.
 
-    color_space : "auto" decodes sRGB from 8-bit pictures, "sRGB" always, "raw" never
-    most : shrink to at most this many pixels a side; 0 keeps all
+    color_space : "auto" decodes sRGB in 8-bit pictures, "sRGB" always, "raw" never
+    most : shrink to at most this many pixels per side; 0 keeps all
     """
     pixels, spec = _stored_pixels(path)
     pixels = _shrunk(pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1], most)
@@ -149,7 +157,7 @@ def read_image(
 
 @reads("a picture")
 def read_alpha(path: str | os.PathLike[str], *, most: int = 0) -> NDArray[np.float32]:
-    """(h, w, 1) float32 opacity of a picture, 1 where it has none; otherwise as `read_image`."""
+    """(h, w, 1) float32 opacity of a picture, one pixel of 1 if it has none; see `read_image`."""
     pixels, spec = _stored_pixels(path)
     channel = spec.alpha_channel
     if not 0 <= channel < pixels.shape[2]:
@@ -158,7 +166,7 @@ def read_alpha(path: str | os.PathLike[str], *, most: int = 0) -> NDArray[np.flo
 
 
 def _stored_pixels(path: str | os.PathLike[str]) -> tuple[NDArray[np.float32], Any]:
-    """((h, w, c) float32 values as they are in the file, its specification)."""
+    """((h, w, c) float32 values as they are stored in the file, the file's specification)."""
     plain = oiio.ImageSpec()
     plain.attribute("oiio:UnassociatedAlpha", 1)
     pixels, buffer = _buffer_pixels(path, 0, plain)
@@ -168,9 +176,10 @@ def _stored_pixels(path: str | os.PathLike[str]) -> tuple[NDArray[np.float32], A
 def _buffer_pixels(
     path: str | os.PathLike[str], level: int = 0, config: Any = None
 ) -> tuple[NDArray[np.float32], Any]:
-    """((h, w, c) float32 values of one mip level, the buffer that was read).
+    """((h, w, c) float32 values of one mip level, the buffer that holds them).
 
-    Raises FabricError for what is no picture, is damaged, or cannot be as large as it says.
+    Raises FabricError for a file that is not a picture, is damaged, or cannot be as large as it
+    claims.
     """
     where = str(readable_file(path))
     with quietly():
@@ -178,11 +187,11 @@ def _buffer_pixels(
         if buffer.has_error or level >= max(buffer.nmiplevels, 1):
             reason = reason_of(buffer)
             if level:
-                reason = f"there is no level {level} ({reason or 'too few'})"
+                reason = f"there is no mip level {level} ({reason or 'it has fewer'})"
             raise FabricError(where, f"cannot be read as a picture: {reason}")
         spec = buffer.spec()
         if spec.deep or spec.depth > 1:
-            raise FabricError(where, "is deep or has several layers of depth; it must be flat")
+            raise FabricError(where, "is a deep or volumetric picture; it must be flat")
         require_plausible(where, spec)
         pixels = None
         if buffer.read(0, level, True, oiio.FLOAT):
@@ -194,7 +203,7 @@ def _buffer_pixels(
 
 
 def _shrunk(pixels: NDArray[np.float32], most: int) -> NDArray[np.float32]:
-    """Means of square blocks, so that no side is longer than `most`; as it is where that is 0."""
+    """Means of square blocks, so that no side is longer than `most`; unchanged if that is 0."""
     longest = max(pixels.shape[:2])
     if not most or longest <= most:
         return pixels
@@ -208,7 +217,7 @@ def _shrunk(pixels: NDArray[np.float32], most: int) -> NDArray[np.float32]:
 def read_exr_layers(
     path: str | os.PathLike[str],
 ) -> tuple[dict[str, NDArray[np.float32]], dict[str, Any]]:
-    """Layers (h, w, c) and metadata of an EXR that `write_exr` wrote."""
+    """(name -> layer (h, w, c), metadata) of an EXR that `write_exr` wrote."""
     pixels, buffer = _buffer_pixels(path)
     planes: dict[str, list[NDArray[np.float32]]] = {}
     for k, name in enumerate(buffer.spec().channelnames):
@@ -226,12 +235,12 @@ def write_mip_exr(
     kind: type[Any],
     metadata: Mapping[str, Any],
 ) -> None:
-    """A square mip-mapped EXR in tiles of 64, zip compressed, written band by band.
+    """Write a square mip-mapped EXR in tiles of 64, zip compressed, band by band.
 
-    levels : for each level a function that gives its rows from the top, as (rows, size, channels)
-        arrays of `kind`, np.float16 or np.float32; heights in multiples of 64, or the whole level
+    levels : for each level, a function that yields its rows from the top, as (rows, size, channels)
+        arrays of `kind`, np.float16 or np.float32; a height is a multiple of 64 or the whole level
 
-    Written whole or not at all; `FabricError` where it cannot.
+    The file is written whole or not at all; raises FabricError if it cannot be written.
     """
     half = np.dtype(kind) == np.float16
     with whole_file(path) as temporary:
@@ -246,7 +255,7 @@ def write_mip_exr(
             spec.attribute("openexr:levelmode", 1)
             spec.attribute("textureformat", "Plain Texture")
             spec.attribute("wrapmodes", "clamp,clamp")
-            # The time of writing would make two files of the same pixels differ.
+            # With the time of writing, two files of the same pixels would differ.
             spec.attribute("DateTime", "1970:01:01 00:00:00")
             for key, value in metadata.items():
                 spec.attribute(key, value if isinstance(value, int | float | str) else str(value))
@@ -259,7 +268,7 @@ def write_mip_exr(
                 row = end
         good = good and output.close()
         reason = reason_of(output) if output is not None else "no EXR writer"
-        # The file is complete only once the writer is gone.
+        # The writer completes the file when it is destroyed.
         del output
         if not good:
             raise FabricError(str(path), f"cannot be written: {reason}")
@@ -272,19 +281,19 @@ def write_16_bit(
     channels: int,
     metadata: Mapping[str, Any],
 ) -> None:
-    """A square PNG or TIFF of 16-bit numbers, by the path's suffix, written band by band.
+    """Write a square PNG or TIFF, told by the suffix, of 16-bit numbers, band by band.
 
-    bands : rows from the top, (rows, size, channels); a third channel of 0 is added to two, which
-        both formats would take for a grey and its opacity
+    bands : rows from the top, (rows, size, channels). To two channels a third of 0 is added, since
+        both formats would take two for grey and opacity.
 
-    Written whole or not at all; `FabricError` where it cannot.
+    The file is written whole or not at all; raises FabricError if it cannot be written.
     """
     kept = 3 if channels == 2 else channels
     with whole_file(path) as temporary:
         output: Any = oiio.ImageOutput.create(str(temporary))
         spec = oiio.ImageSpec(size, size, kept, oiio.UINT16)
         spec.channelnames = ("Y",) if kept == 1 else ("R", "G", "B", "A")[:kept]
-        # The fourth channel is data: nothing is to be divided by it.
+        # The fourth channel is data: keep OpenImageIO from dividing by it.
         spec.attribute("oiio:UnassociatedAlpha", 1)
         spec.attribute("compression", "zip")
         spec.attribute("DateTime", "1970:01:01 00:00:00")
@@ -309,16 +318,16 @@ def write_16_bit(
 
 @reads("a picture")
 def read_mip_level(path: str | os.PathLike[str], level: int = 0) -> NDArray[np.float32]:
-    """(h, w, c) float32 pixels of one mip level, values as they are in the file."""
+    """(h, w, c) float32 pixels of one mip level, with the values stored in the file."""
     plain = oiio.ImageSpec()
-    # A fourth channel is data: nothing is to be multiplied by it.
+    # The fourth channel is data: keep OpenImageIO from multiplying by it.
     plain.attribute("oiio:UnassociatedAlpha", 1)
     return _buffer_pixels(path, level, plain)[0]
 
 
 @reads("a picture")
 def shape_of(path: str | os.PathLike[str]) -> tuple[int, int, int]:
-    """(height, width, channels) as the head of a picture's file says; no pixel is read."""
+    """(height, width, channels) from the header of a picture's file; no pixel is read."""
     where = str(readable_file(path))
     with quietly():
         source: Any = oiio.ImageInput.open(where)
@@ -330,9 +339,9 @@ def shape_of(path: str | os.PathLike[str]) -> tuple[int, int, int]:
 
 @reads("a picture")
 def read_middle(path: str | os.PathLike[str], most: int) -> NDArray[np.float32]:
-    """(h, w, c) float32 middle of a square texture, at most `most` a side.
+    """(h, w, c) float32, the middle of a square texture, at most `most` pixels per side.
 
-    most : a multiple of 64; no other tile is read where there are tiles
+    most : a multiple of 64; of a tiled texture, only the tiles in the middle are read
     """
     where = str(readable_file(path))
     with quietly():

@@ -1,4 +1,4 @@
-"""Flat pictures of bounded size, read band by band: what weaves are drawn in."""
+"""Reading flat pictures of bounded size band by band, for drafts drawn as images."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from fabricusd.files import readable_file
 from fabricusd.images.files import quietly, reason_of, require_plausible
 
 BAND = 4 * 1024 * 1024
-"""Bytes of pixels that are read at once."""
+"""Bytes of pixels that are read at a time."""
 
 
 @contextmanager
 def _at_most(megabytes: int) -> Iterator[None]:
-    """Let formats that take memory for the whole picture when they are opened refuse first."""
+    """Make formats refuse a large picture that would be allocated as soon as it is opened."""
     name = "limits:imagesize_MB"
     before = oiio.get_int_attribute(name)
     oiio.attribute(name, megabytes)
@@ -33,7 +33,7 @@ def _at_most(megabytes: int) -> Iterator[None]:
 
 
 def _require_decodable(where: str, most_bytes: int) -> None:
-    """Raise for a JPEG 2000 that takes more memory than that: opening one decodes it, unbounded."""
+    """Raise for a JPEG 2000 that takes more memory than that: opening one decodes all of it."""
     with open(where, "rb") as stream:
         head = stream.read(512)
     form = ">IIH"  # height, width and channels of the box; width and height of the codestream
@@ -54,15 +54,15 @@ def _require_decodable(where: str, most_bytes: int) -> None:
 
 
 class FlatImage:
-    """A flat picture in a file, read band by band as often as asked for.
+    """A flat picture in a file, which can be read band by band, repeatedly.
 
     width, height, channels : of the pixels that are read; at most 4 channels
-    alpha : the channel of opacity, or -1
-    linear : whether its numbers are floats and linear; else they are display codes
-    several : whether the file holds more pictures, of which this is the first
+    alpha : index of the channel of opacity, or -1
+    linear : True if the values are linear floats, False if they are display codes
+    several : whether the file holds more pictures after this one
 
-    Raises FabricError for what is no flat image of 1 to `largest` pixels a side and at most
-    `most_pixels` altogether, before a pixel is read.
+    Raises FabricError, before a pixel is read, unless the file is a flat image of 1 to `largest`
+    pixels per side and at most `most_pixels` altogether.
     """
 
     def __init__(self, path: str | os.PathLike[str], largest: int, most_pixels: int) -> None:
@@ -73,7 +73,7 @@ class FlatImage:
             spec = reader.spec()
             self._require_flat(spec, largest, most_pixels)
             self.several = bool(reader.seek_subimage(1, 0))
-            reason_of(reader)  # what is wrong with a second picture is nobody's concern
+            reason_of(reader)  # drop the error of a second picture, which is never read
             reader.close()
         self.width, self.height = int(spec.width), int(spec.height)
         self.channels = min(int(spec.nchannels), 4)
@@ -85,7 +85,7 @@ class FlatImage:
         with _at_most(self.most_bytes >> 20):
             reader: Any = oiio.ImageInput.open(self.where)
         if reader is None:
-            raise FabricError(self.where, f"is not an image ({reason_of(oiio)}); it must be one")
+            raise FabricError(self.where, f"is not an image that can be read ({reason_of(oiio)})")
         return reader
 
     def _require_flat(self, spec: Any, largest: int, most_pixels: int) -> None:
@@ -93,8 +93,8 @@ class FlatImage:
         if not (1 <= min(sides) <= max(sides) <= largest and spec.depth <= 1):
             raise FabricError(
                 self.where,
-                f"is {spec.width} x {spec.height} x {spec.depth} pixels; it must be from 1 to "
-                f"{largest} a side, and flat",
+                f"is {spec.width} x {spec.height} x {spec.depth} pixels; it must be flat, and from "
+                f"1 to {largest} pixels per side",
             )
         tile = spec.tile_width * spec.tile_height
         if max(spec.width * spec.height, tile) > most_pixels:
@@ -105,7 +105,7 @@ class FlatImage:
             )
         if spec.deep or spec.nchannels < 1:
             raise FabricError(
-                self.where, "has no pixels of one colour each; it must be a flat image"
+                self.where, "does not have one colour per pixel; it must be a flat image"
             )
         require_plausible(self.where, spec)
         if spec.image_bytes(True) > self.most_bytes:
@@ -118,7 +118,7 @@ class FlatImage:
     def bands(self) -> Iterator[NDArray[np.uint8] | NDArray[np.float32]]:
         """(rows, width, channels) uint8 display codes or float32 linear values, from the top.
 
-        Raises FabricError where the file ends before the picture does.
+        Raises FabricError if the file ends before the picture does.
         """
         with quietly():
             reader = self._open()
@@ -141,7 +141,7 @@ class FlatImage:
             if pixels is None or reason:
                 raise FabricError(
                     self.where,
-                    f"cannot be read to its end ({reason or 'no pixels'}); it must be a whole "
+                    f"cannot be read to its end ({reason or 'no pixels'}); it must be a complete "
                     "image",
                 )
             yield np.asarray(pixels).reshape(end - begin, self.width, self.channels)

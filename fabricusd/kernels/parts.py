@@ -29,7 +29,8 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
     def finalize(self) -> None:
         self._raise_if_finalized()
         for library in dict.fromkeys(self._linking_libraries):
-            self._reload_init.update(library._reload_init)
+            if hasattr(self, "_reload_init"):
+                self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
         self._finalized = True
 
@@ -51,7 +52,8 @@ class _PartLowering(NativeLowering):  # type: ignore[misc]
         lowered = state["cr"]
         entry = _entry_for_python(state.func_id.func, lowered)
         state.targetctx.insert_user_function(entry, lowered.fndesc, [state.library])
-        state.reload_init.extend(state.library._reload_init)
+        # Libraries carry this from numba 0.63 on.
+        state.reload_init.extend(getattr(state.library, "_reload_init", ()))
         state["cr"] = lowered._replace(cfunc=entry)
         return True
 

@@ -1,1 +1,1 @@
-"""How far apart two pictures or two reflectances are, and whether chance explains it."""
+"""Measures of how far apart two pictures or two colours are, and whether noise explains it."""

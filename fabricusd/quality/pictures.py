@@ -1,8 +1,8 @@
 """Differences between two pictures of the same size, in linear Rec. 709.
 
 RMSE          root of the mean squared difference, over pixels and channels
-relative MSE  mean of (a - b)^2 / (b^2 + 0.01), b the reference: dark and bright count alike
-FLIP          [Andersson2020], what a viewer flipping between the two would see, 0 to 1
+relative MSE  mean of (a - b)^2 / (b^2 + 0.01), b the reference: dark and bright pixels count alike
+FLIP          [Andersson2020], the difference seen by flipping between the two, 0 to 1
 delta E 2000  [Sharma2005], of the display colours, mean and 95th percentile
 """
 
@@ -24,9 +24,9 @@ RELATIVE_FLOOR = 0.01
 
 @dataclass(frozen=True)
 class Difference:
-    """Figures for a picture against its reference.
+    """Differences of a picture from its reference.
 
-    not_finite : pixels of either that hold NaN or infinity; the other figures leave them out
+    not_finite : pixels that are NaN or infinity in either; the other figures leave them out
     """
 
     rmse: float
@@ -40,11 +40,12 @@ class Difference:
 def flip_map(picture: Picture, reference: Picture, *, high_range: bool) -> NDArray[np.float64]:
     """(h, w) FLIP of two (h, w, 3) linear pictures, 0 to 1.
 
-    high_range : whether they are radiance, seen at several exposures, or display light from 0 to 1
+    high_range : True for radiance, which is compared at several exposures; False for display light
+        from 0 to 1
     """
     import flip_evaluator
 
-    # FLIP takes linear light with inputsRGB=False; negative light is none.
+    # With inputsRGB=False, FLIP takes linear light. Negative values count as 0.
     error, _, _ = flip_evaluator.evaluate(
         np.ascontiguousarray(np.maximum(reference, 0.0), np.float32),
         np.ascontiguousarray(np.maximum(picture, 0.0), np.float32),
@@ -58,11 +59,11 @@ def flip_map(picture: Picture, reference: Picture, *, high_range: bool) -> NDArr
 def difference(picture: Picture, reference: Picture, *, high_range: bool = True) -> Difference:
     """Every figure for (h, w, 3) `picture` against `reference`, both linear.
 
-    FabricError where the sizes differ, or no pixel is finite in both.
+    Raises FabricError if the sizes differ, or if no pixel is finite in both.
     """
     if picture.shape != reference.shape or picture.ndim != 3 or picture.shape[2] != 3:
         raise FabricError(
-            "pictures", f"are {_size(picture)} and {_size(reference)}; they must be of one size"
+            "pictures", f"are {_size(picture)} and {_size(reference)}; they must have the same size"
         )
     good = np.asarray(np.isfinite(picture).all(axis=2) & np.isfinite(reference).all(axis=2))
     if not good.any():
@@ -71,7 +72,7 @@ def difference(picture: Picture, reference: Picture, *, high_range: bool = True)
     b = np.asarray(reference, np.float64)[good]
     square = (a - b) ** 2
     colors = delta_e_2000(picture[good][None], reference[good][None])
-    # FLIP looks at neighbourhoods, so what is not finite is made equal in both.
+    # FLIP looks at neighbourhoods, so pixels that are not finite are made equal in both.
     flip = flip_map(
         np.where(good[..., None], picture, 0.0).astype(np.float32),
         np.where(good[..., None], reference, 0.0).astype(np.float32),

@@ -1,4 +1,4 @@
-"""Whether chance explains a difference: the tests that golden pictures and samplers are held to."""
+"""Statistical tests of whether chance explains a difference between pictures or histograms."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ def z_test(
     golden_variance: NDArray[np.floating],
     significance: float = 0.01,
 ) -> tuple[bool, float]:
-    """Do two noisy pictures show the same? (passes, smallest p-value of a pixel).
+    """Whether two noisy pictures can have the same expectation: (passes, smallest p-value).
 
-    Each is a mean with the variance of that mean, any equal shapes. Two-sided z per value; the
-    significance is for the whole picture, shared out by [Sidak1967], so that a true pair fails once
-    in 1/significance pictures whatever its size. Values that neither picture says vary are left out
-    where they agree, and fail the picture where they do not.
+    Each picture is a mean with the variance of that mean, all of the same shape. The z-test of each
+    value is two-sided. The significance holds for the picture as a whole and is divided among its
+    values by [Sidak1967], so that of pairs with the same expectation one in 1/significance fails,
+    whatever their size. Values without variance in either picture are left out if they agree, and
+    fail the test if they do not.
     """
     spread = np.sqrt(np.asarray(variance_of_mean, np.float64) + golden_variance)
     gap = np.abs(np.asarray(mean, np.float64) - golden)
@@ -43,21 +44,23 @@ def z_test(
 def chi_squared(
     counts: NDArray[np.integer], expected: NDArray[np.floating], least: float = 5.0
 ) -> tuple[float, float, int]:
-    """(statistic, p-value, degrees of freedom) of sampled counts against what a density expects.
+    """(statistic, p-value, degrees of freedom) of sampled counts against the expected counts.
 
-    Cells that expect fewer than `least` are pooled, so that the statistic follows its law; a count
-    in a cell that expects nothing at all makes the p-value 0. [Pearson1900]
+    Cells with an expectation below `least` are pooled, so that the statistic follows its law. A
+    count in a cell whose expectation is 0 makes the p-value 0. [Pearson1900]
     """
     found = np.asarray(counts, np.float64).ravel()
     wanted = np.asarray(expected, np.float64).ravel()
     if found.shape != wanted.shape:
-        raise FabricError("counts", f"are {found.size} and expected {wanted.size}; as many of each")
+        raise FabricError(
+            "counts", f"are {found.size}; there must be as many as expected counts, {wanted.size}"
+        )
     if (found[wanted <= 0.0] > 0).any():
         return math.inf, 0.0, 0
     order = np.argsort(wanted)
     found, wanted = found[order], wanted[order]
     small = int(np.searchsorted(wanted, least))
-    # Pool the smallest until together they expect enough.
+    # Pool the smallest cells until their expectation is large enough.
     while small < wanted.size and wanted[:small].sum() < least and small > 0:
         small += 1
     if small:

@@ -1,7 +1,8 @@
 """Fabrics as USD prims: the schema, reading, writing, checking, presets, weave importers.
 
-Importing this registers the schema with USD. Where a stage was used before, fabricusd works all the
-same; for USD itself fallbacks are then missing, unless PXR_PLUGINPATH_NAME names `PLUGIN_PATH`.
+Importing this package registers the schema with USD. If the program has used a stage before,
+fabricusd works all the same, but USD itself lacks the fallbacks, unless PXR_PLUGINPATH_NAME names
+`PLUGIN_PATH`.
 """
 
 from __future__ import annotations

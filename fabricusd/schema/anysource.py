@@ -1,4 +1,4 @@
-"""A fabric from whatever a user has: a USD file, a WIF draft, an image, or a preset's name."""
+"""Load a fabric from a USD file, a WIF draft, an image, or a preset's name."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ def is_draft(source: str | os.PathLike[str]) -> bool:
 
 @reads("a fabric")
 def load_any(source: str | os.PathLike[str]) -> tuple[Fabric, tuple[str, ...]]:
-    """(fabric, what was noticed on the way). FabricError as the reader of that kind raises it."""
+    """Return (fabric, notes of the reader). Raises FabricError as that reader does."""
     text = os.fspath(source)
     if is_draft(text):
         from fabricusd.weaves import losses, to_fabric
 
         draft = read_draft(text)
         return to_fabric(draft, name=Path(text).stem), (*draft.warnings, *losses(draft))
-    from fabricusd.schema.read import load
+    from fabricusd.schema.read import load_noted
 
-    return load(text), ()
+    return load_noted(text)

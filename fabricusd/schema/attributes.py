@@ -40,6 +40,11 @@ class Attribute:
     sentinel: float | None = None
 
     @property
+    def is_color(self) -> bool:
+        """Whether it holds a colour, which has a color space."""
+        return self.type_name.startswith("color")
+
+    @property
     def limits(self) -> Mapping[str, Any]:
         """The field's bounds, in SI; empty where it has none."""
         for f in fields(self.owner):
@@ -83,6 +88,11 @@ BINDING = (
     Attribute("fabric:binding:offset", "double2", Binding, "offset"),
 )
 """Numbers of a WovenBindingAPI."""
+
+
+def every_attribute() -> tuple[Attribute, ...]:
+    """All of them, of the three schemas."""
+    return (*THREAD, *FABRIC, *thread_set("warp"), *thread_set("weft"), *BINDING)
 
 
 def to_si(value: Any, attribute: Attribute) -> Any:

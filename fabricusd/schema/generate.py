@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from fabricusd.fabric import MODELS
+from fabricusd.schema.attributes import Attribute, every_attribute, unscale
 
 HERE = Path(__file__).resolve().parent
 PLUGIN = HERE / "plugin"
@@ -56,6 +57,47 @@ def _whole_source(folder: Path) -> Path:
     return target
 
 
+def _finished(made: Path, source: Path) -> str:
+    """The text of usdGenSchema's layer with each attribute's unit and bounds, which it leaves out.
+
+    Bounds are USD's `limits`, in the unit of the file; an open bound is written as the closed one
+    nearest to it, which `limits` have alone. USD before 25.11 passes over them.
+    """
+    from pxr import Sdf
+
+    layer, written = (Sdf.Layer.FindOrOpen(str(path)) for path in (made, source))
+    bounds = {entry.name: _limits(entry) for entry in every_attribute()}
+    for prim in layer.rootPrims:
+        for spec in prim.attributes:
+            unit = written.GetObjectAtPath(spec.path).customData.get("unit")
+            if unit:
+                spec.customData = {**dict(spec.customData), "unit": unit}
+            if bounds.get(spec.name):
+                spec.SetInfo("limits", bounds[spec.name])
+    return str(layer.ExportToString())
+
+
+def _limits(entry: Attribute) -> dict[str, dict[str, Any]]:
+    """USD's `limits` of one attribute: hard ones, and soft ones where a value stands for None."""
+    from pxr import Gf
+
+    held = entry.limits
+    lo = held.get("minimum") if held.get("above") is None else held["above"]
+    hi = held.get("maximum") if held.get("below") is None else held["below"]
+    ends = {
+        name: unscale(end, entry.scale)
+        for name, end in (("minimum", lo), ("maximum", hi))
+        if end is not None
+    }
+    width = {"color3d": Gf.Vec3d, "double2": Gf.Vec2d}.get(entry.type_name)
+    shaped = {name: width(*[end] * width.dimension) if width else end for name, end in ends.items()}
+    if not shaped:
+        return {}
+    if entry.sentinel is None:
+        return {"hard": shaped}
+    return {"hard": {**shaped, "minimum": entry.sentinel}, "soft": shaped}
+
+
 def generate() -> dict[str, str]:
     """File name -> contents, freshly made."""
     from pxr import Usd
@@ -76,7 +118,7 @@ def generate() -> dict[str, str]:
         made = out / "generatedSchema.usda"
         if done.returncode or not made.exists():
             raise RuntimeError(f"usdGenSchema failed: {done.stdout}{done.stderr}")
-        schema = made.read_text()
+        schema = _finished(made, source)
         info_text = re.sub(r"^#.*\n", "", (out / "plugInfo.json").read_text(), flags=re.M)
     plugin = json.loads(info_text)["Plugins"][0]
     plugin.update({"LibraryPath": "", "ResourcePath": ".", "Root": "."})

@@ -1,4 +1,4 @@
-"""Names of prims."""
+"""Make valid names for prims."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def prim_name(text: str, *, ascii_only: bool = False) -> str:
     ascii_only : for names that go into MaterialX too, which has no other letters
     """
     name = re.sub(r"\W+", "_", text.strip()) or "Fabric"
-    # Not all that Python takes for a letter is one to USD.
+    # Python counts more characters as letters than USD does.
     ascii_name = re.sub(r"[^A-Za-z0-9_]", "_", name)
     spellings: tuple[str, ...] = (ascii_name, f"_{ascii_name}")
     if not ascii_only:
@@ -23,7 +23,7 @@ def prim_name(text: str, *, ascii_only: bool = False) -> str:
 
 
 def free_name(name: str, taken: Container[str]) -> str:
-    """`name`, with a number after it where it is `taken`."""
+    """Return `name`, with a number after it if it is `taken`."""
     candidate, count = name, 1
     while candidate in taken:
         count += 1

@@ -1,4 +1,4 @@
-"""From what a user names to a stage: a file, a file with a prim path, or a preset."""
+"""Open the stage that a user names: a file, a file with a prim path, or a preset."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pxr import Sdf, Tf, Usd, UsdUtils
 
 from fabricusd.errors import FabricError, one_line, reads
 from fabricusd.files import readable_file
+from fabricusd.schema.access import kind_of, type_of
 
 PRESETS = Path(__file__).resolve().parent / "presets"
 
@@ -19,11 +20,11 @@ PARSER_WORDS = {
     r"parse error matching \S.*? at '": "does not parse at '",
     r"Error parsing \w+ value: Failed .*?\(at sub-part .*?\) at ": "no value of its type: ",
 }
-"""What USD's text parser says in its own terms, as patterns, and in plain ones."""
+"""Patterns of what USD's text parser says, and plain words to replace each of them with."""
 
 
 def preset_names() -> list[str]:
-    """Names of the fabrics that come with the package."""
+    """Return the names of the fabrics that come with the package."""
     return sorted(path.stem for path in PRESETS.glob("*.usda"))
 
 
@@ -31,11 +32,11 @@ def split_source(source: str | os.PathLike[str]) -> tuple[Path, str]:
     """`FILE[:/PRIM]` or a preset's name -> (file, prim path or "")."""
     text = os.fspath(source)
     file, separator, prim = text.rpartition(":/")
-    # `C:/cloth.usda` begins with a drive, which is no file.
+    # The part of `C:/cloth.usda` before the `:` is a drive, not a file.
     if not separator or (len(file) == 1 and file.isalpha()):
         file, separator = text, ""
     if not file:
-        raise FabricError(repr(text), "names no file; it must be a USD file or a preset")
+        raise FabricError(repr(text), "does not name a file; it must name a USD file or a preset")
     prim = f"/{prim}" if separator else ""
     if not os.path.exists(file) and file in preset_names():
         return PRESETS / f"{file}.usda", prim
@@ -46,12 +47,14 @@ def split_source(source: str | os.PathLike[str]) -> tuple[Path, str]:
 def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
     """Open the stage of a file or a preset, with every composition error raised.
 
-    Returns (stage, the name to use in messages). FabricError where the file is missing, empty, no
-    USD, or does not compose.
+    Returns (stage, the name to use in messages). Raises FabricError where the file is missing,
+    empty, not USD, or does not compose.
     """
     path, _ = split_source(source)
-    near = f"; presets are {', '.join(preset_names())}" if not path.suffix else ""
-    readable_file(path, missing=f"is no file{near}")
+    missing = "does not exist"
+    if not path.suffix:
+        missing = f"is neither a file nor a preset; presets are {', '.join(preset_names())}"
+    readable_file(path, missing=missing)
     with usd_errors(str(path)):
         if Sdf.FileFormat.FindByExtension(str(path)) is None:
             raise FabricError(str(path), "is not USD; it must be .usda, .usdc, .usd or .usdz")
@@ -63,7 +66,7 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
 
 
 def compose_stage(path: str) -> Usd.Stage:
-    """The stage of a file as it is on disk now; composition errors are the caller's to look at."""
+    """Open the stage of a file as it is on disk now; the caller looks at composition errors."""
     # USD also prints them as warnings.
     with no_warnings():
         layer = Sdf.Layer.FindOrOpen(path)
@@ -71,8 +74,8 @@ def compose_stage(path: str) -> Usd.Stage:
             raise FabricError(path, "is not USD; it cannot be parsed")
         stage = Usd.Stage.Open(layer)
         for used in stage.GetUsedLayers():
-            # The process may hold an older reading of the file; edits nobody saved are kept.
-            # Reloading one may have let go of another.
+            # The process may hold an older reading of the file. Unsaved edits are kept. Reloading
+            # one layer may have released another.
             if not used.expired and not used.dirty and not used.anonymous:
                 used.Reload()
         return stage
@@ -100,31 +103,34 @@ def flattened(source: str | os.PathLike[str]) -> str:
 
 @contextmanager
 def usd_errors(where: str, doing: str = "parsed as USD") -> Iterator[None]:
-    """What USD raises in the block as a FabricError of one line; `where` is the file."""
+    """Turn what USD raises in the block into a FabricError of one line; `where` is the file."""
     try:
         try:
             yield
         except Tf.ErrorException as error:
             raise FabricError(where, f"cannot be {doing}: {_usd_words(error)}") from error
     except UnicodeEncodeError as error:
-        raise FabricError(where, "has a name that is not UTF-8; USD needs one that is") from error
+        raise FabricError(where, "has a name that is not UTF-8; USD needs a UTF-8 name") from error
     except UnicodeDecodeError as error:
         byte = f"the byte {error.object[error.start]:#04x}{_line_of_byte(where)}"
         raise FabricError(where, f"holds {byte}; its text must be UTF-8") from error
 
 
 def _usd_words(error: Tf.ErrorException) -> str:
-    """What is wrong, without names of USD's source code; UnicodeDecodeError where it is no text."""
-    told = [one.commentary for one in error.args] or [str(error)]
-    # Of a value that does not parse USD says twice, and the second time where.
-    words = next((each for each in told if re.search(r":[0-9]+:[0-9]+: ", each)), told[0])
+    """Return what is wrong, without names of USD's source code.
+
+    Raises UnicodeDecodeError where USD's message is not text.
+    """
+    reports = [one.commentary for one in error.args] or [str(error)]
+    # USD reports a value that does not parse twice; the second report says where it is.
+    words = next((each for each in reports if re.search(r":[0-9]+:[0-9]+: ", each)), reports[0])
     for riddle, plain in PARSER_WORDS.items():
         words = re.sub(riddle, plain, words)
     return one_line(words, 300)
 
 
 def _line_of_byte(file: str) -> str:
-    """` in line 7` of a text layer, where its first byte is that is not UTF-8; else nothing."""
+    """Return ` in line 7` for a text layer's first byte that is not UTF-8, or ""."""
     try:
         data = Path(file).read_bytes()
         if data.startswith(b"#usda"):
@@ -139,10 +145,10 @@ def _line_of_byte(file: str) -> str:
 def find_prim(stage: Usd.Stage, file: str, prim_path: str) -> Usd.Prim:
     """The prim at `prim_path`, of any type; FabricError where there is none."""
     if not Sdf.Path.IsValidPathString(prim_path):
-        raise FabricError(f"{file}:{prim_path}", "is no prim path")
+        raise FabricError(f"{file}:{prim_path}", "is not a prim path")
     prim = stage.GetPrimAtPath(prim_path)
     if not prim:
-        raise FabricError(f"{file}:{prim_path}", "is no prim")
+        raise FabricError(f"{file}:{prim_path}", "does not exist; it must be a prim of the file")
     return prim
 
 
@@ -150,23 +156,24 @@ def find_fabric(stage: Usd.Stage, file: str, prim_path: str = "") -> Usd.Prim:
     """The WovenFabric prim at `prim_path`; by default the default prim, or the only one."""
     if prim_path:
         prim = find_prim(stage, file, prim_path)
-        if prim.GetTypeName() != "WovenFabric":
-            kind = prim.GetTypeName() or "an untyped prim"
-            raise FabricError(f"{file}:{prim_path}", f"is {kind}; it must be a WovenFabric")
+        if type_of(prim) != "WovenFabric":
+            raise FabricError(
+                f"{file}:{prim_path}", f"is {kind_of(prim)}; it must be a WovenFabric"
+            )
         return prim
     default = stage.GetDefaultPrim()
-    if default and default.GetTypeName() == "WovenFabric":
+    if default and type_of(default) == "WovenFabric":
         return default
     every = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
     found = []
     walk = iter(every)
     for prim in walk:
-        if prim.GetTypeName() == "WovenFabric":
+        if type_of(prim) == "WovenFabric":
             found.append(prim)
             # A fabric below is its back.
             walk.PruneChildren()
     if not found:
-        raise FabricError(file, "holds no WovenFabric prim")
+        raise FabricError(file, "has no WovenFabric prim")
     if len(found) > 1:
         names = ", ".join(f"{file}:{prim.GetPath()}" for prim in found[:8])
         raise FabricError(file, f"holds {len(found)} fabrics; name one of {names}")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 def fault(rows: Sequence[str]) -> str:
-    """What is wrong with the rows, "" where nothing is."""
+    """Return what is wrong with the rows, "" if nothing is."""
     if not rows:
         return "is empty; it must have at least one row"
     width = len(rows[0])

@@ -13,6 +13,7 @@ from fabricusd.files import whole_file
 from fabricusd.schema import attributes, weave_rows
 from fabricusd.schema.access import BINDING_API
 from fabricusd.schema.attributes import DEGREE, Attribute, from_si, unscale
+from fabricusd.schema.colors import LINEAR
 from fabricusd.schema.names import free_name, prim_name
 from fabricusd.schema.source import usd_errors
 
@@ -29,7 +30,7 @@ def save_all(
 ) -> None:
     """Write fabrics as root prims of a new layer, the first as its default prim.
 
-    Of several with one name the first is written.
+    Of fabrics that share a name, the first is written.
     """
     target = os.fspath(path)
     if not target.lower().endswith(EXTENSIONS):
@@ -59,7 +60,7 @@ def _layer(fabrics: Sequence[Fabric]) -> Sdf.Layer:
             prim = write_fabric(stage, path, fabric)
             if not stage.HasDefaultPrim():
                 stage.SetDefaultPrim(prim)
-    # No geometry here, but USD's own validators ask every layer for both.
+    # The layer has no geometry, but USD's validators want both on every layer.
     stage.SetMetadata("upAxis", "Y")
     stage.SetMetadata("metersPerUnit", 0.01)
     return layer
@@ -68,8 +69,8 @@ def _layer(fabrics: Sequence[Fabric]) -> Sdf.Layer:
 def write_fabric(stage: Usd.Stage, path: Sdf.Path | str, fabric: Fabric) -> Usd.Prim:
     """Define a WovenFabric prim; its threads and its back are children, which a reference brings.
 
-    A name that is no prim's becomes the nearest; threads of one name, and a back that is called
-    as a thread, have a number put after theirs.
+    A name that USD does not accept becomes the nearest one that it does. Threads that share a name,
+    and a back with the name of a thread, get a number after theirs.
     """
     path = Sdf.Path(path)
     prim = stage.DefinePrim(path, "WovenFabric")
@@ -87,7 +88,7 @@ def write_fabric(stage: Usd.Stage, path: Sdf.Path | str, fabric: Fabric) -> Usd.
     _set(prim, "fabric:weave:rows", "string[]", Vt.StringArray(rows))
     if fabric.weave.name:
         _set(prim, "fabric:weave:name", "string", fabric.weave.name)
-    _set(prim, "fabric:model", "token", fabric.model, uniform=True)
+    _set(prim, "fabric:model", "token", fabric.model)
     if fabric.opaque:
         _set(prim, "fabric:opaque", "bool", True)
     _set_numbers(prim, attributes.FABRIC, fabric)
@@ -103,7 +104,7 @@ def write_thread(stage: Usd.Stage, path: Sdf.Path | str, thread: Thread) -> Usd.
     prim = stage.DefinePrim(Sdf.Path(path), "WovenThread")
     _document(prim, thread.documentation)
     _set_numbers(prim, attributes.THREAD, thread)
-    _set(prim, "thread:model", "token", thread.model or "inherit", uniform=True)
+    _set(prim, "thread:model", "token", thread.model or "inherit")
     angles = [unscale(a, DEGREE) for a in thread.curve.angles]
     _set(prim, "thread:curve:positions", "double[]", Vt.DoubleArray(thread.curve.positions))
     _set(prim, "thread:curve:angles", "double[]", Vt.DoubleArray(angles))
@@ -115,12 +116,12 @@ def write_binding(prim: Usd.Prim, fabric_path: Sdf.Path | str, binding: Binding)
     # Not `ApplyAPI`, which asks for a schema that USD knows.
     prim.AddAppliedSchema(BINDING_API)
     prim.CreateRelationship("fabric:binding", custom=False).SetTargets([Sdf.Path(fabric_path)])
-    _set(prim, "fabric:binding:uvSet", "token", binding.uv_set, uniform=True)
+    _set(prim, "fabric:binding:uvSet", "token", binding.uv_set)
     _set_numbers(prim, attributes.BINDING, binding)
 
 
 def _unique_names(names: Sequence[str]) -> list[str]:
-    """Valid prim names; two that fall together are told apart by a number."""
+    """Return valid prim names, with a number after each that repeats an earlier one."""
     taken: dict[str, None] = {}
     for name in names:
         taken[free_name(prim_name(name), taken)] = None
@@ -137,9 +138,11 @@ def _set_numbers(prim: Usd.Prim, table: tuple[Attribute, ...], owner: object) ->
         _set(prim, entry.name, entry.type_name, from_si(getattr(owner, entry.field), entry))
 
 
-def _set(
-    prim: Usd.Prim, name: str, type_name: str, value: object, *, uniform: bool = False
-) -> None:
-    variability = Sdf.VariabilityUniform if uniform else Sdf.VariabilityVarying
+def _set(prim: Usd.Prim, name: str, type_name: str, value: object) -> None:
     kind = Sdf.ValueTypeNames.Find(type_name)
-    prim.CreateAttribute(name, kind, custom=False, variability=variability).Set(value)
+    # Fabrics are read at one time only, and say so.
+    uniform = Sdf.VariabilityUniform
+    attribute = prim.CreateAttribute(name, kind, custom=False, variability=uniform)
+    attribute.Set(value)
+    if type_name.startswith("color"):
+        attribute.SetColorSpace(LINEAR)

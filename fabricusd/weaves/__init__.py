@@ -1,4 +1,4 @@
-"""Weaves from a name, an expression, an image or a WIF draft."""
+"""Weaves read from a name, an expression, an image or a WIF draft."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ def palette_from_codes(codes: ArrayLike, low: float = 0, high: float = 255) -> t
 
 
 def codes_from_palette(palette: Sequence[RGB], low: int = 0, high: int = 255) -> NDArray[np.int64]:
-    """n linear colours -> (n, 3) int64 nearest display codes; colours above 1 are clipped."""
+    """n linear colours -> (n, 3) int64, the nearest display codes; colours above 1 are clipped."""
     linear = np.clip(np.asarray(palette, np.float64).reshape(-1, 3), 0.0, 1.0)
     return np.rint(srgb_from_linear(linear) * (high - low) + low).astype(np.int64)
 

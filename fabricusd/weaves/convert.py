@@ -1,4 +1,4 @@
-"""From a draft to a fabric, and back."""
+"""Conversion of a draft to a fabric, and back."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from fabricusd.weaves.color import RGB
 from fabricusd.weaves.draft import LIMIT, Draft, Side, known_length
 
 DEFAULT_THREAD = Thread(curve=TangentCurve(angles=(-20 * DEGREE, 20 * DEGREE)))
-"""A spun thread that rises and falls over what it crosses, where no other is asked for."""
+"""The default thread: spun, it rises and falls over the threads that it crosses."""
 
 
 def albedo_scale(base: Thread) -> float:
-    """What a draft's colour is multiplied by to make an albedo: the base's largest channel.
+    """The factor that turns a draft's colour into an albedo: the largest channel of the base's.
 
-    The published albedos are a colour times a scale (MODEL section 11), which belongs to the
-    fibre and not to the dye; a white thread so reflects as much as the base's brightest channel.
+    A published albedo is a colour times a scale (MODEL section 11), and the scale belongs to the
+    fibre, not to the dye: a white thread reflects as much as the base in its brightest channel.
     """
     return max(base.albedo)
 
@@ -29,16 +29,16 @@ def albedo_scale(base: Thread) -> float:
 def to_fabric(
     draft: Draft, base_thread: Thread = DEFAULT_THREAD, name: str = "", density: float | None = None
 ) -> Fabric:
-    """The fabric that `draft` weaves of threads like `base_thread`.
+    """The fabric that `draft` weaves from threads like `base_thread`.
 
-    Each distinct pair of palette colour and thickness is one thread, `Color3` (counted from 1,
-    as WIF counts) or `Color3_2` for its second thickness; `color` is the draft's, `albedo` is
-    the colour times `albedo_scale(base_thread)`. A draft without colours has the one thread
-    `Thread`, the base's own. Threads of spacing 0 are left out. `density` [1/m] is used where the
-    draft has no spacing; None is the default of `ThreadSet`. `losses(draft)` says what changed;
-    it is part of the fabric's documentation.
+    Each distinct pair of palette colour and thickness becomes one thread, called `Color3` (counted
+    from 1, as WIF counts) or `Color3_2` for the second thickness of that colour. Its `color` is the
+    draft's, its `albedo` the colour times `albedo_scale(base_thread)`. A draft without colours has
+    one thread, `Thread`, which is the base. Threads of spacing 0 are left out. `density` [1/m] is
+    used if the draft has no spacing; None stands for the default of `ThreadSet`. `losses(draft)`
+    says what was changed, and becomes part of the fabric's documentation.
 
-    Raises FabricError where every thread of a set is hidden.
+    Raises FabricError if every thread of a set is hidden.
     """
     warp, weft, cells = _visible(draft)
     if not (warp.threads and weft.threads):
@@ -62,11 +62,11 @@ def to_fabric(
 
 
 def from_fabric(fabric: Fabric) -> Draft:
-    """The draft that `fabric` was woven from; its palette is the distinct `color`s in use.
+    """The draft that `fabric` was woven from; its palette holds the distinct `color`s in use.
 
-    A set with threads of one thickness has that, and one with several has a thickness for each
+    A set whose threads share one thickness has that thickness; otherwise the draft has one for each
     thread of the repeat. `from_fabric(to_fabric(draft))` has the same weave, colours and sizes
-    (spacing to rounding), apart from what `losses` names.
+    (spacing up to rounding), apart from what `losses` names.
     """
     used: dict[RGB, int] = {}
     fields: dict[str, object] = {}
@@ -87,7 +87,7 @@ def from_fabric(fabric: Fabric) -> Draft:
         else:
             warnings.append(
                 f"The {label}'s {len(thick)} thicknesses do not fit the weave's {count} threads; "
-                "the draft has none."
+                "the draft has no thicknesses."
             )
     return Draft(
         weave=fabric.weave,
@@ -100,16 +100,16 @@ def from_fabric(fabric: Fabric) -> Draft:
 
 
 def _title(fabric: Fabric) -> str:
-    """The weave's name where the fabric's is none of its own, or that one spelt as a prim's."""
+    """The fabric's name; the weave's if the fabric has none, or the same one spelt as a prim's."""
     spelt = re.sub(r"\W+", "_", fabric.weave.name).strip("_")
     own = fabric.name != "Fabric" and fabric.name.strip("_") != spelt
     return fabric.name if own else fabric.weave.name
 
 
 def losses(draft: Draft, density: float | None = None) -> tuple[str, ...]:
-    """One sentence for each thing in `draft` that a fabric cannot carry or has to assume.
+    """One sentence for each thing in `draft` that a fabric cannot hold or has to assume.
 
-    `density` as in `to_fabric`.
+    density : as for `to_fabric`
     """
     found, assumed = [], []
     per_cm = (ThreadSet().density if density is None else density) / 100
@@ -121,7 +121,7 @@ def losses(draft: Draft, density: float | None = None) -> tuple[str, ...]:
         if len(shown) > 1:
             found.append(
                 f"The {side.label} is spaced unevenly, {min(shown) * 1e3:.4g} to "
-                f"{max(shown) * 1e3:.4g} mm; the fabric has its mean."
+                f"{max(shown) * 1e3:.4g} mm; the fabric has the mean spacing."
             )
         if side.spacing is None and not shown:
             assumed.append(f"{per_cm:g} {'ends' if side.label == 'warp' else 'picks'}/cm")
@@ -131,14 +131,15 @@ def losses(draft: Draft, density: float | None = None) -> tuple[str, ...]:
 
 
 def _visible(draft: Draft) -> tuple[Side, Side, np.ndarray]:
-    """Both sides and the cells without the threads of spacing 0."""
+    """(warp, weft, cells), without the threads of spacing 0."""
     cells = draft.weave.cells
     sides = []
     for axis, side in enumerate((draft.warp, draft.weft)):
         if 0.0 not in side.spacings:
             sides.append(side)
             continue
-        # Colours may repeat with another length than the weave: the cut needs both written out.
+        # Colours and weave may repeat after different lengths; to leave out threads, both have to
+        # be written out over their common repeat.
         total = math.lcm(side.threads, len(side.colors) or 1)
         if total > LIMIT:
             raise FabricError(
@@ -163,9 +164,9 @@ def _visible(draft: Draft) -> tuple[Side, Side, np.ndarray]:
 
 
 def _kinds(side: Side, base: Thread) -> list[tuple[int, float]]:
-    """(palette index, thickness) of each thread, as long as the shortest sequence that holds it.
+    """(palette index, thickness) of each thread, over the shortest sequence that repeats.
 
-    The index is -1 where the draft has no colours.
+    The index is -1 if the draft has no colours.
     """
     colors = side.colors or (-1,)
     default = side.thickness if side.thickness is not None else base.thickness
@@ -203,7 +204,7 @@ def _threads(draft: Draft, base: Thread, kinds: list[tuple[int, float]]) -> dict
 
 
 def _thread_set(sequence: tuple[int, ...], side: Side, density: float | None) -> ThreadSet:
-    # Each spacing is the width that one thread takes, so their mean is the pitch.
+    # A spacing is the width that one thread takes up, so the mean spacing is the pitch.
     spacing = float(np.mean(side.spacings)) if side.spacings else side.spacing
     if spacing is not None:
         return ThreadSet(sequence=sequence, density=1.0 / spacing)

@@ -1,7 +1,7 @@
-"""A draft: a weave and what a weaver writes beside it, before it becomes a fabric.
+"""A draft: a weave and a weaver's notes beside it, from which a fabric is made.
 
-Every source of weaves (a name, an expression, an image, a WIF file) makes a `Draft`;
-`convert.to_fabric` makes it a `Fabric`, `convert.from_fabric` goes back.
+Every source of weaves (a name, an expression, an image, a WIF file) yields a `Draft`.
+`convert.to_fabric` turns a draft into a `Fabric`; `convert.from_fabric` goes back.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from fabricusd.fabric import Weave
 from fabricusd.weaves.color import RGB
 
 LIMIT = 16384
-"""Most ends, and most picks, of an imported draft: 256 MiB of cells, four times the largest
-jacquard in use."""
+"""Most ends, and most picks, of an imported draft, which then has 256 MiB of cells: four times the
+largest jacquard in use."""
 
 LARGEST_LENGTH = 1.0
-"""Most metres that a spacing or a thickness may have; a larger one is a mistaken unit."""
+"""Largest spacing or thickness [m]; a larger one comes from a mistaken unit."""
 
 SMALLEST_LENGTH = 1e-6
-"""Least metres that a spacing or a thickness above 0 may have: a tenth of the finest fibre."""
+"""Smallest spacing or thickness above 0 [m]: a tenth of the finest fibre."""
 
 
 def quoted(text: str, longest: int = 60) -> str:
-    """`text` in quotes for one line of a message: cut, and without what would not print."""
+    """`text` in quotes, for one line of a message: shortened, unprintable characters as `?`."""
     line = "".join(c if c.isprintable() else "?" for c in text[:longest])
     return f"'{line}{'...' if len(text) > longest else ''}'"
 
 
 class Side(NamedTuple):
-    """What a draft says of one set of threads: colours, spacing, thickness (see `Draft`)."""
+    """What a draft says about one set of threads: colours, spacing, thickness (see `Draft`)."""
 
     label: str
     threads: int
@@ -46,24 +46,24 @@ class Side(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Draft:
-    """A weave, the colours of its threads, and their sizes where they are known.
+    """A weave, the colours of its threads, and their sizes as far as they are known.
 
     weave : Weave
-    palette : colours, linear Rec. 709; empty where the source has no colours
-    warp_colors, weft_colors : (k,) int - indices into `palette`, repeated without end: end `i`
-        has colour `warp_colors[i % k]`. Both are empty, as the palette is, or neither.
-    warp_spacing, weft_spacing : float or None - from one thread's middle to the next [m]
+    palette : colours, linear Rec. 709; empty if the source has no colours
+    warp_colors, weft_colors : (k,) int - indices into `palette`, repeated across the cloth: end `i`
+        has the colour `warp_colors[i % k]`. Palette and both sequences are empty together.
+    warp_spacing, weft_spacing : float or None - between the middles of neighbouring threads [m]
     warp_thickness, weft_thickness : float or None - visible width of a thread [m]
-    warp_spacings, weft_spacings : (ends,) or (picks,) float, or empty - thread by thread [m], in
-        place of the spacing of the set. 0 is a thread that the cloth hides.
-    warp_thicknesses, weft_thicknesses : likewise [m]; 0 where it is not known
-    color_range : (low, high) int - display codes that the source wrote its colours in
+    warp_spacings, weft_spacings : (ends,) or (picks,) float, or empty - thread by thread [m],
+        overriding the spacing of the set. A thread of spacing 0 is hidden in the cloth.
+    warp_thicknesses, weft_thicknesses : likewise [m]; 0 if unknown
+    color_range : (low, high) int - range of the display codes in the source
     title : str
     author, notes : str - as the source has them
-    source : str - where it came from; not compared
-    warnings : one line each on what was assumed while reading; not compared
+    source : str - where the draft came from; ignored by ==
+    warnings : one line about each assumption made while reading; ignored by ==
 
-    Raises FabricError for an index without a colour, and for a length that is not one.
+    Raises FabricError for an index that has no colour and for a length out of range.
     """
 
     weave: Weave
@@ -94,8 +94,8 @@ class Draft:
         if not len({bool(self.palette), bool(self.warp_colors), bool(self.weft_colors)}) == 1:
             raise FabricError(
                 "colours",
-                f"are {len(self.palette)} in the palette, {len(self.warp_colors)} of the warp and "
-                f"{len(self.weft_colors)} of the weft; give all three, or none",
+                f"number {len(self.palette)} in the palette, {len(self.warp_colors)} in the warp "
+                f"and {len(self.weft_colors)} in the weft; give all three, or none",
             )
         for side in (self.warp, self.weft):
             _check_side(side, len(self.palette))
@@ -118,12 +118,12 @@ class Draft:
 
     @property
     def colored(self) -> bool:
-        """Whether the draft says which colours its threads have."""
+        """Whether the draft gives its threads colours."""
         return bool(self.palette)
 
 
 def known_length(value: float) -> float | None:
-    """`value` [m] where a draft may have it as a spacing or thickness, else None."""
+    """`value` [m] if it is in range for a spacing or a thickness, else None."""
     return value if SMALLEST_LENGTH <= value <= LARGEST_LENGTH else None
 
 
@@ -132,7 +132,7 @@ def _check_side(side: Side, colors: int) -> None:
         if not 0 <= index < colors:
             raise FabricError(
                 f"{side.label} colour {k}",
-                f"is {index}; it must be from 0 to {colors - 1}, the palette has {colors}",
+                f"is {index}; it must be from 0 to {colors - 1}, since the palette has {colors}",
             )
     for name, value in (("spacing", side.spacing), ("thickness", side.thickness)):
         if value is not None and not SMALLEST_LENGTH <= value <= LARGEST_LENGTH:
@@ -158,10 +158,10 @@ def _check_side(side: Side, colors: int) -> None:
 def with_colors(
     draft: Draft, warp: Sequence[RGB] | None = None, weft: Sequence[RGB] | None = None
 ) -> Draft:
-    """`draft` in other colours: `warp` and `weft` are linear colours, repeated thread by thread.
+    """`draft` in other colours; `warp` and `weft` are linear colours, repeated across the cloth.
 
-    A set that is given none keeps its own colours; where it has none, it takes those of the other
-    set, so that a draft of one colour needs to be told only once.
+    A set that is given no colours keeps its own. If it has none of its own, it takes those of the
+    other set, so that a single colour has to be given only once.
     """
     if not warp and not weft:
         return draft

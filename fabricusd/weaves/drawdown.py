@@ -1,8 +1,9 @@
-"""A draft drawn in a terminal, as weavers draw it.
+"""Drawing a draft in a terminal, the way weavers draw it.
 
-Threading across the top (shaft 1 lowest), tie-up in the corner, treadling at the right, and below
-the threading the drawdown: filled where the warp is on top. End 1 is at the left and pick 1 at the
-bottom, so the drawdown looks as the cloth does, U to the right and V up.
+The threading runs across the top (shaft 1 lowest), the tie-up is in the corner, the treadling at
+the right, and the drawdown below the threading: a square is filled where the warp is on top. End 1
+is at the left and pick 1 at the bottom, so that the drawdown looks like the cloth, U to the right
+and V up.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ from fabricusd.weaves.draft import Draft
 from fabricusd.weaves.loom import Loom, thread_loom
 
 MOST_SHAFTS = 40
-"""More shafts than this is a jacquard, whose threading tells nobody anything."""
+"""Most shafts that are drawn: a weave with more is a jacquard, whose threading says nothing."""
 
 SMALLEST = 8
-"""Repeats of fewer threads are drawn several times over, until there are as many."""
+"""Fewest threads that are drawn: smaller repeats are drawn several times over."""
 
 BLANK, EMPTY, FILLED, FIRST_COLOR = 0, 1, 2, 3
-"""What a square of the drawing shows; from FIRST_COLOR on, a colour of the palette."""
+"""Values of a square in the drawing; FIRST_COLOR + k is colour k of the palette."""
 
 INK, PAPER = (24, 24, 24), (232, 232, 232)
 
@@ -39,11 +40,11 @@ def draw(
     color: bool = False,
     ascii_only: bool = False,
 ) -> str:
-    """The draft of `fabric`, at most `width` characters by `height` lines; None is no limit.
+    """The draft of `fabric`, at most `width` characters by `height` lines; None means no limit.
 
-    color : bool - 24-bit colour escapes: each square of the drawdown in the colour of the thread
-        on top, where the threads have more than one
-    ascii_only : bool - `#` and `.`, one character a square, instead of half blocks
+    color : bool - draw each square of the drawdown in the colour of the thread on top, by 24-bit
+        colour escapes, if the threads have more than one colour
+    ascii_only : bool - draw with `#` and `.`, one character a square, instead of half blocks
     """
     return draw_draft(from_fabric(fabric), width, height, color, ascii_only)
 
@@ -55,7 +56,7 @@ def draw_draft(
     color: bool = False,
     ascii_only: bool = False,
 ) -> str:
-    """As `draw`, from a draft."""
+    """Like `draw`, for a draft."""
     ends, picks = (
         _total(draft.weave.ends, draft.warp_colors),
         _total(draft.weave.picks, draft.weft_colors),
@@ -66,7 +67,7 @@ def draw_draft(
     loom = thread_loom(draft.weave.cells)
     words = _caption(draft, loom)
     frame = (loom.treadles + 1, loom.shafts + 1)
-    # A frame that leaves too little of the cloth to see is left out.
+    # Leave out a frame that would take too much room from the cloth.
     framed = loom.shafts <= MOST_SHAFTS
     framed = framed and columns - frame[0] >= min(ends, max(columns // 3, SMALLEST))
     framed = framed and rows - frame[1] >= min(picks, max(rows // 3, SMALLEST))
@@ -86,7 +87,7 @@ def draw_draft(
 
 
 def _total(threads: int, colors: tuple[int, ...]) -> int:
-    """Threads until weave and colours repeat together, written out until there are enough."""
+    """Threads after which weave and colours repeat together, repeated up to at least SMALLEST."""
     total = math.lcm(threads, len(colors) or 1)
     return total * -(-SMALLEST // total)
 
@@ -101,7 +102,7 @@ def _caption(draft: Draft, loom: Loom) -> list[str]:
 
 
 def _drawdown(draft: Draft, ends: int, picks: int, color: bool) -> Squares:
-    """(picks, ends) squares of the first ends and picks, the last pick on top."""
+    """(picks, ends) squares of the first ends and picks, the last pick in the top row."""
     i, j = np.arange(ends), np.arange(picks)
     cells = draft.weave.cells[np.ix_(i % draft.weave.ends, j % draft.weave.picks)]
     squares = np.where(cells, FILLED, EMPTY)
@@ -128,13 +129,13 @@ def _framed(drawdown: Squares, loom: Loom) -> Squares:
 
 
 def _palette(draft: Draft) -> list[tuple[int, int, int] | None]:
-    """The 8-bit display colour of each kind of square; None is the terminal's own."""
+    """The 8-bit display colour of each value of a square; None is the terminal's own colour."""
     colors = [(int(r), int(g), int(b)) for r, g, b in codes_from_palette(draft.palette)]
     return [None, PAPER, INK, *colors]
 
 
 def _pairs(canvas: Squares, ascii_only: bool) -> list[tuple[Squares, Squares | None]]:
-    """The rows of squares that share a line of text: two, or one without half blocks."""
+    """The rows of squares that share a line of text: two, or one in ASCII."""
     if ascii_only:
         return [(row, None) for row in canvas]
     if len(canvas) % 2:
@@ -169,7 +170,7 @@ def _line(
 def _mark(
     top: tuple[int, int, int] | None, bottom: tuple[int, int, int] | None, ascii_only: bool
 ) -> tuple[str, str]:
-    """(character, colour escape) of two squares one above the other."""
+    """(character, colour escape) for two squares, one above the other."""
     if top is None and bottom is None:
         return " ", ""
     if top is None or bottom is None:

@@ -6,9 +6,9 @@
     shift(E, di, dj)                            E moved by di ends and dj picks
     scale(E, si, sj)                            each cell of E repeated si x sj times
 
-True is warp on top. `mod` is never negative, `i` and `j` count from 0. The repeat follows from
-the numbers. Nothing is executed: the text is parsed to a tree, of which only the forms above
-are accepted.
+True means that the warp is on top. `mod` is never negative; `i` and `j` count from 0. The repeat
+follows from the numbers. Nothing is executed: the text is parsed into a syntax tree, in which only
+the forms above are accepted.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ LONGEST = 1000
 """Most characters in an expression."""
 
 DEEPEST = 50
-"""Most levels of nesting: Python's own stack is the limit that this keeps away from."""
+"""Most levels of nesting, well below the depth at which Python's own stack overflows."""
 
 MOST_TERMS = 32
 """Most comparisons and calls; each costs one pass over the repeat."""
 
 MOST_WORK = 16 * LARGEST * LARGEST
-"""Most comparisons and calls, each times the crossings of the repeat: half a second."""
+"""Most comparisons and calls times crossings of the repeat: half a second of work."""
 
 LARGEST_NUMBER = 10**6
-"""Largest constant; products with a thread number then stay far inside 64 bits."""
+"""Largest constant; its product with a thread number stays far below 64 bits."""
 
 ROWS = 64
-"""Ends that are evaluated at once: what every pass over them makes then stays in the cache."""
+"""Ends that are evaluated at once, few enough that intermediate results stay in the cache."""
 
 Grid = NDArray[np.int64]
 Values = NDArray[np.generic]
@@ -79,7 +79,7 @@ class _Linear:
 
 @dataclass(frozen=True)
 class _Term:
-    """A number or a truth for each cell, the same again after `ends` and `picks`."""
+    """A number, or a truth value, for each cell; it repeats after `ends` and `picks`."""
 
     evaluate: Evaluate
     ends: int
@@ -88,10 +88,10 @@ class _Term:
 
 
 def parse_expression(text: str) -> Draft:
-    """The draft of a weave expression; its repeat is the shortest that the numbers imply.
+    """The draft of a weave expression, whose repeat is the shortest that the numbers imply.
 
-    The weave is named by what it is where that has a name (`twill 1/4 S`), by `text` otherwise.
-    Raises FabricError for what is not an expression, and for a repeat above `LARGEST`.
+    The weave is called by its usual name if it has one (`twill 1/4 S`), and otherwise by `text`.
+    Raises FabricError for text that is not an expression, and for a repeat above `LARGEST`.
     """
     where = f"weave expression {quoted(text)}"
     if len(text) > LONGEST:
@@ -100,7 +100,7 @@ def parse_expression(text: str) -> Draft:
         tree, terms = _tree(text)
         term = _term(tree)
         if not term.truth:
-            raise FabricError("", f"is a number; it must be compared, {FORM}")
+            raise FabricError("", f"is a number; it must be a comparison, {FORM}")
         if max(term.ends, term.picks) > LARGEST:
             raise FabricError(
                 "", f"repeats after {term.ends} x {term.picks}; it must be at most {LARGEST}"
@@ -110,7 +110,7 @@ def parse_expression(text: str) -> Draft:
             raise FabricError(
                 "",
                 f"has {terms} comparisons and calls over a repeat of {term.ends} x {term.picks}; "
-                f"it must have at most {MOST_WORK // crossings} of them there",
+                f"for a repeat of that size it must have at most {MOST_WORK // crossings}",
             )
     except FabricError as error:
         raise error.inside(where) from None
@@ -136,18 +136,21 @@ def _cells(term: _Term) -> NDArray[np.bool_]:
 
 
 def _not_a_satin(text: str, name: str) -> tuple[str, ...]:
-    """The thesis prints `mod(i + j, N) == 0` as a satin; above N = 2 it is a twill."""
+    """A warning if it is a twill where a satin may be meant, or nothing.
+
+    The thesis prints `mod(i + j, N) == 0` as a satin; above N = 2 it is a twill.
+    """
     runs = name.split()[1].split("/") if name.startswith("twill") else []
     if len(runs) == 2 and "1" in runs and sum(map(int, runs)) > 3:
         return (
             f"'{text.strip()}' is a {name}; a satin of {sum(map(int, runs))} needs a step of 2 "
-            "or more, prime to it, before i or j.",
+            f"or more, coprime to {sum(map(int, runs))}, before i or j.",
         )
     return ()
 
 
 def _tree(text: str) -> tuple[ast.expr, int]:
-    """The syntax of an expression, and how many comparisons and calls it has."""
+    """The syntax tree of an expression, and the number of its comparisons and calls."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SyntaxWarning)
@@ -161,7 +164,7 @@ def _tree(text: str) -> tuple[ast.expr, int]:
     while level:
         depth += 1
         terms += sum(isinstance(node, ast.Call | ast.Mod) for node in level)
-        # One comparison may go on and on: 1 <= a < b < c.
+        # One comparison may be a chain of several: 1 <= a < b < c.
         terms += sum(len(node.ops) for node in level if isinstance(node, ast.Compare))
         level = [child for node in level for child in ast.iter_child_nodes(node)]  # type: ignore
     if depth > DEEPEST:
@@ -174,7 +177,7 @@ def _tree(text: str) -> tuple[ast.expr, int]:
 
 
 def _term(node: ast.expr) -> _Term:
-    """The truth or the periodic number that `node` stands for."""
+    """The truth value or the periodic number that `node` stands for."""
     if isinstance(node, ast.BoolOp):
         join = np.logical_and if isinstance(node.op, ast.And) else np.logical_or
         terms = [_truth(value) for value in node.values]
@@ -198,7 +201,7 @@ def _term(node: ast.expr) -> _Term:
 def _truth(node: ast.expr) -> _Term:
     term = _term(node)
     if not term.truth:
-        raise FabricError(quoted(ast.unparse(node), 40), f"must be compared, {FORM}")
+        raise FabricError(quoted(ast.unparse(node), 40), f"must be a comparison, {FORM}")
     return term
 
 
@@ -210,7 +213,7 @@ def _number(node: ast.expr) -> _Term:
 
 
 def _join(terms: list[_Term], combine: Callable[[Iterator[Values]], Values]) -> _Term:
-    """The truth that `combine` makes of the terms, one by one; it repeats when all of them do."""
+    """The truth value that `combine` makes of the terms, in order; it repeats when they all do."""
     return _Term(
         lambda i, j: combine(t.evaluate(i, j) for t in terms),
         math.lcm(*(t.ends for t in terms)),
@@ -222,7 +225,7 @@ def _join(terms: list[_Term], combine: Callable[[Iterator[Values]], Values]) -> 
 def _comparison(node: ast.Compare) -> _Term:
     tests = [COMPARE[type(op)] for op in node.ops if type(op) in COMPARE]
     if len(tests) < len(node.ops):
-        raise FabricError(quoted(ast.unparse(node), 40), "must compare by ==, !=, <, <=, > or >=")
+        raise FabricError(quoted(ast.unparse(node), 40), "must use ==, !=, <, <=, > or >=")
 
     terms = [_number(value) for value in (node.left, *node.comparators)]
 
@@ -245,7 +248,8 @@ def _call(node: ast.Call) -> _Term:
         )
     if len(node.args) != wanted or node.keywords:
         raise FabricError(
-            f"'{name}'", f"has {len(node.args) + len(node.keywords)} arguments; it takes {wanted}"
+            f"'{name}'",
+            f"has {len(node.args) + len(node.keywords)} arguments; it must have {wanted}",
         )
     if name == "mod":
         return _mod(node.args[0], node.args[1])
@@ -254,7 +258,7 @@ def _call(node: ast.Call) -> _Term:
     if name == "shift":
         return replace(inner, evaluate=lambda i, j: inner.evaluate(i - a, j - b))
     if a < 1 or b < 1:
-        raise FabricError("'scale'", f"is by {a} x {b}; it must be by 1 or more each way")
+        raise FabricError("'scale'", f"is by {a} x {b}; both numbers must be at least 1")
     return replace(
         inner,
         evaluate=lambda i, j: inner.evaluate(i // a, j // b),
@@ -266,14 +270,14 @@ def _call(node: ast.Call) -> _Term:
 def _mod(value: ast.expr, divisor: ast.expr) -> _Term:
     n = _constant(divisor)
     if n < 1:
-        raise FabricError("'mod'", f"is by {n}; it must be by 1 or more")
+        raise FabricError("'mod'", f"divides by {n}; the divisor must be at least 1")
     if _is_periodic(value):
         term = _number(value)
         return replace(term, evaluate=lambda i, j: np.mod(term.evaluate(i, j), n))
     number = _linear(value)
 
     def evaluate(i: Grid, j: Grid) -> Values:
-        # Reduced end by end and pick by pick first: the full grid is then of small numbers.
+        # Reduce ends and picks separately first, so that the full grid holds small numbers.
         along = np.mod(number.a * i, n).astype(np.int32)
         across = np.mod(number.b * j + number.c, n).astype(np.int32)
         return np.asarray(np.mod(along + across, np.int32(n)))
@@ -293,10 +297,14 @@ def _linear(node: ast.expr) -> _Linear:
     found = _linear_or_none(node)
     if found is None:
         raise FabricError(
-            quoted(ast.unparse(node), 40), f"is not whole numbers times i and j; write it {FORM}"
+            quoted(ast.unparse(node), 40),
+            f"is not a sum of whole multiples of i and j; write it {FORM}",
         )
     if max(abs(found.a), abs(found.b), abs(found.c)) > LARGEST_NUMBER:
-        raise FabricError(quoted(ast.unparse(node), 40), f"has a number above {LARGEST_NUMBER}")
+        raise FabricError(
+            quoted(ast.unparse(node), 40),
+            f"has a number above {LARGEST_NUMBER}; numbers must be at most that",
+        )
     return found
 
 

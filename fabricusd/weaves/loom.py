@@ -1,4 +1,4 @@
-"""How a weave is set up on a loom: threading, tie-up and treadling."""
+"""The set-up of a loom for a weave: threading, tie-up and treadling."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 class Loom(NamedTuple):
-    """A loom with as few shafts and treadles as the weave allows, one of each a thread.
+    """A loom with as few shafts and treadles as the weave allows; each thread uses one of them.
 
     threading : (m,) int - the shaft of each end, from 0
     treadling : (n,) int - the treadle of each pick, from 0
@@ -22,19 +22,19 @@ class Loom(NamedTuple):
 
     @property
     def shafts(self) -> int:
-        """Ends that differ from each other."""
+        """Number of distinct ends."""
         return int(self.tie_up.shape[1])
 
     @property
     def treadles(self) -> int:
-        """Picks that differ from each other."""
+        """Number of distinct picks."""
         return int(self.tie_up.shape[0])
 
 
 def thread_loom(cells: NDArray[np.bool_]) -> Loom:
     """The loom for `cells` (m, n); `tie_up[treadling[j], threading[i]] == cells[i, j]`.
 
-    Equal ends share a shaft and equal picks a treadle, numbered as they first appear.
+    Equal ends share a shaft and equal picks a treadle; both are numbered in order of appearance.
     """
     threading, ends = _distinct_rows(cells)
     treadling, picks = _distinct_rows(cells.T)
@@ -42,7 +42,7 @@ def thread_loom(cells: NDArray[np.bool_]) -> Loom:
 
 
 def _distinct_rows(cells: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """((rows,) int number of each row, (k,) int where each number first stands)."""
+    """((rows,) int number of each row, (k,) int row at which each number first appears)."""
     bits = np.ascontiguousarray(np.packbits(cells, axis=1))
     whole = bits.view(np.dtype((np.void, bits.shape[1]))).ravel()
     _, first, number = np.unique(whole, return_index=True, return_inverse=True)

@@ -1,7 +1,7 @@
-"""Weaves that have a name. To add one, write a function and put it in `@named(...)`.
+"""Weaves that have a name. To add one, write a function and decorate it with `@named(...)`.
 
-A function takes the words after the name and gives a `Draft` without a title. Everywhere below,
-`cells[i, j]` is end `i`, pick `j`, True where the warp is on top.
+A function takes the words after the name and returns a `Draft` without a title. Everywhere below,
+`cells[i, j]` is the crossing of end `i` and pick `j`, True where the warp is on top.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ Make = Callable[[list[str]], Draft]
 
 
 class Named(NamedTuple):
-    """One entry of `WEAVES`: how it is written, and the function that makes it."""
+    """One entry of `WEAVES`: an example of how it is written, and the function that makes it."""
 
     form: str
     make: Make
 
 
 WEAVES: dict[str, Named] = {}
-"""Name -> entry, in the order in which they are listed to people."""
+"""Name -> entry, in the order in which messages and help list them."""
 
 
 def named(name: str, form: str) -> Callable[[Make], Make]:
@@ -53,12 +53,14 @@ def named(name: str, form: str) -> Callable[[Make], Make]:
 def parse_named(text: str) -> Draft:
     """The draft of a named weave such as `twill 2/2 S`.
 
-    Raises FabricError for a name that is not in `WEAVES` and for words that do not fit it.
+    Raises FabricError for a name that is not in `WEAVES` and for words that do not fit the name.
     """
     words = text.lower().split()
     entry = WEAVES.get(words[0]) if words else None
     if entry is None:
-        raise FabricError(f"weave {quoted(text)}", f"has no such name; it must be {forms()}")
+        raise FabricError(
+            f"weave {quoted(text)}", f"is not a named weave; it must be one of {forms()}"
+        )
     try:
         draft = entry.make(words[1:])
     except FabricError as error:
@@ -67,7 +69,7 @@ def parse_named(text: str) -> Draft:
 
 
 def forms() -> str:
-    """Every named weave as it is written, for messages and help."""
+    """An example of every named weave, for messages and help."""
     return ", ".join(entry.form for entry in WEAVES.values())
 
 
@@ -92,7 +94,7 @@ def basket(words: list[str]) -> Draft:
 
 @named("twill", "twill 2/1 S")
 def twill(words: list[str]) -> Draft:
-    """Over and under the given numbers of picks, one pick further on each end: Z up, S down."""
+    """Over and under the given numbers of picks, moved by a pick from end to end: Z up, S down."""
     runs, words = _take_runs(words, "twill 2/1 S")
     hand = _take_word(words, ("s", "z"), "z").upper()
     _expect_none(words, "twill 2/1 S")
@@ -104,15 +106,15 @@ def twill(words: list[str]) -> Draft:
 
 @named("satin", "satin 5 step 2 weft")
 def satin(words: list[str]) -> Draft:
-    """One tie in each of N picks, `step` picks on from end to end, none beside another.
+    """One tie in N picks, `step` picks further on each end, so that no two ties are neighbours.
 
-    cells = mod(step i + j, N) == 0 for the weft-faced, its complement for the warp-faced, which
-    is the default. The step must be from 2 to N - 2 and prime to N, or it is a twill, or an end
-    without a tie (MODEL section 1).
+    A weft-faced satin is cells = mod(step i + j, N) == 0; the warp-faced one, the default, is its
+    complement. The step must be from 2 to N - 2 and coprime to N; otherwise the weave is a twill,
+    or has picks without a tie (MODEL section 1).
     """
     form = "satin 5 step 2"
     if not words:
-        raise FabricError("", f"has no number of threads; write it as in {form}")
+        raise FabricError("", f"is missing its number of threads; write it as in {form}")
     first, _, slash_step = words.pop(0).partition("/")
     count = _number(first, form)
     step = _number(slash_step, form) if slash_step else 0
@@ -125,7 +127,7 @@ def satin(words: list[str]) -> Draft:
     _expect_none(words, form)
     good = [s for s in range(2, count - 1) if math.gcd(s, count) == 1]
     if not good:
-        raise FabricError("", "has no step; a satin must be of 5, 7 or more threads")
+        raise FabricError("", "has no possible step; a satin must have 5, 7 or more threads")
     step = step or good[0]
     if step not in good:
         shown = ", ".join(map(str, good[:12])) + (", ..." if len(good) > 12 else "")
@@ -138,7 +140,7 @@ def satin(words: list[str]) -> Draft:
 
 @named("herringbone", "herringbone 2/2 8")
 def herringbone(words: list[str]) -> Draft:
-    """Stripes of Z and S twill, so many ends wide; the lines break where they meet."""
+    """Stripes of Z and S twill of the given number of ends; the lines break where stripes meet."""
     form = "herringbone 2/2 8"
     runs, words = _take_runs(words, form)
     over = _over(runs)
@@ -146,22 +148,22 @@ def herringbone(words: list[str]) -> Draft:
     _expect_none(words, form)
     i, j = _grid(2 * width, len(over))
     t = i - width
-    # Half a repeat further at the turn: in 2/2 each end there lies against the opposite of its
-    # neighbour, the cut that tells a herringbone from a point twill.
+    # Skip half a repeat at the turn: in 2/2, the two ends there are opposites of each other. This
+    # cut tells a herringbone from a point twill.
     lag = np.where(t < 0, i, width - 1 + len(over) // 2 - t)
     return Draft(weave=Weave(over[(j - lag) % len(over)], f"herringbone {_slashes(runs)} {width}"))
 
 
 @named("point", "point 2/2 8")
 def point(words: list[str]) -> Draft:
-    """Twill that turns back on itself every so many ends: chevrons."""
+    """Twill that reverses after the given number of ends: chevrons."""
     form = "point 2/2 8"
     runs, words = _take_runs(words, form)
     over = _over(runs)
     width = _number(words.pop(0), form) if words else len(over)
     _expect_none(words, form)
     if width < 2:
-        raise FabricError("", f"turns every {width} ends; it must be at least 2")
+        raise FabricError("", f"turns every {width} ends; that number must be at least 2")
     i, j = _grid(2 * width - 2, len(over))
     lag = np.minimum(i, 2 * width - 2 - i)
     return Draft(weave=Weave(over[(j - lag) % len(over)], f"point {_slashes(runs)} {width}"))
@@ -169,14 +171,14 @@ def point(words: list[str]) -> Draft:
 
 @named("diamond", "diamond 2/2 8")
 def diamond(words: list[str]) -> Draft:
-    """Twill that turns back every so many ends and picks: diamonds, bird's eye when small."""
+    """Twill that reverses after a given number of ends and picks: diamonds, bird's eye if small."""
     form = "diamond 2/2 8"
     runs, words = _take_runs(words, form)
     over = _over(runs)
     width = _number(words.pop(0), form) if words else len(over)
     _expect_none(words, form)
     if width < 2:
-        raise FabricError("", f"turns every {width} threads; it must be at least 2")
+        raise FabricError("", f"turns every {width} threads; that number must be at least 2")
     i, j = _grid(2 * width - 2, 2 * width - 2)
     lag, row = np.minimum(i, 2 * width - 2 - i), np.minimum(j, 2 * width - 2 - j)
     return Draft(weave=Weave(over[(row - lag) % len(over)], f"diamond {_slashes(runs)} {width}"))
@@ -184,7 +186,7 @@ def diamond(words: list[str]) -> Draft:
 
 @named("houndstooth", "houndstooth")
 def houndstooth(words: list[str]) -> Draft:
-    """Twill 2/2 of four dark and four light threads both ways."""
+    """Twill 2/2 with four dark and four light threads in turn, in warp and weft."""
     _expect_none(words, "houndstooth")
     order = (0,) * 4 + (1,) * 4
     weave = Weave(twill(["2/2"]).weave.cells, "houndstooth")
@@ -192,7 +194,7 @@ def houndstooth(words: list[str]) -> Draft:
 
 
 def _over(runs: list[int]) -> NDArray[np.bool_]:
-    """Over and under in turn: 2/1 -> [True, True, False]."""
+    """Alternating runs of over and under: 2/1 -> [True, True, False]."""
     if len(runs) % 2:
         raise FabricError(
             f"'{_slashes(runs)}'", "must be pairs of over and under, as in 2/1 or 3/1/1/3"
@@ -208,12 +210,14 @@ def _grid(m: int, n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def _take_runs(words: list[str], form: str) -> tuple[list[int], list[str]]:
-    """Numbers joined by slashes, from the first word, and the words after it."""
+    """The numbers of the first word, which slashes separate, and the words after it."""
     if not words:
-        raise FabricError("", f"is not complete; write it as in {form}")
+        raise FabricError("", f"is incomplete; write it as in {form}")
     runs = [_number(part, form) for part in words[0].split("/")]
     if sum(runs) > LARGEST:
-        raise FabricError(quoted(words[0], 20), f"is {sum(runs)} threads; at most {LARGEST}")
+        raise FabricError(
+            quoted(words[0], 20), f"is {sum(runs)} threads; it must be at most {LARGEST}"
+        )
     return runs, words[1:]
 
 
@@ -231,7 +235,7 @@ def _take_word(words: list[str], choices: tuple[str, ...], default: str) -> str:
 
 def _expect_none(words: list[str], form: str) -> None:
     if words:
-        raise FabricError(quoted(words[0], 20), f"is not expected there; write it as in {form}")
+        raise FabricError(quoted(words[0], 20), f"is not expected here; write it as in {form}")
 
 
 def _slashes(runs: list[int]) -> str:

@@ -1,4 +1,4 @@
-"""Files that are given for WIF and are something else: named as what they are when refused."""
+"""Recognition of files that are given as WIF but are not, so that the refusal names their kind."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ DRAFT_SUFFIXES = {
     ".wpo": "a .wpo draft (WeavePoint)",
     ".twa": "a .twa draft (TempoWeave)",
 }
-"""Other programs' drafts; each of these programs exports WIF."""
+"""Drafts of other programs, all of which can export WIF."""
 
 EXPORT = "export it as WIF"
 
@@ -29,13 +29,13 @@ BEGINNINGS = (
     (b"PXR-USDC", "a USD layer", "it must be a WIF draft"),
     (b"%PDF", "a PDF document", "it must be a WIF draft"),
 )
-"""(first bytes, what such a file is, what to do with it)."""
+"""(first bytes, what such a file is, what the user should do)."""
 
 
 def refuse_other_drafts(path: str | os.PathLike[str], head: bytes) -> None:
-    """Raise FabricError where the file `path`, which begins with `head`, is known not to be WIF.
+    """Raise FabricError if the file `path`, which begins with `head`, is known not to be WIF.
 
-    A file that calls itself a WIF draft in its first bytes is taken for one whatever its name is.
+    A file that has [WIF] in its first bytes is taken for a WIF draft, whatever its name is.
     """
     if b"[WIF]" in head.upper().replace(b"\0", b""):
         return
@@ -45,4 +45,4 @@ def refuse_other_drafts(path: str | os.PathLike[str], head: bytes) -> None:
             raise FabricError(str(path), f"is {kind}; {advice}")
     kind = DRAFT_SUFFIXES.get(Path(path).suffix.lower(), "")
     if kind:
-        raise FabricError(str(path), f"is {kind} by its name; {EXPORT}")
+        raise FabricError(str(path), f"is {kind}, judging by its name; {EXPORT}")

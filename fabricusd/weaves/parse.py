@@ -1,4 +1,4 @@
-"""One entry for weaves written on a command line."""
+"""Parsing of weaves that are written on a command line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fabricusd.weaves.named import WEAVES, forms, parse_named
 def parse_weave(text: str) -> Draft:
     """The draft of a named weave (`twill 2/1 S`) or of an expression (`mod(2*i + j, 5) != 0`).
 
-    Raises FabricError, one line, for anything else.
+    Raises FabricError for anything else.
     """
     words = text.lower().split()
     if words and words[0] in WEAVES:

@@ -1,4 +1,4 @@
-"""What a weaver calls a grid of cells: plain, basket, twill, satin, or none of these."""
+"""A weaver's name for a grid of cells: plain, basket, twill or satin."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 LARGEST = 64
-"""Repeats above this many threads a side are not looked at; no named weave is that wide."""
+"""Most threads of a repeat, each way, that is examined; no weave with a name is wider."""
 
 
 def recognise(cells: NDArray[np.bool_]) -> str:
-    """The name of the weave `cells` (m, n), as `named.py` writes it; "" where it has none.
+    """The name of the weave `cells` (m, n), spelt as in `named.py`; "" if it has no name.
 
-    A repeat written several times over is recognised as the one repeat. Which thread a repeat
-    starts at does not matter.
+    Several copies of a repeat are recognised as that repeat. It does not matter at which thread the
+    repeat starts.
     """
     if max(cells.shape) > LARGEST:
         return ""
@@ -36,7 +36,7 @@ def recognise(cells: NDArray[np.bool_]) -> str:
 
 
 def shortest_repeat(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The smallest (m', n') part of which `cells` (m, n) is a whole number of copies."""
+    """The smallest (m', n') block that tiles `cells` (m, n) a whole number of times."""
     for axis in (0, 1):
         count = cells.shape[axis]
         for period in range(1, count + 1):
@@ -61,17 +61,17 @@ def _basket(cells: NDArray[np.bool_]) -> str:
 
 
 def _stepped(end: NDArray[np.bool_], step: int) -> str:
-    """The weave in which each end repeats the one before it, `step` picks later."""
+    """The name of a weave in which each end is the previous one, moved by `step` picks."""
     n, over = len(end), int(end.sum())
     if step in (1, n - 1):
         changes = np.flatnonzero(end != np.roll(end, 1))
         changes = np.roll(changes, 0 if end[changes[0]] else -1)
         runs = [int(r) for r in (np.roll(changes, -1) - changes) % n]
-        # A twill may be read from any of its lines; the longest over first, as weavers write it.
+        # A twill may be read from any of its lines; weavers write the longest "over" first.
         runs = max(runs[k:] + runs[:k] for k in range(0, len(runs), 2))
         lengths = "/".join(map(str, runs))
         return f"twill {lengths} {'Z' if step == 1 else 'S'}"
     if over in (1, n - 1) and math.gcd(step, n) == 1:
-        # MODEL section 1 writes a satin mod(a i + j, N): its tie moves a picks *down* per end.
+        # MODEL section 1 writes a satin mod(a i + j, N): its tie moves *down* by a picks per end.
         return f"satin {n} step {n - step}{' weft' if over == 1 else ''}"
     return ""

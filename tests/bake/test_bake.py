@@ -325,7 +325,7 @@ def test_the_command_says_when_a_bound_is_not_reached(square, tmp_path, capsys):
     common = ["bake", str(square), "--fabric", "linen_plain", "--maps", "opacity", "-o", out]
     assert main([*common, "--max-error", "0.01", "--resolution", "64"]) == 1
     shown = capsys.readouterr()
-    assert "0.01 was asked for" in shown.err
+    assert "--max-error asks for 0.01" in shown.err
     assert "manifest.json" in shown.out
     assert main([*common, "--no-clobber"]) == 2
 

@@ -44,7 +44,7 @@ LAYER = {
     "not a number": ("ior = 1.5", "ior = nan", "thread:ior is nan; it must be at least 1"),
     "an empty grid": ('["10", "01"]', "[]", "rows is empty; it must have"),
     "rows of two lengths": ('"01"]', '"0"]', r"rows \[1\] has 1 characters; it must have 2"),
-    "no thread": ("</Cloth/Warp>", "</Cloth/Weft>", "no prim; it must be one"),
+    "no thread": ("</Cloth/Warp>", "</Cloth/Weft>", "does not exist; it must be a WovenThread"),
     "values in time alone": ("density = 20", "density.timeSamples = { 1: 20 }", "none at rest"),
 }  # fmt: skip
 
@@ -57,19 +57,19 @@ WIF = {
     "not a number": ("Spacing=0.05", "Spacing=nan", r"\[WARP\] Spacing is 'nan'; it must"),
     "an empty cloth": ("[WARP]\nThreads=2", "[WARP]\nThreads=0", "'0'; it must be a whole number"),
     "a size that disagrees": ("Shafts=2", "Shafts=1", "2 names 2; it must be from 0 to 1"),
-    "a colour of no table": ("Color=2", "Color=9", r"\[WEFT\] Color is '9'; it must be a number"),
+    "a colour of no table": ("Color=2", "Color=9", r"\[WEFT\] Color is '9'; it must be a colour"),
     "a billion threads": ("[WEFT]\nThreads=2", "[WEFT]\nThreads=1000000000", "from 1 to 16384"),
 }
 
 WEAVE = {
     "truncated": ("mod(i + j", "character .*cannot be read; write it as in"),
     "empty": ("", "must be one of plain"),
-    "of a wrong type": ("mod(i + j, 2.5) < 1", "'2.5' is not whole numbers"),
-    "without a comparison": ("mod(i + j, 2)", "must be compared, as in"),
-    "by zero": ("mod(i + j, 0) < 1", "by 0; it must be by 1 or more"),
-    "a name not known": ("mod(k, 2) < 1", "'k' is not whole numbers times i and j"),
+    "of a wrong type": ("mod(i + j, 2.5) < 1", "'2.5' is not a sum of whole multiples"),
+    "without a comparison": ("mod(i + j, 2)", "must be a comparison, as in"),
+    "by zero": ("mod(i + j, 0) < 1", "divides by 0; the divisor must be at least 1"),
+    "a name not known": ("mod(k, 2) < 1", "'k' is not a sum of whole multiples of i and j"),
     "too large": ("mod(i, 99991) < 1", "repeats after 99991 x 1; it must be at most 4096"),
-    "a satin that is none": ("satin 6 step 2", "must be of 5, 7 or more"),
+    "a satin that is none": ("satin 6 step 2", "a satin must have 5, 7 or more"),
     "code": ("__import__('os').getcwd() == 1", "must be mod, shift or scale"),
 }
 
@@ -152,7 +152,7 @@ def test_a_broken_image(fault, kept, capsys):
 
 
 NO_FILE = {
-    "missing": "no file|No such file",
+    "missing": "no file|No such file|does not exist",
     "directory": "is a directory; it must be a file",
     "empty": "is empty; it must hold",
     "pipe": "is a pipe or a device; it must be a file",
@@ -198,4 +198,4 @@ def test_lines_that_no_one_uses_are_told_and_the_draft_is_read(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     Path("d.wif").write_text(SMALL.replace("[TIEUP]\n", "[TIEUP]\n9=1\n"))
     assert main(("cat", "d.wif")) == 0
-    assert "d.wif: [TIEUP] has 1 line(s) of no treadle from 1 to 2" in capsys.readouterr().err
+    assert "d.wif: [TIEUP] has 1 line(s) for treadles outside 1 to 2" in capsys.readouterr().err

@@ -132,8 +132,8 @@ def test_the_fuzzer_would_see_a_traceback(monkeypatch):
     status, _, err = called(["cat", "velvet"])
     assert status == 2
     assert err == (
-        "fabricusd: internal error: KeyError: 'oops'; please report it with what "
-        "FABRICUSD_DEBUG=1 shows of it\n"
+        "fabricusd: internal error: KeyError: 'oops'; please report it with the "
+        "traceback that FABRICUSD_DEBUG=1 shows\n"
     )
     monkeypatch.setenv("FABRICUSD_DEBUG", "1")
     status, _, err = called(["cat", "velvet"])

@@ -36,6 +36,7 @@ OPTIONS = {
     ("new", "--thickness"): ("-0.1", "1001"),
     ("compare", "--max-flip"): ("-0.1", "1001"),
     ("compare", "--max-error"): ("-0.1", "1001"),
+    ("compare", "--significance"): ("0", "-0.1", "0.6"),
 }
 
 ARGUMENTS = {
@@ -50,9 +51,9 @@ TEXTS = {
     ("render", "--frames", "1-200000"): "at most 100000 frames",
     ("render", "--frames", "1-99999,1-99999"): "at most 100000 frames",
     ("render", "--frames", "9" * 400): "from -1000000000 to 1000000000",
-    ("render", "--frames", "1e308"): "it must be as in 1-10",
-    ("render", "--frames", "1-2x0"): "by steps above 0",
-    ("render", "--frames", "nan"): "it must be as in 1-10",
+    ("render", "--frames", "1e308"): "write it as in 7, 1-10",
+    ("render", "--frames", "1-2x0"): "with a step above 0",
+    ("render", "--frames", "nan"): "write it as in 7, 1-10",
     ("new", "--warp-color", "0*#fff"): "from 1 to 16384",
     ("new", "--warp-color", "99999999*#fff"): "from 1 to 16384",
     ("new", "--warp-color", "nan,0,0"): "--warp-color",
@@ -89,7 +90,8 @@ def refusal(capsys, folder, arguments):
 def test_a_number_out_of_range_is_refused_with_option_value_and_range(
     capsys, folder, command, option
 ):
-    setting = "difference" if command == "compare" else option[2:].replace("-", "_")
+    differs = command == "compare" and option.startswith("--max-")
+    setting = "difference" if differs else option[2:].replace("-", "_")
     for value in (*OPTIONS[command, option], *ODD):
         line = refusal(capsys, folder, [command, *ARGUMENTS[command], option, value])
         assert option in line
@@ -110,7 +112,7 @@ def test_a_number_within_a_text_is_refused_with_option_value_and_range(
 def test_a_picture_of_too_many_pixels_is_refused(capsys, folder):
     size = ["--width", "60000", "--height", "60000"]
     line = refusal(capsys, folder, ["render", *ARGUMENTS["render"], *size])
-    assert f"60000 x 60000 pixels; it must be at most {MOST_PIXELS}" in line
+    assert f"60000 x 60000 pixels; it must have at most {MOST_PIXELS}" in line
 
 
 def test_the_table_has_every_option_that_takes_a_number():

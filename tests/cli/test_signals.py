@@ -83,7 +83,7 @@ def require_picture(folder):
 def test_a_picture_is_kept_by_every_signal_that_asks_for_an_end(tmp_path, number):
     process = begin(tmp_path)
     process.send_signal(number)
-    assert "interrupted; what was done is kept" in end(process, 130)
+    assert "interrupted; the samples taken so far are kept" in end(process, 130)
     require_picture(tmp_path)
 
 
@@ -93,7 +93,7 @@ def test_under_nohup_the_terminals_end_is_none(tmp_path):
     time.sleep(0.3)
     assert process.poll() is None
     process.send_signal(signal.SIGTERM)
-    assert "interrupted; what was done is kept" in end(process, 130)
+    assert "interrupted; the samples taken so far are kept" in end(process, 130)
     require_picture(tmp_path)
 
 

@@ -12,6 +12,9 @@ import numba
 import pytest
 
 import fabricusd.kernels.start  # noqa: F401
+from fabricusd.kernels.internals import use_internals
+
+pytestmark = pytest.mark.skipif(not use_internals(), reason="this run uses numba as it is")
 
 KERNEL = """
 from numba import njit

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import pytest
 from numba import njit
 
+from fabricusd.kernels.internals import use_internals
 from fabricusd.kernels.parts import PartCompiler, _PartLibrary
+
+pytestmark = pytest.mark.skipif(not use_internals(), reason="this run uses numba as it is")
 
 
 @njit(pipeline_class=PartCompiler)

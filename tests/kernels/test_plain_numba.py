@@ -6,12 +6,17 @@ import json
 import os
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core.compiler import Compiler
 
 from fabricusd.kernels import internals, real
 from fabricusd.kernels.parts import PartCompiler
+
+PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 
 VALUES = """
 import json, numpy as np
@@ -38,6 +43,7 @@ def values(**variables):
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not internals.use_internals(), reason="this run uses numba as it is")
 def test_values_without_internals_are_those_with_them():
     without, found = values(**{internals.VARIABLE: "1"})
     plain, expected = values()
@@ -49,8 +55,30 @@ def test_values_without_internals_are_those_with_them():
         np.testing.assert_allclose(a, b, rtol=1e-12)
 
 
-def test_another_version_of_numba_is_used_as_it_is(monkeypatch):
-    assert real.PartCompiler is PartCompiler
+def test_parts_are_compiled_by_the_compiler_that_is_chosen():
+    assert real.PartCompiler is (PartCompiler if internals.use_internals() else Compiler)
+
+
+@pytest.mark.parametrize("version", [f"{tried}1" for tried in internals.TRIED])
+def test_a_tried_version_of_numba_is_used_with_its_internals(monkeypatch, version):
+    monkeypatch.setattr(internals.numba, "__version__", version)
+    monkeypatch.delenv(internals.VARIABLE, raising=False)
     assert internals.use_internals()
-    monkeypatch.setattr(internals.numba, "__version__", "0.99.0")
+    monkeypatch.setenv(internals.VARIABLE, "1")
     assert not internals.use_internals()
+
+
+def test_another_version_of_numba_is_used_as_it_is_unless_it_is_being_tried(monkeypatch):
+    monkeypatch.setattr(internals.numba, "__version__", "0.99.0")
+    monkeypatch.delenv(internals.VARIABLE, raising=False)
+    assert not internals.use_internals()
+    monkeypatch.setenv(internals.VARIABLE, "0")
+    assert internals.use_internals()
+
+
+def test_the_pin_of_numba_begins_and_ends_with_versions_that_were_tried():
+    needs = tomllib.loads(PROJECT.read_text())["project"]["dependencies"]
+    [pin] = [need.removeprefix("numba") for need in needs if need.startswith("numba")]
+    minors = [int(version.split(".")[1]) for version in internals.TRIED]
+    assert minors == sorted(minors)
+    assert pin == f">=0.{minors[0]},<0.{minors[-1] + 1}"

@@ -106,7 +106,7 @@ LOST = {
         "TargetsKept", "/Looks/Satin fabric:back loses its target /Back of siblings.usda"),
     "no prim": (
         'def "Satin" (references = @siblings.usda@)\n{\n    rel fabric:back = </Nowhere>\n}',
-        "BackIsAFabric", "/Looks/Satin fabric:back targets /Nowhere, which is no prim"),
+        "BackIsAFabric", "/Looks/Satin fabric:back targets /Nowhere, which does not exist"),
     "a prim of another type": (
         'def "Satin" (references = @siblings.usda@)\n{\n    rel fabric:back = </Sheet>\n}',
         "BackIsAFabric", "/Looks/Satin fabric:back targets /Sheet, Mesh"),
@@ -117,7 +117,7 @@ LOST = {
     "a fabric with a fault": (
         'def "Satin" (references = @siblings.usda@)\n'
         '{\n    rel fabric:back = </Looks/Satin/Back>\n    def WovenFabric "Back"\n    {\n    }\n}',
-        "ThreadsExist", "/Looks/Satin/Back fabric:threads names no thread"),
+        "ThreadsExist", "/Looks/Satin/Back fabric:threads targets no thread"),
 }  # fmt: skip
 
 

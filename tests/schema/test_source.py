@@ -34,8 +34,9 @@ def write(tmp_path, name, content):
 
 
 CASES = {
-    "a preset that does not exist": (None, "linnen", "is no file; presets are .*linen_plain"),
-    "a missing file": (None, "nowhere.usda", "nowhere.usda is no file"),
+    "a preset that does not exist": (
+        None, "linnen", "is neither a file nor a preset; presets .*linen_plain"),
+    "a missing file": (None, "nowhere.usda", "nowhere.usda does not exist"),
     "an empty file": (("e.usda", b""), "{}", "is empty"),
     "a text that is no USD": (("t.usda", "hello"), "{}", "cannot be parsed as USD"),
     "a truncated USD text": (("t.usda", '#usda 1.0\ndef WovenFabric "A" {'), "{}", r"t.usda:2"),
@@ -50,11 +51,11 @@ CASES = {
         "t.usda:4.* does not parse at"),
     "another kind of file": (("t.txt", "hello"), "{}", "is not USD; it must be .usda"),
     "a stage without a fabric": (("x.usda", '#usda 1.0\ndef Xform "X"\n{\n}\n'), "{}",
-                                 "holds no WovenFabric prim"),
+                                 "has no WovenFabric prim"),
     "two fabrics and none named": (("two.usda", TWO), "{}", "holds 2 fabrics; name one of .*:/A"),
-    "a prim path of nothing": (("two.usda", TWO), "{}:/Nowhere", ":/Nowhere is no prim"),
+    "a prim path of nothing": (("two.usda", TWO), "{}:/Nowhere", ":/Nowhere does not exist"),
     "a prim of another type": (("two.usda", TWO), "{}:/C", ":/C is Xform; .* be a WovenFabric"),
-    "no prim path at all": (("two.usda", TWO), "{}:/a b", "is no prim path"),
+    "no prim path at all": (("two.usda", TWO), "{}:/a b", "is not a prim path"),
     "a reference to nowhere": (
         ("r.usda", '#usda 1.0\ndef WovenFabric "A" (references = @gone.usda@)\n{\n}\n'), "{}",
         "does not compose: .*gone.usda"),
@@ -110,7 +111,7 @@ def test_a_prim_path_chooses_the_fabric(tmp_path):
     ("name", "message"),
     [
         ("cloth.txt", "has another suffix"),
-        ("nowhere/cloth.usda", "is no directory"),
+        ("nowhere/cloth.usda", "is not a directory"),
         ("taken.usda", "is a directory"),
     ],
 )

@@ -178,7 +178,7 @@ def test_with_colours_gives_both_sets_the_one_colour_named() -> None:
     [
         ({"warp_colors": (2,)}, "warp colour 0 is 2; it must be from 0 to 1"),
         ({"weft_colors": (0, -1)}, "weft colour 1 is -1; it must be from 0 to 1"),
-        ({"palette": ()}, "colours are 0 in the palette, 3 of the warp and 1 of the weft"),
+        ({"palette": ()}, "colours number 0 in the palette, 3 in the warp and 1 in the weft"),
         ({"weft_colors": ()}, "give all three, or none"),
         ({"palette": ((0, 0, float("nan")), RED)}, "palette colour 0 is .*3 numbers"),
         ({"palette": ((0, 0), RED)}, "palette colour 0 is .*3 numbers"),

@@ -67,7 +67,7 @@ def test_a_satin_has_one_tie_an_end_and_none_beside_another(count: int) -> None:
     for step in range(2, count - 1):
         text = f"satin {count} step {step} weft"
         if math.gcd(step, count) > 1:
-            with pytest.raises(FabricError, match=f"step is {step}|has no step"):
+            with pytest.raises(FabricError, match=f"step is {step}|has no possible step"):
                 parse_weave(text)
             continue
         tie = parse_weave(text).weave.cells
@@ -118,26 +118,26 @@ BAD = {
     "nothing": ("", "weave '' is not known"),
     "unknown": ("velvet", "weave 'velvet' is not known; it must be one of plain"),
     "misspelt": ("twil 2/1", "did you mean twill"),
-    "extra word": ("plain 2", "'2' is not expected there"),
+    "extra word": ("plain 2", "'2' is not expected here"),
     "one run": ("twill 2", "pairs of over and under"),
     "zero run": ("twill 2/0", "'0' is not a whole number of at least 1"),
     "negative run": ("twill 2/-1", "'-1' is not a whole number"),
     "fraction": ("twill 1.5/2", "'1.5' is not a whole number"),
-    "no numbers": ("twill", "is not complete; write it as in twill 2/1 S"),
-    "wrong hand": ("twill 2/1 X", "'x' is not expected there"),
+    "no numbers": ("twill", "is incomplete; write it as in twill 2/1 S"),
+    "wrong hand": ("twill 2/1 X", "'x' is not expected here"),
     "three blocks": ("basket 1/2/3", "has 3 numbers; it must have 2"),
     "huge block": ("basket 999999", "at most 4096"),
-    "huge run": ("twill 4096/1", "'4096/1' is 4097 threads; at most 4096"),
+    "huge run": ("twill 4096/1", "'4096/1' is 4097 threads; it must be at most 4096"),
     "huge width": ("herringbone 2/2 4000", "repeat is 8000 x 4; it must be at most 4096"),
-    "satin of nothing": ("satin", "has no number of threads"),
-    "satin without a step": ("satin 6", "has no step; a satin must be of 5, 7 or more"),
-    "satin too small": ("satin 4", "has no step"),
+    "satin of nothing": ("satin", "is missing its number of threads"),
+    "satin without a step": ("satin 6", "has no possible step; a satin must have 5, 7 or more"),
+    "satin too small": ("satin 4", "has no possible step"),
     "satin step not prime": ("satin 8 step 2", "step is 2; with 8 threads it must be 3, 5"),
     "satin step 1": ("satin 5 step 1", "step is 1; with 5 threads it must be 2, 3"),
     "satin step missing": ("satin 5 step", "must be one number"),
     "satin step twice": ("satin 5/2 step 3", "must be one number"),
-    "satin face unknown": ("satin 5 step 2 both", "'both' is not expected there"),
-    "point too narrow": ("point 2/2 1", "turns every 1 ends; it must be at least 2"),
+    "satin face unknown": ("satin 5 step 2 both", "'both' is not expected here"),
+    "point too narrow": ("point 2/2 1", "turns every 1 ends; that number must be at least 2"),
     "unprintable": ("twill \x1b[2J", "'twill ?"),
 }
 

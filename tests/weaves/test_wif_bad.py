@@ -22,10 +22,14 @@ BAD = {
     "truncated in a section's name": (
         SMALL[SMALL.index("READING]") :],
         "",
-        "[THREADING] names no shaft",
+        "[THREADING] does not name any shaft",
     ),
-    "no threading": ("[THREADING]", "[NOTHING]", "d.wif [THREADING] names no shaft"),
-    "threading of zeros": ("[THREADING]\n1=1\n2=2", "[THREADING]\n1=0\n2=0", "names no shaft"),
+    "no threading": ("[THREADING]", "[NOTHING]", "d.wif [THREADING] does not name any shaft"),
+    "threading of zeros": (
+        "[THREADING]\n1=1\n2=2",
+        "[THREADING]\n1=0\n2=0",
+        "does not name any shaft",
+    ),
     "no tie-up": (
         "[TIEUP]",
         "[NOTHING]",
@@ -75,7 +79,7 @@ BAD = {
     "negative shaft": (
         "[THREADING]\n1=1",
         "[THREADING]\n1=-1",
-        "[THREADING] 1 is '-1'; it must be whole numbers with commas between",
+        "[THREADING] 1 is '-1'; it must be whole numbers, separated by commas",
     ),
     "fractional shaft": ("[THREADING]\n1=1", "[THREADING]\n1=1.0", "[THREADING] 1 is '1.0'"),
     "shaft in words": ("[THREADING]\n1=1", "[THREADING]\n1=one", "[THREADING] 1 is 'one'"),
@@ -106,7 +110,7 @@ BAD = {
     "colour of no number": (
         "1=0,0,0",
         "black=0,0,0",
-        "[WARP COLORS] 1 is '1'; it must be a number of [COLOR TABLE], which has 2 to 2",
+        "[WARP COLORS] 1 is '1'; it must be a colour of [COLOR TABLE], whose numbers",
     ),
     "no colour of a number": (
         "1=0,0,0\n2=255,255,255",
@@ -128,7 +132,7 @@ BAD = {
     "no such colour": (
         "Color=1",
         "Color=3",
-        "[WARP] Color is '3'; it must be a number of [COLOR TABLE], which has 1 to 2",
+        "[WARP] Color is '3'; it must be a colour of [COLOR TABLE], whose numbers are from 1 to 2",
     ),
     "colour in words": ("Color=2", "Color=white", "[WEFT] Color is 'white'"),
     "thread of no colour": ("[WARP COLORS]\n1=1", "[WARP COLORS]\n1=0", "[WARP COLORS] 1 is '0'"),
@@ -221,7 +225,7 @@ def test_a_file_without_permission_is_refused_in_one_line(tmp_path: Path) -> Non
 
 def test_a_draft_is_not_written_where_it_cannot_be(tmp_path: Path) -> None:
     draft = parse_wif(SMALL)
-    with pytest.raises(FabricError, match="no directory"):
+    with pytest.raises(FabricError, match="not a directory"):
         write_wif(draft, tmp_path / "none" / "d.wif")
     write_wif(draft, tmp_path / "d.wif")
     with pytest.raises(FabricError, match="exists"):

@@ -78,7 +78,7 @@ OTHERS = {
     "the same with a mark": ("a.wif", b"\xef\xbb\xbf" + DTX, "is a .dtx draft (Fiberworks)"),
     "the same in UTF-16": ("a.wif", DTX.decode().encode("utf-16"), "is a .dtx draft (Fiberworks)"),
     "the same after empty lines": ("a.wif", b"\r\n\r\n" + DTX, "is a .dtx draft (Fiberworks)"),
-    "known by its name alone": ("a.dtx", b"hello", "is a .dtx draft (Fiberworks) by its name"),
+    "known by its name alone": ("a.dtx", b"hello", "is a .dtx draft (Fiberworks), judging by"),
     "a draft of WeavePoint": ("a.wpo", b"\x7b\0\1\2\3\4", "is a .wpo draft (WeavePoint)"),
     "a draft of TempoWeave": ("a.wif", b"PK\3\4\x14\0\0", "is a ZIP archive, as TempoWeave's .twa"),
     "a picture": ("a.wif", b"\x89PNG\r\n\x1a\n\0\0", "is a PNG picture; read it with --image"),

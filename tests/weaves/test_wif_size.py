@@ -130,14 +130,17 @@ def test_a_file_of_too_many_lines_is_refused_in_500_megabytes(tmp_path: Path, ki
             stream.writelines(threads("TREADLING", 10**6))
             stream.write("[WARP]\nThreads=1000000\n[WEFT]\nThreads=1000000\n")
     megabytes, message = peak_of_reading(path)
-    assert message == f"{path} has more lines than the 1000000 of the largest WIF draft"
+    assert message == f"{path} has too many lines for a WIF draft; it must have at most 1000000"
     assert megabytes < 500  # measured 120
 
 
 def test_a_line_without_an_end_is_refused_where_it_becomes_too_long(tmp_path: Path) -> None:
     path = tmp_path / "wide.wif"
     path.write_text(f"{HEAD}[THREADING]\n1={'1,' * LONGEST}\n")
-    with pytest.raises(FabricError, match="line 10 is longer than the 1000000 characters"):
+    with pytest.raises(
+        FabricError,
+        match="line 10 is too long for a WIF draft; it must have at most 1000000 characters",
+    ):
         read_wif(path)
 
 

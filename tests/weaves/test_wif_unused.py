@@ -17,9 +17,15 @@ CASES = Path(__file__).parents[1] / "cases" / "wif_extra_lines"
 @pytest.mark.parametrize(
     ("file", "warning"),
     [
-        ("extra_treadles.wif", "[TIEUP] has 2 line(s) of no treadle from 1 to 4, such as '5'"),
-        ("end_zero.wif", "[TREADLING] has 1 line(s) of no pick from 1 to 4, such as '5'"),
-        ("default_colour.wif", "[WARP] Color is '0'; it must be a number of [COLOR TABLE]"),
+        (
+            "extra_treadles.wif",
+            "[TIEUP] has 2 line(s) for treadles outside 1 to 4, such as '5'",
+        ),
+        (
+            "end_zero.wif",
+            "[TREADLING] has 1 line(s) for picks outside 1 to 4, such as '5'",
+        ),
+        ("default_colour.wif", "[WARP] Color is '0'; it must be a colour of [COLOR TABLE]"),
     ],
 )
 def test_lines_beyond_what_the_draft_has_leave_its_drawdown(file: str, warning: str) -> None:
@@ -32,32 +38,32 @@ def test_lines_beyond_what_the_draft_has_leave_its_drawdown(file: str, warning: 
 
 
 UNUSED = {
-    "end beyond the warp": (("4=4\n[TIEUP]", "4=4\n9=1\n[TIEUP]"), "[THREADING] has 1 line(s) of"),
-    "end zero": (("[THREADING]\n", "[THREADING]\n0=1\n"), "no end from 1 to 4, such as '0'"),
+    "end beyond the warp": (("4=4\n[TIEUP]", "4=4\n9=1\n[TIEUP]"), "[THREADING] has 1 line(s) for"),
+    "end zero": (("[THREADING]\n", "[THREADING]\n0=1\n"), "ends outside 1 to 4, such as '0'"),
     "end in words": (("[THREADING]\n", "[THREADING]\nfirst=x\n"), "such as 'first'"),
-    "end of nonsense": (("[THREADING]\n", "[THREADING]\n-1=1\n1.5=1\n９=1\n"), "has 3 line(s) of"),
+    "end of nonsense": (("[THREADING]\n", "[THREADING]\n-1=1\n1.5=1\n９=1\n"), "has 3 line(s) for"),
     "end beyond integers": (("[THREADING]\n", f"[THREADING]\n{'9' * 5000}=1\n"), "such as '9999"),
-    "pick beyond the weft": (("5=1\n", "5=1\n6=1\n7=99\n8=no\n"), "[TREADLING] has 3 line(s) of"),
-    "treadle beyond the loom": (("4=1,4\n", "4=1,4\n5=1\n6=99\n"), "[TIEUP] has 2 line(s) of no"),
-    "treadle zero": (("4=1,4\n", "4=1,4\n0=1\n"), "[TIEUP] has 1 line(s) of no treadle"),
+    "pick beyond the weft": (("5=1\n", "5=1\n6=1\n7=99\n8=no\n"), "[TREADLING] has 3 line(s) for"),
+    "treadle beyond the loom": (("4=1,4\n", "4=1,4\n5=1\n6=99\n"), "[TIEUP] has 2 line(s) for"),
+    "treadle zero": (("4=1,4\n", "4=1,4\n0=1\n"), "[TIEUP] has 1 line(s) for treadles outside"),
     "wrong treadle that no pick presses": (
         ("Treadles=4", "Treadles=9\n"),
         ("4=1,4\n", "4=1,4\n5=7\n6=x\n"),
-        "No pick uses 2 treadle(s) that are wrong: d.wif [TIEUP] 5 names 7",
+        "2 treadle(s) are wrong, but no pick uses them: d.wif [TIEUP] 5 names 7",
     ),
     "lift plan beside a tie-up, wrong": (
         ("[NOTES]", "[LIFTPLAN]\n1=99\n[NOTES]"),
-        "[LIFTPLAN] is not used, since there are a tie-up and a treadling: d.wif [LIFTPLAN] 1 ",
+        "[LIFTPLAN] is not used, since there is a tie-up with a treadling: d.wif [LIFTPLAN] 1 ",
     ),
     "colour that no thread has, wrong": (
         ("2=255,255,255\n", "2=255,255,255\n3=1,2\n4=0,0,256\n5=x\n"),
-        "No thread uses 3 colour(s) that are wrong: d.wif [COLOR TABLE] 3 is '1,2'",
+        "3 colour(s) are wrong, but no thread uses them: d.wif [COLOR TABLE] 3 is '1,2'",
     ),
-    "colour in words": (("1=0,0,0\n", "1=0,0,0\nblack=0,0,0\n"), "[COLOR TABLE] has 1 line(s) of"),
+    "colour in words": (("1=0,0,0\n", "1=0,0,0\nblack=0,0,0\n"), "[COLOR TABLE] has 1 line(s) for"),
     "default colour while each end has its own": (
         ("Color=1", "Color=17"),
         ("[TIEUP]", "[WARP COLORS]\n1=1\n2=1\n3=1\n4=1\n[TIEUP]"),
-        "[WARP] Color is '17'; it must be a number of [COLOR TABLE], which has 1 to 2; it is not",
+        "it must be a colour of [COLOR TABLE], whose numbers are from 1 to 2; it is not",
     ),
     "default colour zero": (("Color=1", "Color=0"), "4 warp thread(s) have no colour"),
     "colour of no end": (("[TIEUP]", "[WARP COLORS]\n5=99\n[TIEUP]"), "[WARP COLORS] has 1 line"),
@@ -65,7 +71,7 @@ UNUSED = {
     "spacing of no end": (("[TIEUP]", "[WARP SPACING]\n5=x\n[TIEUP]"), "[WARP SPACING] has 1 line"),
     "thickness of no pick": (
         ("[TIEUP]", "[WEFT THICKNESS]\n6=0.1\n[TIEUP]"),
-        "[WEFT THICKNESS] has 1 line(s) of no pick from 1 to 5, such as '6'",
+        "[WEFT THICKNESS] has 1 line(s) for picks outside 1 to 5, such as '6'",
     ),
     "default spacing while each end has its own": (
         ("Spacing=0.05", "Spacing=wide"),
@@ -76,19 +82,19 @@ UNUSED = {
         ("[WIF]", "MHWeave 3\nVersion=2\n[WIF]"),
         "2 line(s) before the first section are not used, such as 'MHWeave 3'",
     ),
-    "a section before [WIF]": (("[WIF]", "[HELLO]\n1=1\n[WIF]"), "not of WIF and are not used"),
+    "a section before [WIF]": (("[WIF]", "[HELLO]\n1=1\n[WIF]"), "are not part of WIF and are"),
     "lines without =": (
         ("[THREADING]\n", "[THREADING]\nthe threading\n1\n=3\n"),
-        "3 line(s) are no KEY=VALUE and are not used, such as 'the threading'",
+        "3 line(s) are not KEY=VALUE and are not used, such as 'the threading'",
     ),
     "a section without its end": (("[NOTES]", "[FOO\n[NOTES]"), "such as '[FOO'"),
     "notes without a number": (
         ("[NOTES]\n", "[NOTES]\nsee also=x\n"),
-        "[NOTES] has 1 line(s) of no line from 0 to 1000000, such as 'see also'",
+        "[NOTES] has 1 line(s) for notes outside 0 to 1000000, such as 'see also'",
     ),
     "unknown sections": (
         ("[NOTES]", "[THREADS]\n1=x\n[NOTES]"),
-        "1 section(s) are not of WIF and are not used, such as 'THREADS'",
+        "1 section(s) are not part of WIF and are not used, such as 'THREADS'",
     ),
 }  # fmt: skip
 
@@ -123,7 +129,7 @@ USED = {
     "default colour that an end needs": (
         ("Color=1", "Color=17"),
         ("[TIEUP]", "[WARP COLORS]\n1=1\n2=1\n3=1\n[TIEUP]"),
-        "[WARP] Color is '17'; it must be a number of [COLOR TABLE], which has 1 to 2",
+        "[WARP] Color is '17'; it must be a colour of [COLOR TABLE], whose numbers are from 1 to 2",
     ),
     "default spacing that an end needs": (
         ("Spacing=0.05", "Spacing=wide"),

@@ -7,15 +7,12 @@ is a scaled one, because its cloth has a different number of threads.
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.scene.scene import Mesh
-
-if TYPE_CHECKING:
-    from fabricusd.bake.layout.garment import Garment
 
 SAME = 1e-6
 """Distance, relative to a mesh's extent, within which two points are the same. The rounding of
@@ -60,7 +57,19 @@ class Shape(Protocol):
         """(m, 3) int."""
 
 
-def are_alike(a: Garment, b: Garment) -> bool:
+class Laid(Shape, Protocol):
+    """A shape with UVs: a garment."""
+
+    @property
+    def uv(self) -> NDArray[np.float64]:
+        """(m, 3, 2) float64."""
+
+    @property
+    def lay(self) -> NDArray[np.int32]:
+        """(m,) int - index of the lay of each triangle."""
+
+
+def are_alike(a: Laid, b: Laid) -> bool:
     """Whether two garments with the same UVs are translated and rotated copies of each other."""
     same_uv = a.uv.shape == b.uv.shape and np.array_equal(a.uv, b.uv)
     same = same_uv and np.array_equal(a.triangles, b.triangles) and np.array_equal(a.lay, b.lay)

@@ -1,1 +1,1 @@
-"""The panels of the chart, one file each."""
+"""The panels of the chart, each in a module of its own."""

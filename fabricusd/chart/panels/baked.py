@@ -1,4 +1,4 @@
-"""Panels: error of baked forms against their size, and against the time that they take to bake."""
+"""Panels: error of baked BTFs against their size, and against the time to bake them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ QUICK_FORMS = ("factored", "ubo-joint")
 
 @lru_cache(maxsize=2)
 def bakes(quick: bool) -> tuple[Row, ...]:
-    """A row for each preset, form and bound, its cost in megabytes."""
+    """A row for each preset, form and bound; its cost is the size in megabytes."""
     rows = []
     with tempfile.TemporaryDirectory() as name:
         for preset in PRESETS[:1] if quick else PRESETS:
@@ -54,7 +54,7 @@ def _bake(folder: Path, preset: str, form: str, bound: float, quick: bool) -> Ro
 
 
 def by_time(quick: bool) -> list[Row]:
-    """The same rows, their cost in seconds."""
+    """The same rows; their cost is the time in seconds."""
     return [
         Row(
             group=row.group, method=row.method, cost=row.figures["seconds"],

@@ -1,4 +1,4 @@
-"""Panel: standard surfaces over baked textures against the cloth that they stand for."""
+"""Panel: standard surfaces over baked textures, compared with the cloth that they represent."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PRESETS = (
 QUICK_PRESETS = ("linen_plain",)
 QUICK_KINDS = ("preview", "openpbr")
 THREADS = 6400.0
-"""Along the square that is baked: a texel then spans whole repeats."""
+"""Threads along the square that is baked; with so many, a texel spans whole repeats."""
 
 SQUARE = (
     "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
@@ -41,7 +41,7 @@ SQUARE = (
 
 
 def baked_texels(fabric: Fabric, folder: Path, threads: float = THREADS) -> TexelSample:
-    """Texels of a square of `fabric`, `threads` along its side, baked at 64 x 64."""
+    """Texels of a square of `fabric` with `threads` along its side, baked at 64 x 64."""
     scene = folder / "square.obj"
     scene.write_text(SQUARE)
     out = folder / f"{fabric.name}_{threads:g}"
@@ -54,8 +54,7 @@ def baked_texels(fabric: Fabric, folder: Path, threads: float = THREADS) -> Texe
 
 
 def run(quick: bool) -> list[Row]:
-    """A group for each preset: every kind of surface with the textures alone and fitted, and the
-    law itself."""
+    """A group of rows for each preset: every kind of surface, fitted and unfitted, and the law."""
     rows = []
     with tempfile.TemporaryDirectory() as name:
         for preset in QUICK_PRESETS if quick else PRESETS:
@@ -66,7 +65,7 @@ def run(quick: bool) -> list[Row]:
 
 def _rows(fabric: Fabric, texels: TexelSample, quick: bool) -> list[Row]:
     wi, wo = direction_pairs()
-    # One texel is what a renderer shades; all of them are what it shows from afar.
+    # A renderer shades one texel at a time, so time one; seen from afar, all of them count.
     one = texels.part(slice(1))
     law = "the law, far"
     runs: dict[str, Callable[[], object]] = {
@@ -94,7 +93,7 @@ def _rows(fabric: Fabric, texels: TexelSample, quick: bool) -> list[Row]:
 
 
 def draw(figure: Any, rows: Sequence[Row]) -> None:
-    """Bars of delta E by preset and surface, fitted in full and with the textures alone in grey."""
+    """Draw bars of delta E by preset and surface: fitted in colour, textures alone in grey."""
     axes = figure.subplots()
     presets = list(dict.fromkeys(row.group for row in rows))
     kinds = [k for k in KINDS if any(row.method.startswith(f"{k},") for row in rows)]

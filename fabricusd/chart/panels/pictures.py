@@ -33,7 +33,7 @@ QUICK_NOISES = (0.1,)
 
 
 def run(quick: bool) -> list[Row]:
-    """A group for each preset on a cylinder that fills the picture."""
+    """Two groups for each preset, on a cylinder that fills the picture."""
     rows = []
     for name in QUICK_PRESETS if quick else PRESETS:
         rows += _rows(name, quick) + _one_light(name, quick)
@@ -41,7 +41,7 @@ def run(quick: bool) -> list[Row]:
 
 
 def _one_light(name: str, quick: bool) -> list[Row]:
-    """The same cylinder under one distant light, no bounces: a picture in one call of the law."""
+    """The cylinder under one distant light, without bounces: one call of the law is a picture."""
     real: Any = np.float32
     fabric, size = load(name), 24 if quick else 48
     wi, wo = _cylinder(size)
@@ -76,8 +76,10 @@ def _one_light(name: str, quick: bool) -> list[Row]:
 
 
 def _cylinder(size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(size^2, 3) light and viewer in the surface frames of an upright cylinder, seen from afar;
-    places turned away from the light see a light that is just above the cloth."""
+    """(size^2, 3) directions to light and viewer in the surface frames of an upright cylinder.
+
+    The viewer is far away. Places that face away from the light get a light just above the cloth.
+    """
     across = (2 * (np.arange(size) + 0.5) / size - 1) * 0.98
     turn = np.tile(np.arcsin(across), size)
     c, s = np.cos(turn), np.sin(turn)
@@ -117,7 +119,7 @@ def _rows(name: str, quick: bool) -> list[Row]:
     reference, _ = picture(1000, spp=most)
     settings = _settings(quick)
     for arguments in settings.values():
-        # Kernels are compiled, or loaded, when they are first called.
+        # The first call compiles or loads the kernels.
         picture(0, 4, **{**arguments, "spp": 4})
     found: dict[str, list[tuple[float, ...]]] = {method: [] for method in settings}
     for seed in range(repeats):

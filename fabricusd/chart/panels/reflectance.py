@@ -1,4 +1,4 @@
-"""Panel: error of the surface law against its time, by model, quadrature, precision, NumPy."""
+"""Panel: error of the surface law against its time, by model, quadrature and precision."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from fabricusd.schema import load
 
 Floats = NDArray[np.float64]
 Method = tuple[int, Callable[[], Floats]]
-"""Pairs of directions that a call evaluates, and the call, answering for the same first pairs."""
+"""(pairs of directions that a call evaluates, the call, which returns CHECKED of the values)."""
 
 QUICK_PRESETS = ("linen_plain", "polyester_satin_charmeuse")
 PRESETS = (
@@ -43,16 +43,16 @@ RULES = {
 }
 QUICK_RULES = ("points, 2 widths", "points, 1 width", "points, 1/4 width", "closed form, 10°")
 BOUNDS = (0.05, 0.01, 0.002)
-"""Bounds that `conserving` cloth is asked to meet; its rules are chosen by them."""
+"""Error bounds for `conserving` cloth, from which its quadrature rules are chosen."""
 
 CHECKED = 512
-"""Pairs that an error is measured on."""
+"""Pairs of directions on which an error is measured."""
 
 REFERENCE_NODES = 256
-"""Midpoints on each piece of a curve in the reference."""
+"""Midpoints on each piece of a curve, for the reference."""
 
 SPLITS = 4
-"""Parts of the pairs whose errors tell how repeatable an error is."""
+"""Parts into which the pairs are divided to estimate the spread of an error."""
 
 
 def run(quick: bool) -> list[Row]:
@@ -78,7 +78,7 @@ def _run(quick: bool) -> list[Row]:
         weave = f"{name}, weave"
         truth = weave_reference(fabric, hit)
         rows += _group(weave, truth, weave_methods(fabric, hit, quick), rounds)
-    # Its kernels take longer to compile than all the rest takes to run.
+    # These kernels take longer to compile than all the rest takes to run.
     for name in () if quick else QUICK_PRESETS:
         one = replace(load(name), model="conserving")
         truth = plain.conserving_far(one, *_checked(), per_segment=REFERENCE_NODES)
@@ -88,7 +88,7 @@ def _run(quick: bool) -> list[Row]:
 
 
 def _group(group: str, truth: Floats, methods: dict[str, Method], rounds: int) -> list[Row]:
-    """Rows of methods measured in turns against `truth` (CHECKED, 3)."""
+    """Rows of methods, timed in turns and compared with `truth` (CHECKED, 3)."""
     taken = in_turns({name: call for name, (_, call) in methods.items()}, rounds)
     rows = []
     for name, (count, call) in methods.items():
@@ -108,7 +108,7 @@ def _group(group: str, truth: Floats, methods: dict[str, Method], rounds: int) -
 
 
 def relative_error(found: Floats, truth: Floats) -> tuple[float, float]:
-    """Mean absolute error over the mean of the truth, and its spread over SPLITS of the pairs."""
+    """(mean absolute error over the mean of the truth, its spread over SPLITS parts of pairs)."""
     miss = np.abs(found - truth).mean(axis=1) / truth.mean()
     parts = [float(part.mean()) for part in np.array_split(miss, SPLITS)]
     return float(miss.mean()), typical(parts)[1]
@@ -120,18 +120,18 @@ def _checked() -> tuple[Floats, Floats]:
 
 
 def places(fabric: Fabric, count: int) -> Floats:
-    """(count, 2) weave coordinates, evenly over one repeat: Roberts' sequence."""
+    """(count, 2) weave coordinates, spread evenly over one repeat by Roberts' sequence."""
     steps = np.array([0.7548776662466927, 0.5698402909980532])
     return np.asarray((np.arange(count)[:, None] * steps) % 1.0 * fabric.weave.cells.shape)
 
 
 def far_reference(fabric: Fabric) -> Floats:
-    """(CHECKED, 3) level `far` by the law as it is written."""
+    """(CHECKED, 3) values of level `far`, by the plain implementation of the law."""
     return plain.far(fabric, *_checked(), per_segment=REFERENCE_NODES)
 
 
 def weave_reference(fabric: Fabric, hit: WeaveHit, per_segment: int = REFERENCE_NODES) -> Floats:
-    """(CHECKED, 3) level `weave` at the first places of `hit`, as it is written."""
+    """(CHECKED, 3) values of level `weave` at the first places of `hit`, by the plain law."""
     wi, wo = _checked()
     out = np.zeros((CHECKED, 3))
     for share in plain.shares(fabric):
@@ -148,7 +148,7 @@ def _chosen(quick: bool) -> dict[str, Rule]:
 
 
 def far_methods(fabric: Fabric, count: int, quick: bool) -> dict[str, Method]:
-    """Compiled in both precisions by every rule, and NumPy."""
+    """Methods of level `far`: compiled with every rule in both precisions, and NumPy."""
     methods: dict[str, Method] = {}
     for label, rule in _chosen(quick).items():
         methods[f"float32, {label}"] = (count, _far(fabric, rule, count, np.float32))
@@ -177,12 +177,12 @@ def _far(fabric: Fabric, rule: Rule, count: int, real: Any) -> Callable[[], Floa
 
 
 def _first_checked(w: Floats, count: int) -> Floats:
-    """(3, count): the checked directions over and over."""
+    """(3, count) - the checked directions, repeated."""
     return np.ascontiguousarray(np.resize(w, (count, 3)).T)
 
 
 def weave_methods(fabric: Fabric, hit: WeaveHit, quick: bool) -> dict[str, Method]:
-    """As `far_methods`; the rule is that of the normalisation `Q`."""
+    """Methods of level `weave`, as in `far_methods`; the rule is that of the normalisation `Q`."""
     methods: dict[str, Method] = {}
     count = len(hit.set)
     for label, rule in _chosen(quick).items():
@@ -207,7 +207,10 @@ def _weave(fabric: Fabric, hit: WeaveHit, rule: Rule, real: Any) -> Callable[[],
 
 
 def conserving_methods(fabric: Fabric, count: int) -> dict[str, Method]:
-    """The public function in float64 at each bound, single scattering, and NumPy."""
+    """Methods of `conserving` cloth: the public function in float64 at each bound, and NumPy.
+
+    Single scattering only.
+    """
     methods: dict[str, Method] = {}
     for bound in BOUNDS:
         methods[f"float64, --max-error {bound:g}"] = (count, _bounded(fabric, bound, count))

@@ -1,4 +1,4 @@
-"""The panels, in the order of the page. To add one: a module with a PANEL, and its line here."""
+"""The panels in the order of the page. To add one, write a module with a PANEL and add it here."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Panel: methods of shadowing from thread to thread, against the marched height field."""
+"""Panel: methods for shadows between threads, against the marched height field."""
 
 from __future__ import annotations
 
@@ -29,29 +29,29 @@ WOVEN = (
     "silk_shot",
 )
 ELEVATIONS = (5, 10, 20, 30, 45, 60)
-"""Of the light [degrees]."""
+"""Elevations of the light [degrees]."""
 
 AZIMUTHS = 16
 TABLES = ((16, (4, 2)), (16, (8, 4)), (32, (8, 4)), (16, (16, 8)), (64, (32, 16)))
-"""Sizes of the `horizon` table, the usual one among them: azimuths, texels along and across."""
+"""Sizes of the `horizon` table, including the usual one: azimuths, (texels along, across)."""
 
 USUAL = "horizon, 16 of 8×4"
 
 
 def places_on_threads(fabric: Fabric, count: int) -> Floats:
-    """(n, 2) weave coordinates on the threads of one repeat, evenly; gaps are left out."""
+    """(n, 2) weave coordinates, spread evenly over the threads of one repeat but not over gaps."""
     uv = places(fabric, count)
     return uv[~lookup(fabric, uv).gap]
 
 
 def light(elevation: float, azimuth: float) -> Floats:
-    """(3,) unit direction, angles in degrees, azimuth from U to V."""
+    """(3,) unit direction; angles are in degrees, the azimuth goes from U to V."""
     e, a = math.radians(elevation), math.radians(azimuth)
     return np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
 
 
 def shares(fabric: Fabric, uv: Floats, cloth: CompiledFabric, shadow: Shadow) -> Floats:
-    """(elevations, azimuths, places) share of the light that arrives."""
+    """(elevations, azimuths, places) share of the light that arrives at each place."""
     return np.array(
         [
             [
@@ -74,7 +74,7 @@ def rms(x: Floats) -> float:
 
 
 def run(quick: bool, names: Sequence[str] = ()) -> list[Row]:
-    """A group for each woven preset, or for those of `names`."""
+    """A group of rows for each woven preset, or for each of `names`."""
     before = numba.get_num_threads()
     numba.set_num_threads(1)
     try:
@@ -117,7 +117,7 @@ def _rows(fabric: Fabric, quick: bool) -> list[Row]:
 
 
 def _shadows(fabric: Fabric, quick: bool) -> dict[str, Shadow]:
-    """The methods, and `horizon` with tables of other sizes, in single precision."""
+    """Every method, and `horizon` with tables of other sizes, all in single precision."""
     found = {method: compile_shadow(fabric, method) for method in METHODS}
     for azimuths, texels in () if quick else TABLES:
         name = f"horizon, {azimuths} of {texels[0]}×{texels[1]}"

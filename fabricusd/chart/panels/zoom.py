@@ -1,4 +1,4 @@
-"""Panel: moiré and blur of cloth at a distance, by how it is sampled and filtered."""
+"""Panel: moiré and blur of cloth at a distance, by method of sampling and filtering."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ PRESETS = ("linen_plain", "polyester_satin_charmeuse")
 WIDTHS = (0.1, 0.2, 0.35, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0, 11.0, 16.0, 30.0)
 QUICK_WIDTHS = (0.2, 1.0, 4.0, 30.0)
 ACROSS = (1, 2, 4, 8)
-"""Samples along a pixel's side."""
+"""Samples along the side of a pixel."""
 
 PARTS = ("alias", "blur", "shift")
 
 LIGHTS = ((0.48, 0.36, 0.8), (-0.6, 0.0, 0.8), (0.0, 0.8, 0.6))
-"""Directions to the light; the figures are means over them, the spreads are theirs."""
+"""Directions to the light; figures and spreads are taken over them."""
 
 
 def run(quick: bool) -> list[Row]:
-    """A group for each preset and width of a pixel in threads."""
+    """A group of rows for each preset and each width of a pixel in threads."""
     rows = []
     for name in PRESETS:
         fabric = load(name)
@@ -49,8 +49,10 @@ def run(quick: bool) -> list[Row]:
 
 
 def sample_costs(fabric: Fabric, count: int, rounds: int) -> dict[str, tuple[float, float]]:
-    """ns of a sample at levels `far` and `weave` (place and shadow by table included), float32, one
-    worker: (median, spread)."""
+    """Level, `far` or `weave` -> (median, spread) of the cost of a sample [ns].
+
+    In float32, with one worker; `weave` includes finding the place and its shadow by table.
+    """
     before = numba.get_num_threads()
     numba.set_num_threads(1)
     try:
@@ -109,7 +111,7 @@ def _far_share(view: View) -> float:
 
 
 def _pictures(view: View) -> dict[str, Floats]:
-    """Method -> picture. `auto` mixes its levels by their weights, its mean over many samples."""
+    """Method -> picture. `auto` mixes its levels by their weights, as it does over many samples."""
     found = {"far": picture(view, "far", 1)}
     share = _far_share(view)
     for across in ACROSS:
@@ -122,7 +124,7 @@ def _pictures(view: View) -> dict[str, Floats]:
 
 
 def draw(figure: Any, rows: Sequence[Row]) -> None:
-    """Alias and blur against the width of a pixel, a curve a method."""
+    """Plot alias and blur against the width of a pixel, with a curve for each method."""
     names = list(dict.fromkeys(row.group.split(",")[0] for row in rows))
     methods = ("far", "weave, point", "weave, 4×4", "weave, 8×8", "auto, point", "auto, 4×4")
     grid = figure.subplots(2, len(names), sharex=True, sharey=True, squeeze=False)

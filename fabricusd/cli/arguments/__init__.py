@@ -1,1 +1,1 @@
-"""Arguments that several commands take."""
+"""Arguments that several commands share."""

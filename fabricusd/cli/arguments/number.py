@@ -1,4 +1,4 @@
-"""Numbers on the command line, whose ranges are checked before any work begins."""
+"""Numbers on the command line; their ranges are checked before any work begins."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fabricusd.ranges import RANGES
 
 
 def number(setting: str) -> Callable[[str], Any]:
-    """The `type` of an option: text to a number in the range of that setting."""
+    """The `type` of an option: a parser for a number in the range of that setting."""
     allowed = RANGES[setting]
 
     def parse(text: str) -> Any:

@@ -6,9 +6,9 @@ import argparse
 
 
 def add_units(parser: argparse.ArgumentParser) -> None:
-    """What the lengths of a file without a unit are in."""
+    """Add `--units`, the unit of lengths in a file that does not state one."""
     parser.add_argument(
         "--units",
         choices=("m", "cm", "mm", "in"),
-        help="of the lengths in an .obj or .ply (default: m)",
+        help="unit of the lengths in an .obj or .ply (default: m)",
     )

@@ -26,7 +26,7 @@ from fabricusd.materials.networks.graph import Graph, Value
 from fabricusd.materials.targets.paths import asset_path
 from fabricusd.materials.targets.write_usd import write_material
 from fabricusd.schema import export, write_binding, write_fabric
-from fabricusd.schema.access import BINDING_API
+from fabricusd.schema.access import remove_binding
 from fabricusd.schema.names import prim_name
 from fabricusd.schema.source import usd_errors
 
@@ -171,7 +171,7 @@ def _fill(
         if not one.binds_fabric and lay.fabric is not None:
             write_binding(prim, scope.AppendChild(prim_name(lay.fabric.name)), binding_of(lay))
     elif one.binds_fabric:
-        prim.RemoveAppliedSchema(BINDING_API)
+        remove_binding(prim)
         prim.CreateRelationship("fabric:binding", custom=False).SetTargets([])
     if variant != "off":
         recipe = recipes[one.maps.name, one.lay, variant]

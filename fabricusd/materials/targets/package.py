@@ -10,6 +10,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdUtils
 from fabricusd.errors import FabricError
 from fabricusd.files import require_writable, whole_file
 from fabricusd.materials.targets import Job
+from fabricusd.schema.access import type_of
 
 
 def check(where: Path, clobber: bool) -> None:
@@ -73,6 +74,6 @@ def _unused(stage: Usd.Stage) -> list[Sdf.Path]:
     return [
         prim.GetPath()
         for prim in stage.Traverse()
-        if prim.GetTypeName() == "WovenFabric"
+        if type_of(prim) == "WovenFabric"
         or (prim.IsA(UsdShade.Material) and prim.GetPath() not in bound)
     ]

@@ -164,9 +164,25 @@ def _vertical(length: float) -> float:
     return length if 0 < length <= _FARTHEST else 0.0
 
 
+def _exposure_scale(camera: UsdGeom.Camera, time: Usd.TimeCode) -> float:
+    """Factor on the light that reaches the film."""
+    if hasattr(camera, "ComputeLinearExposureScale"):
+        return float(camera.ComputeLinearExposureScale(time))
+    # USD 24.11 has neither this function nor all of the attributes.
+    numbers = {"exposure": 0.0, "time": 1.0, "iso": 100.0, "fStop": 1.0, "responsivity": 1.0}
+    for name in numbers:
+        full = name if name == "exposure" else f"exposure:{name}"
+        attribute = camera.GetPrim().GetAttribute(full)
+        value = attribute.Get(time) if attribute else None
+        numbers[name] = numbers[name] if value is None else float(value)
+    light = numbers["time"] * numbers["iso"] / 100.0 * numbers["responsivity"]
+    stop = numbers["fStop"]
+    return light * 2.0 ** numbers["exposure"] / stop**2 if stop else math.inf
+
+
 def _stops(camera: UsdGeom.Camera, time: Usd.TimeCode, scene: Scene) -> float:
     """Exposure in stops, of compensation, ISO, time, f-stop and responsivity together."""
-    scale = float(camera.ComputeLinearExposureScale(time))
+    scale = _exposure_scale(camera, time)
     stops = math.log2(scale) if math.isfinite(scale) and scale > 0 else math.nan
     if abs(stops) <= _MOST_STOPS:
         return stops

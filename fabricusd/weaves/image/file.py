@@ -1,4 +1,4 @@
-"""The pixels of an image file as display colours."""
+"""The pixels of an image file, as display colours."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ MOST_PIXELS = 2**27
 class CodeImage:
     """The pixels of an image file as display colours 0xRRGGBB, read band by band.
 
-    Floating-point images are linear and are encoded for display; transparency shows white.
-    Raises FabricError for what is not an image of 1 to `largest` pixels a side and at most
+    Floating-point images are linear and are encoded for display; transparency shows as white.
+    Raises FabricError for a file that is not an image of 1 to `largest` pixels a side and at most
     `MOST_PIXELS` altogether.
     """
 
     def __init__(self, path: str | os.PathLike[str], largest: int) -> None:
-        # Here, so that drafts of other kinds do not wait for OpenImageIO.
+        # Imported here, so that drafts of other kinds do not wait for OpenImageIO.
         from fabricusd.images.flat import FlatImage
 
         self.image = FlatImage(path, largest, MOST_PIXELS)
@@ -41,7 +41,7 @@ class CodeImage:
             )
             row += len(pixels)
             if self.image.alpha >= 0:
-                # Colours come multiplied by alpha, so what is left of 1 lays them on white.
+                # Colours are premultiplied by alpha, so adding 1 - alpha lays them over white.
                 shown = _over_white(shown, self.image.alpha)
             yield _packed(shown)
 
@@ -67,7 +67,7 @@ def _packed(pixels: NDArray[np.uint8]) -> NDArray[np.uint32]:
 
 
 def _display(where: str, pixels: NDArray[Any], row: int) -> NDArray[np.uint8]:
-    """Linear to 8-bit display codes; `row` is where the band begins."""
+    """Linear pixels to 8-bit display codes; `row` is the first row of the band."""
     bad = ~np.isfinite(pixels).all(axis=2)
     if bad.any():
         y, x = np.unravel_index(int(np.argmax(bad)), bad.shape)

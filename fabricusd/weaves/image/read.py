@@ -1,9 +1,9 @@
-"""Weaves from an image: a pixel for each crossing, its colour that of the thread on top.
+"""Weaves from an image, with one pixel for each crossing in the colour of the thread on top.
 
 The top row of the image is the last pick, the left column the first end. A black-and-white image
-is a drawdown as weavers draw it: black is warp on top, white is weft. An image of more colours is
-the cloth seen from above, one colour a thread: which colours are warp follows from the rule that
-a column has one warp colour and a row one weft colour, or is told.
+is a drawdown as weavers draw it: black means warp on top, white means weft. An image with more
+colours shows the cloth from above, and each thread has one colour. Which colours are warp is given
+by the caller, or follows from the rule that a column has one warp colour and a row one weft colour.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ T = TypeVar("T", bound=np.generic)
 MODES = ("auto", "black-white", "colors")
 
 WHITE, BLACK, GREY = 191, 64, 24
-"""White has all channels from 191, black up to 64, within 24 of each other: compressed images
-blur their edges, and a quarter of the range each way is blur."""
+"""White has every channel at 191 or above, black at 64 or below, all within 24 of each other:
+compression blurs the edges of an image, so a quarter of the range at each end is allowed for."""
 
 MOST_COLORS = 64
-"""More colours than this are a photograph, not threads."""
+"""Most colours of an image of threads; an image with more is a photograph."""
 
 
 @reads("a draft")
@@ -51,15 +51,15 @@ def read_image(
 ) -> Draft:
     """The draft in the image `path`, in any format that OpenImageIO reads.
 
-    mode : str - `black-white`, `colors`, or `auto`: black-white where every pixel is one of them
+    mode : str - `black-white`, `colors`, or `auto`: black-white if every pixel is black or white
         and no colours are given
-    invert : bool - white is warp on top; in colours, warp is looked for among the lightest
-    warp_colors, weft_colors : linear colours of the threads of each set, where the image alone
-        does not tell; one of the two is enough
+    invert : bool - white means warp on top; in colours, prefer the lightest as warp
+    warp_colors, weft_colors : linear colours of the threads of each set, for an image that does not
+        determine them; one of the two is enough
 
-    Transparent pixels are white. Raises FabricError for what is not an image of 1 to `LIMIT`
-    pixels a side and at most `image_file.MOST_PIXELS` altogether, and for the first pixel that
-    cannot be told to be warp or weft.
+    Transparent pixels are white. Raises FabricError for a file that is not an image of 1 to `LIMIT`
+    pixels a side and at most `image.file.MOST_PIXELS` altogether, and for the first pixel that
+    can be neither warp nor weft.
     """
     if mode not in MODES:
         raise FabricError("mode", f"is '{mode}'; it must be one of {', '.join(MODES)}")
@@ -115,7 +115,7 @@ def _cells(warp_on_top: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _marked(image: CodeImage) -> NDArray[np.bool_]:
-    """(2^24,) bool: which colours there are. A table is ten times as fast as sorting them."""
+    """(2^24,) bool: which colours occur. A table is ten times as fast as sorting the pixels."""
     seen = np.zeros(1 << 24, np.bool_)
     for codes in image.bands():
         for row in codes:
@@ -124,7 +124,7 @@ def _marked(image: CodeImage) -> NDArray[np.bool_]:
 
 
 def _looked_up(image: CodeImage, found: NDArray[np.intp], values: NDArray[T]) -> NDArray[T]:
-    """`values[k]` at each pixel of the colour `found[k]`, (h, w)."""
+    """(h, w) - `values[k]` at each pixel that has the colour `found[k]`."""
     table = np.zeros(1 << 24, values.dtype)
     table[found] = values
     result = np.empty(image.shape, values.dtype)
@@ -138,7 +138,7 @@ def _looked_up(image: CodeImage, found: NDArray[np.intp], values: NDArray[T]) ->
 
 
 def _indices(wanted: Sequence[RGB], colors: NDArray[np.uint8], label: str) -> list[int]:
-    """Where the linear colours `wanted` stand in `colors`."""
+    """Indices of the linear colours `wanted` in `colors`."""
     indices = []
     for code in codes_from_palette(wanted):
         match = np.flatnonzero((colors == code).all(axis=1))

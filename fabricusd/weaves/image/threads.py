@@ -1,4 +1,4 @@
-"""Which threads an image of a cloth shows: the colour of each column and of each row."""
+"""The threads in an image of a cloth: a warp colour per column, a weft colour per row."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from fabricusd.weaves.color import describe_code
 
 
 class Threads(NamedTuple):
-    """What an image shows: palette indices, and where the warp is on top.
+    """The threads of an image: palette indices, and where the warp is on top.
 
     warp_on_top : (h, w) bool
-    columns : (w,) int - colour of the warp thread of each column
-    rows : (h,) int - colour of the weft thread of each row, top first
-    warnings : what was assumed
+    columns : (w,) int - colour of the warp thread in each column
+    rows : (h,) int - colour of the weft thread in each row, top first
+    warnings : what had to be assumed
     """
 
     warp_on_top: NDArray[np.bool_]
@@ -35,15 +35,15 @@ def find_threads(
     weft: Sequence[int] = (),
     lightest_first: bool = False,
 ) -> Threads:
-    """The threads of an image of colour numbers `index` (h, w) into `colors` (k, 3).
+    """The threads of an image, given as indices `index` (h, w) into `colors` (k, 3).
 
-    `index` is used up.
+    `index` is overwritten.
 
-    Each colour belongs to the warp or to the weft: those in `warp` and `weft`, all others of the
-    other set where only one is given, and without any as the image demands; what it leaves open
-    is decided for the darkest colour, as warp, as in a black-and-white draft.
-    Raises FabricError, naming a pixel, where a column would have two warp colours, a row two weft
-    colours, or a colour both meanings.
+    Each colour belongs to the warp or to the weft. If `warp` or `weft` is given, it says which; if
+    only one of them is, all other colours belong to the other set. If neither is, the image
+    decides, and where it leaves a choice, the darkest colour is warp, as in a black-and-white
+    draft. Raises FabricError, naming a pixel, if a column would have two warp colours, a row two
+    weft colours, or if a colour would belong to both sets.
     """
     shown_in_column = np.zeros((index.shape[1], len(colors)), np.bool_)
     shown_in_row = np.zeros((index.shape[0], len(colors)), np.bool_)
@@ -60,7 +60,7 @@ def find_threads(
         )
     columns = _threads(where, index, colors, shown_in_column & is_warp, "column", warnings)
     rows = _threads(where, index, colors, shown_in_row & ~is_warp, "row", warnings)
-    for line in index:  # in its place: a second picture of this size would be the most there is
+    for line in index:  # in place: a second array of this size would be the peak of memory use
         line[:] = is_warp[line]
     return Threads(index.view(np.bool_), columns, rows, tuple(warnings))
 
@@ -98,7 +98,8 @@ def _inferred(
     lightest_first: bool,
     warnings: list[str],
 ) -> NDArray[np.bool_]:
-    """(k,) bool: of two colours in a column at least one is weft, of two in a row one is warp."""
+    """(k,) bool, True for warp: of two colours in a column at least one is weft, and of two in a
+    row at least one is warp."""
     share_column = shown_in_column.T.astype(int) @ shown_in_column > 0
     share_row = shown_in_row.T.astype(int) @ shown_in_row > 0
     np.fill_diagonal(share_column, False)
@@ -111,8 +112,8 @@ def _inferred(
     for color in order.tolist():
         if color in known:
             continue
-        # Every constraint is between two colours, so a choice that meets no contradiction can
-        # stand whatever is chosen for the colours it does not reach.
+        # Every constraint is between two colours, so a choice that leads to no contradiction can
+        # be kept, whatever is chosen for the colours that it does not reach.
         as_warp = _followed(known, color, True, share_column, share_row)
         as_weft = _followed(known, color, False, share_column, share_row)
         chosen = as_warp if as_warp is not None else as_weft
@@ -120,14 +121,16 @@ def _inferred(
             x, y, code = _first(index, np.arange(len(colors)) == color, colors)
             raise FabricError(
                 f"{where} pixel ({x}, {y})",
-                f"is {code}, which lies among the others as warp and as weft; its set must be "
-                "told by the colours of the warp or of the weft",
+                f"is {code}, which can be neither warp nor weft throughout the image; give the "
+                "colours of the warp or of the weft",
             )
         if as_warp is not None and as_weft is not None:
             free.append(describe_code(colors[color]))
         known = chosen
     if free:
-        warnings.append(f"The image leaves open which set {', '.join(free)} is; taken as warp.")
+        warnings.append(
+            f"The image does not say whether {', '.join(free)} is warp or weft; taken as warp."
+        )
     return np.array([known[k] for k in range(len(colors))])
 
 
@@ -138,7 +141,7 @@ def _followed(
     share_column: NDArray[np.bool_],
     share_row: NDArray[np.bool_],
 ) -> dict[int, bool] | None:
-    """`known` with `color` decided and all that follows from it, None where that contradicts."""
+    """`known`, with `color` decided and all that follows from that; None for a contradiction."""
     known = dict(known)
     todo = [(color, warp)]
     while todo:
@@ -161,7 +164,7 @@ def _threads(
     line: str,
     warnings: list[str],
 ) -> NDArray[np.intp]:
-    """(lines,) int: the one colour of its set that each line shows; the commonest where none."""
+    """(lines,) int: the one colour of its set in each line; the commonest if a line has none."""
     counts = shown.sum(axis=1)
     label = "warp" if line == "column" else "weft"
     if not counts.any():
@@ -183,8 +186,8 @@ def _threads(
     hidden = int((counts == 0).sum())
     if hidden:
         warnings.append(
-            f"{hidden} {line}(s) show no {label}; its colour there is taken to be "
-            f"{describe_code(colors[usual])}."
+            f"{hidden} {line}(s) show no {label}; the {label} is taken to be "
+            f"{describe_code(colors[usual])} there."
         )
     return np.where(counts > 0, np.argmax(shown, axis=1), usual)
 
@@ -192,6 +195,6 @@ def _threads(
 def _first(
     index: NDArray[np.uint8], wanted: NDArray[np.bool_], colors: NDArray[np.uint8]
 ) -> tuple[int, int, str]:
-    """(x, y, colour in words) of the first pixel of a wanted colour."""
+    """(x, y, colour as #rrggbb) of the first pixel that has a wanted colour."""
     y, x = np.unravel_index(int(np.argmax(wanted[index])), index.shape)
     return int(x), int(y), describe_code(colors[index[y, x]])

@@ -1,7 +1,7 @@
-"""The readers of drafts, one file each: what suffix a file has says which of them reads it.
+"""The readers of drafts, one module each; the suffix of a file decides which of them reads it.
 
-To add one: a module here with a `READER`, and its line in `READERS`. Only the module of the reader
-that is asked for is imported.
+To add one, write a module here with a `READER`, and add a line to `READERS`. A module is imported
+only when its reader is needed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 READERS = {
     # module: suffixes
-    "wif": (".wif", ".dtx", ".wpo", ".twa"),  # its reader calls the last three by their names
+    "wif": (".wif", ".dtx", ".wpo", ".twa"),  # the last three are refused by what they are
     "image": (
         ".png", ".tif", ".tiff", ".bmp", ".gif", ".jpg", ".jpeg", ".exr", ".tga", ".webp",
     ),
@@ -29,10 +29,10 @@ Colors = list[tuple[float, float, float]]
 
 @dataclass(frozen=True, kw_only=True)
 class DraftOptions:
-    """What may be said of a draft besides its file. A reader refuses what it cannot heed.
+    """Options for reading a draft. A reader refuses an option that it cannot follow.
 
-    warp, weft : linear colours of ends and picks in order, [] for those of the file
-    invert : of a drawdown, white is warp on top
+    warp, weft : linear colours of ends and picks in order; [] for the colours of the file
+    invert : in a drawdown, white means warp on top
     """
 
     warp: Colors
@@ -42,10 +42,10 @@ class DraftOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class DraftReader:
-    """One kind of draft.
+    """A reader for one kind of draft.
 
-    help : what the command line says of such a file
-    read : (file, options) -> Draft; FabricError where the file is none
+    help : the command line's description of such a file
+    read : (file, options) -> Draft; raises FabricError if the file is not such a draft
     """
 
     help: str
@@ -53,20 +53,20 @@ class DraftReader:
 
 
 def reader_name(path: str | os.PathLike[str]) -> str:
-    """The name of the reader for a file, "" where its suffix is that of no draft."""
+    """The name of the reader for a file; "" if no reader has its suffix."""
     suffix = Path(path).suffix.lower()
     return next((name for name, suffixes in READERS.items() if suffix in suffixes), "")
 
 
 def suffixes() -> tuple[str, ...]:
-    """The suffixes of all drafts that are read."""
+    """The suffixes of all drafts that can be read."""
     return tuple(suffix for known in READERS.values() for suffix in known)
 
 
 def read_draft(
     path: str | os.PathLike[str], options: DraftOptions | None = None, reader: str = ""
 ) -> Draft:
-    """The draft in a file, read by its suffix, or by the reader that is named."""
+    """The draft in a file, read by the named reader, or else by the one that has its suffix."""
     name = reader or reader_name(path)
     chosen: DraftReader = import_module(f"{__name__}.{name}").READER
     return chosen.read(os.fspath(path), options or DraftOptions(warp=[], weft=[]))

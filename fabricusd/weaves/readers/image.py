@@ -9,7 +9,7 @@ from fabricusd.weaves.readers import DraftOptions, DraftReader
 
 
 def _read(path: str, options: DraftOptions) -> Draft:
-    """Colours given with an image of colours say which of them are whose; else they recolour it."""
+    """Given colours tell the warp of a coloured image from its weft; a drawdown, they colour."""
     told = bool(options.warp or options.weft)
     try:
         draft = read_image(path, invert=options.invert)

@@ -10,7 +10,7 @@ from fabricusd.weaves.wif.read import read_wif
 
 def _read(path: str, options: DraftOptions) -> Draft:
     if options.invert:
-        raise FabricError("--invert", "goes with images only")
+        raise FabricError("--invert", "can only be used with an image")
     draft = read_wif(path)
     return with_colors(draft, options.warp, options.weft) if options.warp or options.weft else draft
 

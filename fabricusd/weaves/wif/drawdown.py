@@ -1,7 +1,7 @@
-"""The drawdown of a WIF draft: from threading with tie-up and treadling, or with a lift plan.
+"""The drawdown of a WIF draft, from threading and either tie-up and treadling or a lift plan.
 
-Which shafts a pick raises is kept as bits, shaft 0 being none: a jacquard has as many of them as
-crossings.
+The shafts that a pick raises are stored as bits, of which bit 0 stands for no shaft: a jacquard has
+as many bits as crossings.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Group = NDArray[np.int32]
 _NONE = np.zeros(0, np.int32)
 
 _BLOCK = 1024
-"""Columns turned into rows at once: 16 MB of them for the largest draft."""
+"""Columns that are turned into rows at once; for the largest draft they take 16 MB."""
 
 
 def drawdown(wif: Wif, ends: int, picks: int) -> NDArray[np.bool_]:
@@ -34,7 +34,8 @@ def drawdown(wif: Wif, ends: int, picks: int) -> NDArray[np.bool_]:
     wif.warn_of_beyond("THREADING", ends, "end")
     if not any(map(len, threading)):
         raise FabricError(
-            wif.section("THREADING").where(), "names no shaft; it must give each end at least one"
+            wif.section("THREADING").where(),
+            "does not name any shaft; it must give each end at least one",
         )
     shafts = _largest(threading)
     raised = _raised(wif, picks, shafts, largest, hint)
@@ -48,10 +49,10 @@ def drawdown(wif: Wif, ends: int, picks: int) -> NDArray[np.bool_]:
 
 
 def _raised(wif: Wif, picks: int, shafts: int, largest: int, hint: str) -> Bits:
-    """(picks, bytes) bits of the shafts 0 to `shafts` that each pick moves.
+    """(picks, bytes) bits of the shafts, from 0 to `shafts`, that each pick moves.
 
-    From tie-up and treadling, which record the loom, and else from the lift plan: many programs
-    write both.
+    They come from tie-up and treadling, which record the loom, and if those are missing from the
+    lift plan: many programs write both.
     """
     tie_up, treadling, plan = (wif.section(n) for n in ("TIEUP", "TREADLING", "LIFTPLAN"))
     planned = any(True for _ in plan.numbers(1, picks))
@@ -69,10 +70,10 @@ def _raised(wif: Wif, picks: int, shafts: int, largest: int, hint: str) -> Bits:
         try:
             same = np.array_equal(_lifted(plan, picks, shafts, largest, hint), moved)
         except FabricError as error:
-            wif.warn(f"[LIFTPLAN] is not used, since there are a tie-up and a treadling: {error}.")
+            wif.warn(f"[LIFTPLAN] is not used, since there is a tie-up with a treadling: {error}.")
         else:
             if not same:
-                wif.warn("[LIFTPLAN] differs from [TIEUP] and [TREADLING], which are used.")
+                wif.warn("[LIFTPLAN] differs from [TIEUP] and [TREADLING]; those two are used.")
     return moved
 
 
@@ -99,7 +100,7 @@ def _moved(wif: Wif, picks: int, shafts: int, largest: int, hint: str) -> Bits:
             if number < len(ties):
                 ties[number] = _bits(group, shafts)
     if wrong:
-        wif.warn(f"No pick uses {len(wrong)} treadle(s) that are wrong: {wrong[0]}.")
+        wif.warn(f"{len(wrong)} treadle(s) are wrong, but no pick uses them: {wrong[0]}.")
     return _union(ties, pressed)
 
 
@@ -112,13 +113,13 @@ def _lifted(plan: Section, picks: int, shafts: int, largest: int, hint: str) -> 
 
 
 def _stated(wif: Wif, key: str) -> tuple[int, str]:
-    """How many shafts or treadles there are at most, and who says so."""
+    """The largest number of a shaft or treadle, and words for where that limit is stated."""
     stated = wif.section("WEAVING").integer(key, 0, LIMIT)
     return (stated, f", [WEAVING] {key}") if stated else (LIMIT, "")
 
 
 def _groups(section: Section, count: int, largest: int, hint: str) -> list[Group]:
-    """What the lines 1 to `count` of `section` list; nothing where there is no line."""
+    """The numbers listed in lines 1 to `count` of `section`; none for a line that is missing."""
     groups = [_NONE] * count
     for number in section.numbers(1, count):
         groups[number - 1] = section.list(number, largest, hint)
@@ -130,19 +131,19 @@ def _largest(groups: Sequence[Group]) -> int:
 
 
 def _bytes(shafts: int) -> int:
-    """Bytes of the bits 0 to `shafts`."""
+    """Bytes that hold the bits 0 to `shafts`."""
     return shafts // 8 + 1
 
 
 def _bits(items: Group, shafts: int) -> Bits:
-    """(bytes,) bits of the numbers up to `shafts` in `items`."""
+    """(bytes,) bits that are set for the numbers in `items` up to `shafts`."""
     row = np.zeros(shafts + 1, np.bool_)
     row[items[items <= shafts]] = True
     return np.packbits(row)
 
 
 def _union(bits: Bits, groups: Sequence[Group]) -> Bits:
-    """(len(groups), w) uint8: the rows of `bits` (k, w) that each group names, or-ed together."""
+    """(len(groups), w) uint8: for each group, the bitwise or of the rows of `bits` it names."""
     union = np.zeros((len(groups), bits.shape[1]), np.uint8)
     for row, items in zip(union, groups, strict=True):
         if len(items) == 1:
@@ -153,7 +154,7 @@ def _union(bits: Bits, groups: Sequence[Group]) -> Bits:
 
 
 def _turned(bits: Bits, columns: int) -> Bits:
-    """(columns, bytes) bits, from rows of at least that many: rows become columns."""
+    """(columns, bytes) bits, transposed from rows of at least `columns` bits."""
     turned = np.zeros((columns, (len(bits) + 7) // 8), np.uint8)
     for start in range(0, columns, _BLOCK):
         end = min(start + _BLOCK, columns)

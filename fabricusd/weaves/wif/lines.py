@@ -1,7 +1,7 @@
-"""The lines of a WIF file, sorted into its sections within bounds that are known beforehand.
+"""The lines of a WIF file, sorted into sections within fixed bounds.
 
-What nothing reads is not kept: private sections, unknown keys, keys of no thread. So the memory
-that a file takes is bounded by what a draft can hold, whatever the file holds beside it.
+Nothing is stored that is never read: private sections, unknown keys, numbers beyond any thread. The
+memory for a file is therefore bounded by what a draft can hold, whatever else the file holds.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ LARGEST = 256 * 1024 * 1024
 """Most bytes of a file: six times a lift plan of 4096 x 4096."""
 
 MOST_LINES = 1_000_000
-"""Most lines of a file: three times what the sections of the largest draft can hold."""
+"""Most lines of a file: three times as many as the sections of the largest draft can have."""
 
 LONGEST = 1_000_000
 """Most characters in a line: ten times the line of a lift plan that raises 16384 shafts."""
 
 MOST_NOTES = 1_000_000
-"""Most characters of [NOTES]; the rest is left out, with a warning."""
+"""Most characters of [NOTES]; the rest is left out with a warning."""
 
 KEYS = {
     "WIF": (),
@@ -53,7 +53,7 @@ NUMBERED = {
     "WEFT THICKNESS": LIMIT,
     "NOTES": MOST_LINES,
 }
-"""Section whose keys are whole numbers -> the largest that can mean anything."""
+"""Section whose keys are whole numbers -> the largest number that has a meaning."""
 
 NOT_READ = (
     "CONTENTS", "TRANSLATIONS", "BITMAP IMAGE", "BITMAP FILE",
@@ -63,18 +63,19 @@ NOT_READ = (
         for name in ("SYMBOL PALETTE", "SYMBOL TABLE", "SYMBOLS", "SPACING ZOOM", "THICKNESS ZOOM")
     ),
 )  # fmt: skip
-"""Sections of WIF that say nothing of the cloth. All others are private, or unknown."""
+"""Sections of WIF that say nothing about the cloth. All others are private or unknown."""
 
 BLANK = "\0\ufeff" + "".join(c for c in map(chr, range(0x3001)) if c.isspace())
-"""What may stand around sections, keys and values without meaning anything."""
+"""Characters without meaning around sections, keys and values."""
 
 
 def file_lines(path: str | os.PathLike[str]) -> Iterator[str]:
-    """The lines of the file `path`, decoded, whichever of the three line ends it has.
+    """The decoded lines of the file `path`, with any of the three kinds of line end.
 
-    UTF-8, -16 and -32 by their byte order marks, UTF-16 without one by its zeros, else UTF-8, and
-    where that cannot be Windows code page 1252. Raises FabricError for a file of more than
-    `LARGEST` bytes, before it is read, and for what is known to be something else than WIF.
+    UTF-8, -16 and -32 are recognised by their byte order marks, UTF-16 without a mark by its zeros.
+    Other files are UTF-8, or, if they are not valid UTF-8, Windows code page 1252. Raises
+    FabricError for a file of more than `LARGEST` bytes, before it is read, and for a file that is
+    known not to be WIF.
     """
     source = readable_file(path)
     size = source.stat().st_size
@@ -88,13 +89,13 @@ def file_lines(path: str | os.PathLike[str]) -> Iterator[str]:
         stream.seek(0)
         encoding = _encoding(head) or _utf_8_or_windows(stream)
         stream.seek(0)
-        # Windows leaves five bytes without a meaning; they can only stand in a title or in notes.
+        # Five bytes are undefined in code page 1252; they can only occur in a title or in notes.
         with io.TextIOWrapper(stream, encoding, errors="replace", newline=None) as text:
             yield from _bounded(text, str(path))
 
 
 def text_lines(text: str, file: str) -> Iterator[str]:
-    """The lines of `text`, whichever of the three line ends it has."""
+    """The lines of `text`, with any of the three kinds of line end."""
     return _bounded(io.StringIO(text, newline=None), file)
 
 
@@ -105,15 +106,18 @@ def _bounded(text: io.TextIOBase, file: str) -> Iterator[str]:
             return
         if len(line) > LONGEST and not line.endswith("\n"):
             raise FabricError(
-                f"{file} line {number}", f"is longer than the {LONGEST} characters of a WIF draft's"
+                f"{file} line {number}",
+                f"is too long for a WIF draft; it must have at most {LONGEST} characters",
             )
         yield line
-    raise FabricError(file, f"has more lines than the {MOST_LINES} of the largest WIF draft")
+    raise FabricError(
+        file, f"has too many lines for a WIF draft; it must have at most {MOST_LINES}"
+    )
 
 
 def _encoding(head: bytes) -> str:
-    """The encoding that the first bytes give away, or nothing."""
-    # A UTF-32 mark begins with that of UTF-16.
+    """The encoding that the first bytes reveal, or "" if they do not."""
+    # UTF-32 first: its byte order mark begins with that of UTF-16.
     if head.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
         return "utf-32"
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -136,11 +140,11 @@ def _utf_8_or_windows(stream: io.BufferedReader) -> str:
 
 
 def read_sections(lines: Iterable[str], file: str) -> Wif:
-    """The sections of a draft, each as far as it is read. A section that comes twice is one.
+    """The sections of a draft, as far as they are read. Sections of the same name are merged.
 
-    Threads and shafts are judged where their section ends, so that a draft that has too many is
-    refused before its lines are. What nothing uses is counted and becomes warnings. Raises
-    FabricError where there is no section `[WIF]`, which every WIF file has.
+    The numbers of threads and shafts are checked at the end of their section, so that a draft with
+    too many is refused before its lines are read. Lines that nothing uses are counted and become
+    warnings. Raises FabricError if there is no section `[WIF]`, which every WIF file has.
     """
     sorter = _Sorter(file)
     for line in lines:
@@ -149,7 +153,7 @@ def read_sections(lines: Iterable[str], file: str) -> Wif:
 
 
 class _Sorter:
-    """Sorts lines into sections, and counts those that belong nowhere."""
+    """Sorts lines into sections, and counts the lines that belong nowhere."""
 
     def __init__(self, file: str) -> None:
         self.wif = Wif(file)
@@ -161,7 +165,7 @@ class _Sorter:
         self.unknown = Unused()
 
     def add(self, line: str) -> None:
-        """Sort one line, without the blanks around it."""
+        """Sort one line, stripped of the blanks around it."""
         if not line or line[0] in ";#":
             return
         if line[0] == "[" and "]" in line:
@@ -201,8 +205,8 @@ class _Sorter:
                 section.numbered[number] = value
         else:
             value = value.partition(";")[0].strip(BLANK)
-            # No number has other characters, so only the message needs what stands there; and a
-            # string that has them takes four times the memory.
+            # A value that is not ASCII is not a number, and only a message will quote it. Cut it:
+            # such a string can take four times the memory.
             section.numbered[number] = value if value.isascii() else value[:60]
 
     def _judge(self) -> None:
@@ -219,12 +223,12 @@ class _Sorter:
         wif = self.wif
         if "WIF" not in wif.sections:
             raise FabricError(
-                wif.file, "has no section [WIF]; it must be a WIF file, which has one"
+                wif.file, "has no section [WIF]; it must be a WIF draft, and all of those have one"
             )
         for unused, what in (
             (self.early, "line(s) before the first section are"),
-            (self.without_value, "line(s) are no KEY=VALUE and are"),
-            (self.unknown, "section(s) are not of WIF and are"),
+            (self.without_value, "line(s) are not KEY=VALUE and are"),
+            (self.unknown, "section(s) are not part of WIF and are"),
         ):
             if unused.count:
                 wif.warn(f"{unused.count} {what} not used, such as {quoted(unused.first, 40)}.")

@@ -1,8 +1,8 @@
 """Reading WIF 1.1 drafts. [WIF1.1]
 
-Shaft, treadle and thread numbers count from 1 in the file; end 1 is our end 0 at the left, pick 1
-our pick 0 at the bottom. A line that nothing uses is a warning, whatever it holds; one that is
-used must be right.
+Shafts, treadles and threads are counted from 1 in the file. End 1 is our end 0, at the left; pick 1
+is our pick 0, at the bottom. A line that nothing uses causes a warning, whatever it holds; a line
+that is used must be right.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from fabricusd.weaves.wif.threads import color_table, colors, lengths
 def read_wif(path: str | os.PathLike[str]) -> Draft:
     """The draft in the WIF file `path`.
 
-    A draft without a title is called by its file's stem. `warnings` says what was missing, assumed
-    or not used. Raises FabricError, one line naming file, section and key, for what is wrong, and
-    for a file above the bounds of `wif_lines`.
+    A draft without a title takes the stem of the file's name. `warnings` says what was missing,
+    assumed or not used. Raises FabricError, naming file, section and key, for a mistake in a line
+    that is used, and for a file beyond the bounds of `wif.lines`.
     """
     return _draft(file_lines(path), str(path))
 
@@ -49,7 +49,7 @@ def _draft(lines: Iterable[str], file: str) -> Draft:
     picks = _count(wif, "WEFT", ("TREADLING", "LIFTPLAN", "WEFT COLORS"))
     cells = drawdown(wif, ends, picks)
     about = wif.section("TEXT")
-    # Blanks of other kinds would not survive being written.
+    # Other kinds of blanks would be lost in writing.
     title = " ".join(about.text("title").split()) or Path(file).stem
     table = color_table(wif)
     fields: dict[str, Any] = {}
@@ -75,7 +75,7 @@ def _draft(lines: Iterable[str], file: str) -> Draft:
 
 
 def _count(wif: Wif, name: str, lists: Iterable[str]) -> int:
-    """Threads of the set `name`: as it says, else the largest that one of `lists` mentions."""
+    """Threads of the set `name`: the number it states, else the largest that `lists` mention."""
     section = wif.section(name)
     stated = section.integer("Threads", 1, LIMIT)
     if stated is not None:
@@ -85,12 +85,15 @@ def _count(wif: Wif, name: str, lists: Iterable[str]) -> int:
         raise FabricError(
             section.where("Threads"), f"is missing; it must be a whole number from 1 to {LIMIT}"
         )
-    wif.warn(f"[{name}] does not say how many Threads it has; {largest} are mentioned.")
+    wif.warn(
+        f"[{name}] does not say how many Threads it has; {largest}, the most that other sections "
+        "mention, are assumed."
+    )
     return largest
 
 
 def _notes(wif: Wif) -> str:
-    """The lines of [NOTES] in the order of their numbers."""
-    wif.warn_of_beyond("NOTES", MOST_LINES, "line", first=0)
+    """The lines of [NOTES], in order of their numbers."""
+    wif.warn_of_beyond("NOTES", MOST_LINES, "note", first=0)
     notes = wif.section("NOTES").numbered
     return "\n".join(notes[number] for number in sorted(notes)).strip()

@@ -1,8 +1,8 @@
-"""What a WIF file says: its sections, and the values in them. [WIF1.1]
+"""The syntax of a WIF file: its sections, and the values in them. [WIF1.1]
 
-What is read here is what files hold and not only what the specification asks for: sections and
-keys in any case, blanks anywhere, comments after numbers, keys that come twice (the last one
-counts), keys of no thread.
+This accepts what real files hold, which is more than the specification allows: sections and keys in
+upper or lower case, blanks anywhere, comments after numbers, repeated keys (the last one counts),
+and keys beyond any thread.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ UNITS = {
     "inches": Decimal("0.0254"),
     "centimeters": Decimal("0.01"),
 }
-"""WIF's units of length [m]; a decipoint is a tenth of a point of 1/72 inch."""
+"""WIF's units of length [m]; a decipoint is a tenth of a point, which is 1/72 inch."""
 
 UNIT_ALIASES = {
     "decipoint": "decipoints",
@@ -43,14 +43,14 @@ LARGEST_CODE = 65535
 """Largest display code of a colour: 16 bits."""
 
 USUAL_RANGES = (255, 999, LARGEST_CODE)
-"""Largest display codes that programs write, tried in turn where the file does not say."""
+"""Largest display codes that programs use, tried in turn if the file does not state a range."""
 
 _DIGITS = str.maketrans("", "", "0123456789,")
 
 
 @dataclass
 class Unused:
-    """Things that nothing uses: how many, and the first of them."""
+    """Count of the things that nothing uses, and the first of them."""
 
     count: int = 0
     first: str = ""
@@ -62,9 +62,9 @@ class Unused:
 
 
 class Section:
-    """One section: `values` by key in lower case, `numbered` by keys that are whole numbers.
+    """One section: `values`, by key in lower case, and `numbered`, by keys that are whole numbers.
 
-    `where(key)` names a line of it in a message.
+    `where(key)` names one of its lines in a message.
     """
 
     def __init__(self, file: str, name: str) -> None:
@@ -79,17 +79,17 @@ class Section:
         return f"{self.file} [{self.name}] {key}".strip()
 
     def text(self, key: str | int) -> str:
-        """A string value; a semicolon is part of it. Empty where there is none."""
+        """A string value, of which a semicolon is part; empty if the key is missing."""
         if isinstance(key, int):
             return self.numbered.get(key, "")
         return self.values.get(key.lower(), "")
 
     def value(self, key: str | int) -> str:
-        """A value that is not a string, without the comment after it."""
+        """A value other than a string, without the comment after it."""
         return self.text(key).partition(";")[0].strip()
 
     def boolean(self, key: str) -> bool | None:
-        """True, False, or None where there is no value."""
+        """True, False, or None if there is no value."""
         word = self.value(key).lower()
         if not word:
             return None
@@ -101,7 +101,7 @@ class Section:
         return word in TRUE
 
     def integer(self, key: str, low: int, high: int) -> int | None:
-        """A whole number from `low` to `high`, or None where there is no value."""
+        """A whole number from `low` to `high`, or None if there is no value."""
         word = self.value(key)
         if not word:
             return None
@@ -113,11 +113,11 @@ class Section:
         return int(word)
 
     def length(self, key: str | int, unit: Decimal) -> float | None:
-        """A length [m] written in `unit`; 0 is allowed, None where there is no value."""
+        """A length [m] that is written in `unit`; it may be 0. None if there is no value."""
         word = self.value(key)
         if not word:
             return None
-        # Some programs write the decimal comma of their country.
+        # Some programs write a decimal comma.
         number = word.replace(",", ".") if word.count(",") == 1 and "." not in word else word
         try:
             written = Decimal(number)
@@ -125,8 +125,8 @@ class Section:
             written = Decimal("nan")
         if written == 0:
             return 0.0
-        # In decimals, so that 0.0185 cm is the float nearest to 0.000185 m and can be written
-        # back as what it was.
+        # Convert in decimals, so that 0.0185 cm becomes the float nearest to 0.000185 m and is
+        # written back unchanged.
         low, high = Decimal(str(SMALLEST_LENGTH)) / unit, Decimal(str(LARGEST_LENGTH)) / unit
         if not written.is_finite() or not low <= written <= high:
             raise FabricError(
@@ -137,11 +137,11 @@ class Section:
         return min(max(float(written * unit), SMALLEST_LENGTH), LARGEST_LENGTH)
 
     def numbers(self, low: int, high: int) -> Iterator[int]:
-        """The keys from `low` to `high` that there are, in the file's order."""
+        """The keys from `low` to `high` that are present, in the order of the file."""
         return (number for number in self.numbered if low <= number <= high)
 
     def beyond(self, low: int, high: int) -> Unused:
-        """The keys that are no whole numbers from `low` to `high`."""
+        """The keys that are not whole numbers from `low` to `high`."""
         found = Unused(self.strays.count, self.strays.first)
         for number in self.numbered:
             if not low <= number <= high:
@@ -149,9 +149,9 @@ class Section:
         return found
 
     def list(self, number: int, largest: int, hint: str = "") -> NDArray[np.int32]:
-        """(k,) numbers of the line `number=n,n,n`; 0 and an empty value are no number.
+        """(k,) numbers of the line `number=n,n,n`; zeros and empty values are skipped.
 
-        Numbers must be at most `largest`; `hint` says why.
+        Numbers must be at most `largest`; `hint` says in a message where that limit comes from.
         """
         word = self.value(number).rstrip(", \t")
         if any(c in word for c in " \t"):
@@ -159,7 +159,7 @@ class Section:
         if word.translate(_DIGITS) or ",," in word or word.startswith(","):
             raise FabricError(
                 self.where(number),
-                f"is {quoted(word, 40)}; it must be whole numbers with commas between",
+                f"is {quoted(word, 40)}; it must be whole numbers, separated by commas",
             )
         items = np.fromstring(word, np.int64, sep=",") if word else np.zeros(0, np.int64)
         items = items[items != 0]
@@ -172,7 +172,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Wif:
-    """A file's sections by their names in upper case, and what was noticed while reading them."""
+    """The sections of a file, by their names in upper case, and the warnings from reading them."""
 
     file: str
     sections: dict[str, Section] = field(default_factory=dict)
@@ -187,10 +187,10 @@ class Wif:
         self.warnings.append(text)
 
     def warn_of_beyond(self, name: str, count: int, noun: str, first: int = 1) -> None:
-        """Warn of the lines of section `name` that belong to none of its `count` things."""
+        """Warn about the lines of section `name` that belong to none of its `count` things."""
         unused = self.section(name).beyond(first, count)
         if unused.count:
             self.warn(
-                f"[{name}] has {unused.count} line(s) of no {noun} from {first} to {count}, such "
+                f"[{name}] has {unused.count} line(s) for {noun}s outside {first} to {count}, such "
                 f"as {quoted(unused.first, 40)}; they are not used."
             )

@@ -1,4 +1,4 @@
-"""Colours, spacing and thickness of the threads of a WIF draft."""
+"""Colour, spacing and thickness of the threads in a WIF draft."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from fabricusd.weaves.wif.syntax import (
 
 @dataclass(frozen=True, kw_only=True)
 class ColorTable:
-    """The colours of a draft that are right, and what is wrong with the others.
+    """The valid colours of a draft, and the errors of the others.
 
     indices : number in the file -> index into `codes`
     codes : (n, 3) int64 display codes
-    range : (low, high) - what codes are from and to
-    wrong : number in the file -> the error that using it is
+    range : (low, high) - smallest and largest display code
+    wrong : number in the file -> the error to raise if a thread uses it
     """
 
     indices: dict[int, int]
@@ -37,7 +37,7 @@ class ColorTable:
     wrong: dict[int, FabricError] = field(default_factory=dict)
 
     def index(self, section: Section, key: str | int) -> int | None:
-        """A palette index from `3`, or from WIF 1.0's `3,255,0,0`; None where there is no value."""
+        """A palette index from `3`, or from WIF 1.0's `3,255,0,0`; None if there is no value."""
         word = section.value(key).partition(",")[0].strip()
         if not word:
             return None
@@ -47,20 +47,20 @@ class ColorTable:
         if number not in self.indices:
             raise FabricError(
                 section.where(key),
-                f"is {quoted(word, 40)}; it must be a number of [COLOR TABLE], which has "
-                f"{min(self.indices)} to {max(self.indices)}",
+                f"is {quoted(word, 40)}; it must be a colour of [COLOR TABLE], whose numbers are "
+                f"from {min(self.indices)} to {max(self.indices)}",
             )
         return self.indices[number]
 
     def warn_of_unused(self, wif: Wif) -> None:
-        """Say which colours are wrong; a thread that has one of them was refused before."""
+        """Warn about the wrong colours; if a thread used one, the draft was refused before."""
         if self.wrong:
             first = next(iter(self.wrong.values()))
-            wif.warn(f"No thread uses {len(self.wrong)} colour(s) that are wrong: {first}.")
+            wif.warn(f"{len(self.wrong)} colour(s) are wrong, but no thread uses them: {first}.")
 
 
 def color_table(wif: Wif) -> ColorTable | None:
-    """The colours of [COLOR TABLE]; None where there is none."""
+    """The colours of [COLOR TABLE]; None if there is no such section."""
     table = wif.section("COLOR TABLE")
     if not table.numbered:
         if table.strays.count:
@@ -107,7 +107,7 @@ def _color_range(wif: Wif, largest: int) -> tuple[int, int]:
     stated = palette.value("Range")
     if stated:
         parts = [part.strip() for part in stated.split(",")]
-        if len(parts) == 1:  # some programs write the largest alone
+        if len(parts) == 1:  # some programs write only the largest
             parts = ["0", *parts]
         usable = len(parts) == 2 and all(p.isascii() and p.isdigit() and len(p) < 10 for p in parts)
         if not usable or not int(parts[0]) < int(parts[1]) <= LARGEST_CODE:
@@ -118,12 +118,12 @@ def _color_range(wif: Wif, largest: int) -> tuple[int, int]:
             )
         return int(parts[0]), int(parts[1])
     high = next((high for high in USUAL_RANGES if largest <= high), LARGEST_CODE)
-    wif.warn(f"[COLOR PALETTE] has no Range; the colours are taken to be from 0 to {high}.")
+    wif.warn(f"[COLOR PALETTE] has no Range; 0 to {high} is assumed.")
     return 0, high
 
 
 def colors(wif: Wif, label: str, count: int, table: ColorTable | None) -> dict[str, Any]:
-    """`{label}_colors`: the set's default, then thread by thread."""
+    """`{label}_colors` of a Draft: each thread's own colour, else the default of the set."""
     if table is None:
         return {}
     name = f"{label.upper()} COLORS"
@@ -141,12 +141,12 @@ def colors(wif: Wif, label: str, count: int, table: ColorTable | None) -> dict[s
 
 
 def _default_color(wif: Wif, label: str, table: ColorTable, without: int) -> int | None:
-    """The colour of the `without` threads that have none of their own; None where there is none."""
+    """The colour for the `without` threads that have none of their own; None if there is none."""
     section = wif.section(label.upper())
     try:
         return table.index(section, "Color")
     except FabricError as error:
-        # 0 is no number wherever WIF numbers things, so it may say here that there is no default.
+        # WIF counts from 1, so 0 may mean here that there is no default.
         if without and section.value("Color").partition(",")[0].strip().strip("0"):
             raise
         wif.warn(f"{error}; it is not used.")
@@ -154,7 +154,7 @@ def _default_color(wif: Wif, label: str, table: ColorTable, without: int) -> int
 
 
 def lengths(wif: Wif, label: str, count: int, name: str) -> dict[str, Any]:
-    """The set's spacing or thickness, and those thread by thread where they differ [m]."""
+    """The spacing or thickness of the set, and of each thread if they differ [m]."""
     threads = wif.section(label.upper())
     each = wif.section(f"{label.upper()} {name.upper()}")
     if each.numbered or each.strays.count:
@@ -172,7 +172,7 @@ def lengths(wif: Wif, label: str, count: int, name: str) -> dict[str, Any]:
         return _set_length(wif, label, name, default)
     fill = default
     if fill is None:
-        # A thread without a number is as its neighbours are on the whole.
+        # A thread without a spacing takes the mean of the others.
         fill = float(np.mean(known)) if name == "spacing" else 0.0
     values = tuple(v if (v := given.get(k)) is not None else fill for k in range(1, count + 1))
     if len(set(values)) == 1:
@@ -184,7 +184,7 @@ def lengths(wif: Wif, label: str, count: int, name: str) -> dict[str, Any]:
 def _default_length(
     wif: Wif, threads: Section, name: str, unit: Decimal, without: int
 ) -> float | None:
-    """The length of the `without` threads that have none of their own [m]."""
+    """The length [m] for the `without` threads that have none of their own."""
     try:
         return threads.length(name.capitalize(), unit)
     except FabricError as error:
@@ -196,12 +196,12 @@ def _default_length(
 
 def _set_length(wif: Wif, label: str, name: str, value: float | None) -> dict[str, Any]:
     if value == 0 and name == "spacing":
-        wif.warn(f"The {label} spacing is 0, which would hide it all; it is not used.")
+        wif.warn(f"The {label} spacing is 0, which would hide every thread; it is not used.")
     return {f"{label}_{name}": value or None}
 
 
 def _unit(section: Section) -> Decimal | None:
-    """Metres in one unit of the set's lengths, None where the file does not say."""
+    """Metres per unit of the set's lengths; None if the file does not say."""
     word = section.value("Units").lower()
     if not word:
         return None

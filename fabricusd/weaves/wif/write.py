@@ -17,20 +17,20 @@ from fabricusd.weaves.loom import thread_loom
 from fabricusd.weaves.wif.syntax import USUAL_RANGES
 
 MOST_SHAFTS = 40
-"""Most shafts of a draft written as tie-up and treadling; jacquards become a lift plan."""
+"""Most shafts of a draft that is written as tie-up and treadling; a jacquard gets a lift plan."""
 
 SECTIONS = (
     "COLOR PALETTE", "TEXT", "WEAVING", "WARP", "WEFT", "NOTES", "TIEUP", "COLOR TABLE",
     "THREADING", "WARP THICKNESS", "WARP SPACING", "WARP COLORS", "TREADLING", "LIFTPLAN",
     "WEFT THICKNESS", "WEFT SPACING", "WEFT COLORS",
 )  # fmt: skip
-"""What may be written, in WIF's order."""
+"""The sections that may be written, in WIF's order."""
 
 
 def write_wif(draft: Draft, path: str | os.PathLike[str], *, clobber: bool = True) -> None:
-    """Write `draft` to the file `path`, which appears whole; `clobber` allows replacing it.
+    """Write `draft` to the file `path`, whole or not at all; `clobber` allows replacing it.
 
-    Raises FabricError where it cannot be written.
+    Raises FabricError if it cannot be written.
     """
     text = wif_text(draft)
     with whole_file(path, clobber=clobber) as temporary:
@@ -38,18 +38,18 @@ def write_wif(draft: Draft, path: str | os.PathLike[str], *, clobber: bool = Tru
 
 
 def wif_text(draft: Draft) -> str:
-    """The text of a WIF file, to be encoded as UTF-8, from which `parse_wif` reads `draft` again.
+    """The text of a WIF file, to be encoded as UTF-8, which `parse_wif` reads back as `draft`.
 
-    Colours are written in the draft's own range where that holds them, else in a usual one or
-    the nearest of 16 bits; lengths in centimetres, exactly. Colours that repeat with another
-    length than the weave are written out in full. Raises FabricError where that makes more than
-    `LIMIT` threads.
+    Colours are written exactly in the draft's own range or else in a usual one, if either can hold
+    them, and otherwise as the nearest 16-bit codes. Lengths are written in centimetres, exactly. If
+    colours and weave repeat after different lengths, both are written out in full. Raises
+    FabricError if that makes more than `LIMIT` threads.
     """
     ends, picks = _full(draft.warp), _full(draft.weft)
     cells = draft.weave.cells
     repeats = (ends // draft.weave.ends, picks // draft.weave.picks)
     loom = thread_loom(cells)
-    # Shafts of the repeat serve all copies of it, so the copies cost no cells.
+    # Copies of the repeat use the same shafts, so they add no cells.
     threading = np.tile(loom.threading, repeats[0])
     treadling = np.tile(loom.treadling, repeats[1])
     title = _line(draft.title or draft.weave.name)
@@ -100,7 +100,7 @@ def _full(side: Side) -> int:
 
 
 def _set(side: Side, count: int) -> dict[str, list[str]]:
-    """[WARP] or [WEFT] and the sections beside it."""
+    """[WARP] or [WEFT], and the sections that go with it."""
     name = side.label.upper()
     lines = [f"Threads={count}"]
     if side.spacing or side.thickness or side.spacings or side.thicknesses:
@@ -124,7 +124,7 @@ def _set(side: Side, count: int) -> dict[str, list[str]]:
 
 
 def _colors(draft: Draft) -> dict[str, list[str]]:
-    """The palette in the first range that holds it; colours that went through USD are float32."""
+    """The palette, in the first range that holds it to float32, which is what USD stores."""
     for low, high in (draft.color_range, *((0, high) for high in USUAL_RANGES)):
         codes = codes_from_palette(draft.palette, low, high)
         if np.allclose(palette_from_codes(codes, low, high), draft.palette, rtol=1e-6, atol=1e-9):
