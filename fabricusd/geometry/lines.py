@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.appearance.weave.coverage import sets
+from fabricusd.appearance.weave.coverage import coverage, sets
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.geometry.centre import RINGS, centre_line

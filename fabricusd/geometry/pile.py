@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.weave.bands import bands, seen_length
+from fabricusd.appearance.weave.bands import seen_length
 from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.appearance.weave.coverage import sets
+from fabricusd.appearance.weave.coverage import coverage, sets
 from fabricusd.appearance.weave.curve import Pieces, pieces
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric

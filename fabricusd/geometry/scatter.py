@@ -24,7 +24,7 @@ from fabricusd.appearance.scattering.columns import (
     VOLUME_WIDTH,
 )
 from fabricusd.appearance.scattering.model import CONSERVING
-from fabricusd.appearance.scattering.models.conserving import transmission
+from fabricusd.appearance.scattering.models.conserving import tabulated
 from fabricusd.appearance.scattering.terms import terms
 from fabricusd.geometry.mesh import SIDES
 from fabricusd.geometry.section import leave, offset_across, squeezed, tube_point
@@ -218,7 +218,8 @@ def _surface_share(row, cos_o):
     """With what probability a path takes the surface's light."""
     if row[LAW] != CONSERVING:
         return 0.5
-    reflected = 1.0 - transmission(np.float64, row, cos_o)
+    through, _ = tabulated(np.float64, row, cos_o)
+    reflected = 1.0 - through
     albedo = max(row[ALBEDO_R], row[ALBEDO_G], row[ALBEDO_B])
     whole = reflected + albedo * (1.0 - reflected)
     return min(0.95, max(0.05, reflected / max(whole, 1e-9)))

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.appearance.weave.coverage import GAP
+from fabricusd.appearance.weave.coverage import GAP, coverage
 from fabricusd.fabric import Fabric
 from fabricusd.geometry import lit_share, seen, tubes
 from fabricusd.schema import load

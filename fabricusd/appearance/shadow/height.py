@@ -154,11 +154,11 @@ def _cross_cell(cloth, rounded, end, pick, origin, du, dv, t0, t1, k):
                 a, b = _within(over, over_t, 0.0, low, a0, b0)
             else:
                 a, b = _within(over, over_t, high, 1.0, a0, b0)
-            start, cells = lower_run(np.float64, cloth, i, j, top, float(side))
+            start, cells, rises = lower_run(np.float64, cloth, i, j, top, float(side))
             mine = own and which != top
             track = Track(
                 below, crown if mine else float(cloth.half_thickness[1 - top, below]), h,
-                cells * float(below_crossing), (start + over) / cells, over_t / cells,
+                rises * cells * float(below_crossing), (start + over) / cells, over_t / cells,
                 2.0 * (along - 0.5) / seen, 2.0 * along_t / seen,
             )  # fmt: skip
             k = _cross_thread(cloth, 0 if mine else rounded, track, a, b, k)
@@ -203,7 +203,7 @@ def _cross_thread(cloth, rounded, track, a, b, k):
             k = max(k, _slope(cloth, rounded, track, p, t))
             continue
         bend = float(cloth.curve_slope[thread, p])
-        if bend == 0.0 or s_t == 0.0:
+        if bend == 0.0 or s_t == 0.0 or length == 0.0:
             continue
         for _ in range(3):
             # The thread is highest above the line of slope k where it is parallel to the line.
@@ -272,7 +272,7 @@ def highest_point(fabric: Fabric, cloth: CompiledFabric) -> float:
             common = math.gcd(len(longest), len(sequence))
             for place, kind in enumerate(sequence):
                 cells = longest[place % common :: common].max()
-                if cloth.pile[kind] or cells == 0:
+                if cloth.pile[kind] or cells < 0:
                     continue
                 half = float(cloth.half_thickness[which, kind])
                 found = max(found, peaks[kind] * float(cells) * crossing + half)
@@ -280,9 +280,9 @@ def highest_point(fabric: Fabric, cloth: CompiledFabric) -> float:
 
 
 def _longest_runs(cloth: CompiledFabric, which: int) -> list[NDArray[np.float64]]:
-    """Longest visible run [cells] of each thread of a set, 0 where there is none.
+    """Longest visible run [cells] of each thread of a set, -1 where there is none.
 
-    The first entry is for runs on top, the second for the strips of hidden runs.
+    The first entry is for runs on top, the second for the strips of hidden runs, which rise nowhere.
     """
     axis = 1 if which == WARP else 0
     on_top, rim = cloth.grid == which, float(cloth.rim[which])
@@ -291,11 +291,9 @@ def _longest_runs(cloth: CompiledFabric, which: int) -> list[NDArray[np.float64]
     if cloth.width[which] > 0:
         count = cloth.runs[..., 0, 1].astype(np.float64)
         cells = np.where(count > 0, count + 2.0 * rim, endless)
-        answer.append(np.where(on_top, cells, 0.0).max(axis=axis))
+        answer.append(np.where(on_top, cells, -1.0).max(axis=axis))
     if cloth.width[which] > 0 and rim > 0:
-        count = cloth.runs[..., 1, 1].astype(np.float64)
-        strips = np.where(count > 0, count - 1.0, endless)
-        answer.append(np.where(on_top, 0.0, 2.0 * rim * strips).max(axis=axis))
+        answer.append(np.where(on_top, -1.0, 0.0).max(axis=axis))
     return answer
 
 

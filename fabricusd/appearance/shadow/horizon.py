@@ -69,8 +69,10 @@ def horizon_table(
     """
     if azimuths < 16 or azimuths % 4:
         raise FabricError("azimuths", f"is {azimuths}; it must be a multiple of 4, at least 16")
-    if min(texels) < 2:
-        raise FabricError("texels", f"is {texels}; it must be at least 2 by 2")
+    if min(texels) < 2 or texels[0] % 2:
+        raise FabricError(
+            "texels", f"is {texels}; it must be at least 2 by 2, with an even number along a thread"
+        )
     repeat = shape_repeat(fabric)
     slots = cloth.runs.shape[2]
     if math.prod((*repeat, slots, *texels, azimuths)) > MOST_BYTES:

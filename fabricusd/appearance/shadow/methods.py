@@ -288,13 +288,14 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
         low, high = 0.0, 1.0
         if part == 0:
             start, cells = upper_run(np.float64, cloth, i, j, top)
+            rises = 1.0
         else:
-            start, cells = lower_run(np.float64, cloth, i, j, top, part - 1.0)
+            start, cells, rises = lower_run(np.float64, cloth, i, j, top, part - 1.0)
             low, high = (0.0, edge) if part == 1 else (1.0 - edge, 1.0)
         visible = float(cloth.width[which]) if high > low else 0.0
-        height = cells * float(cloth.pitch[1 - which]) * float(shadow.crest_height[thread]) + float(
-            cloth.half_thickness[which, thread]
-        )
+        height = rises * cells * float(cloth.pitch[1 - which]) * float(
+            shadow.crest_height[thread]
+        ) + float(cloth.half_thickness[which, thread])
         if visible <= 0.0 or cloth.pile[thread] != 0 or height < 0.999999 * shadow.highest:
             continue
         across = 0.5 * visible

@@ -121,7 +121,8 @@ def _gather(R, cloth, size, ints, reals):
         ints[_WEFT_THREAD + k] = cloth.sequence[WEFT, np.uintp(ints[PICK + k])]
         over = reals[X + k] if top == WARP else reals[Y + k]
         reals[_UPPER_START + k], reals[_UPPER_CELLS + k] = upper_run(R, cloth, i, j, top)
-        reals[_LOWER_START + k], reals[_LOWER_CELLS + k] = lower_run(R, cloth, i, j, top, over)
+        start, cells, _ = lower_run(R, cloth, i, j, top, over)
+        reals[_LOWER_START + k], reals[_LOWER_CELLS + k] = start, cells
 
 
 @njit(**INLINE)

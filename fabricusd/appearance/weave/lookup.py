@@ -189,11 +189,13 @@ def upper_run(R, cloth, i, j, top):
 
 @njit(**INLINE)
 def lower_run(R, cloth, i, j, top, over):
-    """(start, cells), as those of `upper_run`, of the thread underneath at `over` along itself.
+    """(start, cells, rises): the run, as by `upper_run`, of the thread underneath at `over` along it.
 
     Beside the thread on top it shows the end of its own visible run in the cell before or behind.
     Between two threads that both lie over it there is a strip that belongs to no such run: the
-    strips of a hidden run, put together, carry the whole curve once.
+    strips of a hidden run, put together, carry the whole curve once. They rise nowhere.
+
+    rises : 1 on a visible run, 0 on a strip
     """
     which = 1 - top
     rim, slot = cloth.rim[which], cloth.runs.shape[2] - 1
@@ -206,7 +208,7 @@ def lower_run(R, cloth, i, j, top, over):
     place, count = int(cloth.runs[i, j, slot, 0]), int(cloth.runs[i, j, slot, 1])
     beyond = R(cloth.runs[i_next, j_next, 0, 1])
     if count > 0 and place == (count - 1 if ahead else 0):
-        return (rim - R(1) if ahead else beyond + rim), beyond + R(2) * rim
+        return (rim - R(1) if ahead else beyond + rim), beyond + R(2) * rim, R(1)
     # Strips 2 rim wide: of a run with an end, the first is that behind the first cell.
     strip = R(place)
     if count > 0:
@@ -215,7 +217,7 @@ def lower_run(R, cloth, i, j, top, over):
     else:
         start = R(2) * rim * strip + (R(2) * rim - R(1) if ahead else R(0))
         strips = picks if which == WARP else ends
-    return start, max(R(2) * rim * R(strips), cloth.tiny)
+    return start, max(R(2) * rim * R(strips), cloth.tiny), R(0)
 
 
 @njit(**INLINE)
@@ -260,7 +262,7 @@ def thread_at(R, cloth, i, j, end, pick, x, y):
         return WEFT, 0, nan, nan, nan, nan
     top = int(cloth.grid[i, j])
     upper_start, upper_cells = upper_run(R, cloth, i, j, top)
-    lower_start, lower_cells = lower_run(R, cloth, i, j, top, x if top == WARP else y)
+    lower_start, lower_cells, rises = lower_run(R, cloth, i, j, top, x if top == WARP else y)
     which, s, w, cells = place_on(
         R, cloth, top, cloth.width[top], cloth.width[1 - top],
         upper_start, upper_cells, lower_start, lower_cells, x, y,
@@ -268,7 +270,14 @@ def thread_at(R, cloth, i, j, end, pick, x, y):
     if which == GAP:
         return GAP, 0, none, none, none, none
     thread = int(cloth.sequence[which, end if which == WARP else pick])
-    return which, thread, s, w, angle_on(R, cloth, thread, s), cells * cloth.pitch[1 - which]
+    return (
+        which,
+        thread,
+        s,
+        w,
+        angle_on(R, cloth, thread, s),
+        cells * cloth.pitch[1 - which] * (R(1) if which == top else rises),
+    )
 
 
 @njit(**INLINE)

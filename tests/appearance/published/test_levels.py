@@ -134,10 +134,10 @@ def test_weave_and_thread_are_the_written_model_at_a_point(name, model):
 @pytest.mark.parametrize("across_too", [False, True])
 @pytest.mark.parametrize("precision", [np.float64, np.float32])
 def test_the_scalar_and_the_vectorised_kernel_agree(across_too, precision):
-    places = spread_places(700)
+    uv = spread_places(700)
     wi, wo = random_directions(700, 8), random_directions(700, 9)
     for name, fabric in PRESETS.items():
-        tables, hit = surface_tables(fabric, precision=precision), lookup(fabric, places)
+        tables, hit = surface_tables(fabric, precision=precision), lookup(fabric, uv)
         i, o = (np.ascontiguousarray(w.T, precision) for w in (wi, wo))
         psi0, w = hit.angle.astype(precision), hit.across.astype(precision)
         out = np.empty_like(i)

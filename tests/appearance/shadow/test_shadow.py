@@ -193,14 +193,15 @@ def test_peak_is_the_nearest_of_the_highest_points_in_every_direction() -> None:
         warp=ThreadSet(sequence=(0,), density=1000.0, coverage=0.4),
         weft=ThreadSet(sequence=(1,), density=1000.0, coverage=0.5),
     )
-    rise = -math.log(math.cos(angle)) / (2 * angle) * 1e-3
+    width = coverage(fabric).width
+    rise = -math.log(math.cos(angle)) / (2 * angle) * seen_length(1, float(width[WEFT])) * 1e-3
     cloth = compile_fabric(fabric, precision=np.float64)
     shadow = compile_shadow(fabric, "peak", softness=1e-4, precision=np.float64)
     uv = places(fabric, 200, 12)
     hit = lookup(cloth, uv)
     for k, (u, v) in enumerate(uv):
         nearest = min(
-            math.hypot(max(0.0, abs(u - i - 0.5) - 0.4), v - j - 0.5) * 1e-3
+            math.hypot(max(0.0, abs(u - i - 0.5) - width[WARP] / 2), v - j - 0.5) * 1e-3
             for i in range(-4, 7)
             for j in range(-4, 7)
             if PLAIN.cells[i % 2, j % 2]

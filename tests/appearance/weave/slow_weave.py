@@ -20,7 +20,7 @@ class Found(NamedTuple):
     across: float
     angle: float
     length: float
-    """Length of the visible run in cells."""
+    """Length of the visible run in cells; 0 on the strips of a hidden run, which rise nowhere."""
     edge: float
     """How near the point is to where another thread, or another piece of curve, begins."""
 
@@ -82,11 +82,11 @@ def _place_on_thread(on_top: list[bool], crossing: float, along: float) -> tuple
     if not any(on_top):
         # The repeat starts in the middle of a strip: its first half lies before thread 0.
         covered = sum(min(max(along % n - (k + 0.5 - crossing / 2), 0), crossing) for k in range(n))
-        return (along % n - covered) / (n * strip), n * strip
+        return (along % n - covered) / (n * strip), 0.0
     first = before
     while not on_top[(first - 1) % n]:
         first -= 1
     last = before
     while not on_top[(last + 1) % n]:
         last += 1
-    return ((before - first) * strip + inside) / ((last - first) * strip), (last - first) * strip
+    return ((before - first) * strip + inside) / ((last - first) * strip), 0.0
