@@ -203,7 +203,7 @@ def _cross_thread(cloth, rounded, track, a, b, k):
             k = max(k, _slope(cloth, rounded, track, p, t))
             continue
         bend = float(cloth.curve_slope[thread, p])
-        if bend == 0.0 or s_t == 0.0 or length == 0.0:
+        if bend == 0.0 or s_t == 0.0 or track.length == 0.0:
             continue
         for _ in range(3):
             # The thread is highest above the line of slope k where it is parallel to the line.
@@ -282,7 +282,7 @@ def highest_point(fabric: Fabric, cloth: CompiledFabric) -> float:
 def _longest_runs(cloth: CompiledFabric, which: int) -> list[NDArray[np.float64]]:
     """Longest visible run [cells] of each thread of a set, -1 where there is none.
 
-    The first entry is for runs on top, the second for the strips of hidden runs, which rise nowhere.
+    The first entry is for runs on top, the second for strips of hidden runs, which rise nowhere.
     """
     axis = 1 if which == WARP else 0
     on_top, rim = cloth.grid == which, float(cloth.rim[which])

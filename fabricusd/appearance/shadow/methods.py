@@ -293,9 +293,9 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
             start, cells, rises = lower_run(np.float64, cloth, i, j, top, part - 1.0)
             low, high = (0.0, edge) if part == 1 else (1.0 - edge, 1.0)
         visible = float(cloth.width[which]) if high > low else 0.0
-        height = rises * cells * float(cloth.pitch[1 - which]) * float(
-            shadow.crest_height[thread]
-        ) + float(cloth.half_thickness[which, thread])
+        run = rises * cells * float(cloth.pitch[1 - which])
+        half = float(cloth.half_thickness[which, thread])
+        height = run * float(shadow.crest_height[thread]) + half
         if visible <= 0.0 or cloth.pile[thread] != 0 or height < 0.999999 * shadow.highest:
             continue
         across = 0.5 * visible

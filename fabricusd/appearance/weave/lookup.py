@@ -189,9 +189,10 @@ def upper_run(R, cloth, i, j, top):
 
 @njit(**INLINE)
 def lower_run(R, cloth, i, j, top, over):
-    """(start, cells, rises): the run, as by `upper_run`, of the thread underneath at `over` along it.
+    """(start, cells, rises): the run of the thread underneath at `over` along it.
 
-    Beside the thread on top it shows the end of its own visible run in the cell before or behind.
+    Beside the thread on top it shows the end of its own visible run in the cell before or behind;
+    start and cells are those of `upper_run`.
     Between two threads that both lie over it there is a strip that belongs to no such run: the
     strips of a hidden run, put together, carry the whole curve once. They rise nowhere.
 

@@ -11,10 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fabricusd.appearance import surface
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.shadow.height import highest_point
 from fabricusd.appearance.shadow.horizon import shape_repeat
 from fabricusd.appearance.shadow.methods import METHODS, Shadow, compile_shadow, lit_all, shadowing
+from fabricusd.appearance.weave.bands import seen_length
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
+from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEGREE, Fabric, TangentCurve, Thread, ThreadSet, Weave
