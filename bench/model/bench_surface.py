@@ -25,6 +25,7 @@ from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.surface import far_all, points_all, weave_all
 from fabricusd.appearance.weave.compiled import compile_fabric
 from fabricusd.appearance.weave.lookup import find_all
+from fabricusd.appearance.weave.place import Places
 from fabricusd.schema import load
 
 PRESETS = (
@@ -67,7 +68,7 @@ def measure(name: str, count: int, repeats: int) -> None:
         find_all(R, cloth, uv, sets, threads, s, w, angle, length)
 
     def weave() -> None:
-        points_all(R, tables, False, sets, threads, angle, w, wi, wo, out)
+        points_all(R, tables, False, Places(sets, threads, angle, w), wi, wo, out)
 
     def weave_and_horizon() -> None:
         weave_all(R, cloth, shadow, tables, uv, wi, wo, out)

@@ -72,16 +72,14 @@ def lookup_in_numpy(cloth: CompiledFabric, uv: Array) -> dict[str, Array]:
     i, j = np.mod(cell, cloth.grid.shape).astype(np.int32).T
     top = cloth.grid[i, j].astype(np.int32)
     over, along = (np.where(top == WARP, xy[:, a], xy[:, 1 - a]) for a in (0, 1))
-    width = cloth.width[top]
+    width, other = cloth.width[top], cloth.width[1 - top]
     on_top = np.abs(over - 0.5) <= 0.5 * width
-    beside = ~on_top & (cloth.under == 1 - top)
-    beside &= np.abs(along - 0.5) <= 0.5 * cloth.under_width
-    share = np.where(on_top, 1, 1 - width)
-    strip = np.where(over < 0.5, over, over - width)
-    seen = np.where(on_top, along, strip / np.where(share > 0, share, 1))
-    w = 2 * np.where(on_top, (over - 0.5) / width, (along - 0.5) / cloth.under_width)
-    runs = cloth.runs[i, j, np.where(on_top, 0, cloth.runs.shape[2] - 1)]
-    s = np.minimum((runs[:, 0] + seen) / runs[:, 1], cloth.last)
+    beside = ~on_top & (other > 0) & (np.abs(along - 0.5) <= 0.5 * other)
+    strip = np.where(over < 0.5, over, over - width) / np.where(width < 1, 1 - width, 1)
+    w = 2 * np.where(on_top, (over - 0.5) / width, (along - 0.5) / other)
+    start, cells = runs_in_numpy(cloth, i, j, top, over)
+    s = np.where(on_top, start[0] + along, start[1] + over) / np.where(on_top, *cells)
+    s = np.clip(s, 0, cloth.last)
     hit = np.where(on_top, top, 1 - top)
     lengths = cloth.sequence_length[hit]
     place = np.mod(np.where(hit == WARP, cell[:, 0], cell[:, 1]), lengths).astype(np.int32)
@@ -92,10 +90,35 @@ def lookup_in_numpy(cloth: CompiledFabric, uv: Array) -> dict[str, Array]:
     return {
         "set": np.where(on_top | beside, hit, GAP), "thread": thread, "angle": angle,
         "w": np.where(hit == WARP, -w, w), "cell": np.stack((i, j)), "top": top,
-        "along": np.where(on_top, along, seen),
-        "across": np.where(on_top, (over - 0.5) / width, (along - 0.5) / cloth.under_width) + 0.5,
+        "along": np.where(on_top, along, strip),
+        "across": np.where(on_top, (over - 0.5) / width, (along - 0.5) / other) + 0.5,
         "slot": np.where(on_top, 0, cloth.runs.shape[2] - 1),
     }  # fmt: skip
+
+
+def runs_in_numpy(
+    cloth: CompiledFabric, i: Array, j: Array, top: Array, over: Array
+) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """((start above, start below), (cells above, cells below)): `upper_run` and `lower_run`."""
+    rim, below = cloth.rim[top], cloth.rim[1 - top]
+    place, count = (cloth.runs[i, j, 0, k].astype(rim.dtype) for k in (0, 1))
+    repeat = np.where(top == WARP, cloth.grid.shape[1], cloth.grid.shape[0])
+    upper = np.where(count > 0, place + rim, place), np.where(count > 0, count + 2 * rim, repeat)
+    slot, ahead = cloth.runs.shape[2] - 1, over > 0.5
+    place, count = (cloth.runs[i, j, slot, k].astype(rim.dtype) for k in (0, 1))
+    step = np.where(ahead, 1, -1)
+    i_next = (i + np.where(top == WARP, step, 0)) % cloth.grid.shape[0]
+    j_next = (j + np.where(top == WARP, 0, step)) % cloth.grid.shape[1]
+    beyond = cloth.runs[i_next, j_next, 0, 1].astype(rim.dtype)
+    end = (count > 0) & (place == np.where(ahead, count - 1, 0))
+    inner = 2 * below * place + np.where(
+        count > 0, np.where(ahead, below - 1, -below), np.where(ahead, 2 * below - 1, 0)
+    )
+    across = np.where(top == WARP, cloth.grid.shape[0], cloth.grid.shape[1])
+    strips = 2 * below * np.where(count > 0, count - 1, across)
+    start = np.where(end, np.where(ahead, below - 1, beyond + below), inner)
+    cells = np.where(end, beyond + 2 * below, np.maximum(strips, cloth.tiny))
+    return (upper[0], start), (upper[1], cells)
 
 
 def horizon_in_numpy(shadow: Shadow, hit: dict[str, Array], wi: Array) -> Array:

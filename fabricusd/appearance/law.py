@@ -91,35 +91,30 @@ def surface_law(
 
 
 @njit(**PART)
-def law_value(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """(r, g, b) of the surface law at a level.
-
-    thread_set, thread, psi0, w : what `weave.find` returns at the point; not read at level FAR
-    """
+def law_value(R, law, level, place, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
+    """(r, g, b) of the surface law at a level; place : a `Place`, not read at level FAR."""
     red, green, blue = R(0), R(0), R(0)
     if law.kind != CONSERVING_ONLY:
         if level == FAR:
             red, green, blue = far_value(R, law.published, ix, iy, iz, ox, oy, oz)
-        elif thread_set < 2:
+        elif place.thread_set < 2:
             red, green, blue = point_value(
-                R, law.published, level == THREAD, thread_set, thread, psi0, w,
-                ix, iy, iz, ox, oy, oz,
-            )  # fmt: skip
+                R, law.published, level == THREAD, place, ix, iy, iz, ox, oy, oz
+            )
     if law.kind != PUBLISHED_ONLY:
         r, g, b = R(0), R(0), R(0)
         if level == FAR:
             r, g, b = conserving_value(R, law.conserving, ix, iy, iz, ox, oy, oz)
-        elif thread_set < 2:
+        elif place.thread_set < 2:
             r, g, b = conserving_level_value(
-                R, law.conserving, level == THREAD, thread_set, thread, psi0, w,
-                ix, iy, iz, ox, oy, oz,
-            )  # fmt: skip
+                R, law.conserving, level == THREAD, place, ix, iy, iz, ox, oy, oz
+            )
         red, green, blue = red + r, green + g, blue + b
     return red, green, blue
 
 
 @njit(**PART)
-def law_density(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
+def law_density(R, law, level, place, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """pdf(wi) [1/sr] of `law_direction`; 0 for directions that it never draws."""
     p, q = R(0), R(0)
     if law.kind != CONSERVING_ONLY:
@@ -127,16 +122,15 @@ def law_density(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, 
             p = density(R, law.lobes, ix, iy, iz, ox, oy, oz)
         else:
             p = point_density(
-                R, law.published.threads, law.lobes, level == THREAD, thread_set, thread, psi0, w,
-                ix, iy, iz, ox, oy, oz,
-            )  # fmt: skip
+                R, law.published.threads, law.lobes, level == THREAD, place, ix, iy, iz, ox, oy, oz
+            )
     if law.kind != PUBLISHED_ONLY:
         if level == FAR:
             q = density(R, law.conserving_lobes, ix, iy, iz, ox, oy, oz)
         else:
             q = point_density(
-                R, law.conserving.threads, law.conserving_lobes, level == THREAD, thread_set,
-                thread, psi0, w, ix, iy, iz, ox, oy, oz,
+                R, law.conserving.threads, law.conserving_lobes, level == THREAD, place,
+                ix, iy, iz, ox, oy, oz,
             )  # fmt: skip
     # The published models are 0 for a viewer below the cloth: the conserving sampler draws all
     # directions there.
@@ -146,7 +140,7 @@ def law_density(R, law, level, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, 
 
 
 @njit(**PART)
-def law_direction(R, law, level, thread_set, thread, psi0, w, ox, oy, oz, u0, u1, u2):  # type: ignore[no-untyped-def]
+def law_direction(R, law, level, place, ox, oy, oz, u0, u1, u2):  # type: ignore[no-untyped-def]
     """wi (x, y, z) for a viewer and three numbers in [0, 1).
 
     Callers must reject a direction whose `law_density` is 0.
@@ -159,12 +153,11 @@ def law_direction(R, law, level, thread_set, thread, psi0, w, ox, oy, oz, u0, u1
         if level == FAR:
             return direction(R, law.lobes, ox, oy, oz, u0, u1, u2)
         return point_direction(
-            R, law.published.threads, law.lobes, level == THREAD, thread_set, thread, psi0, w,
-            ox, oy, oz, u0, u1, u2,
-        )  # fmt: skip
+            R, law.published.threads, law.lobes, level == THREAD, place, ox, oy, oz, u0, u1, u2
+        )
     if level == FAR:
         return direction(R, law.conserving_lobes, ox, oy, oz, u0, u1, u2)
     return point_direction(
-        R, law.conserving.threads, law.conserving_lobes, level == THREAD, thread_set, thread,
-        psi0, w, ox, oy, oz, u0, u1, u2,
+        R, law.conserving.threads, law.conserving_lobes, level == THREAD, place,
+        ox, oy, oz, u0, u1, u2,
     )  # fmt: skip

@@ -57,6 +57,7 @@ from fabricusd.appearance.shadow.place_blocks import (
 )
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.lookup import WeaveHit, lookup
+from fabricusd.appearance.weave.place import Places, place_at
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import BLOCK, KERNEL, index
@@ -161,7 +162,7 @@ def sample(
     i = np.empty_like(o)
     real: Any = np.float64
     turned = np.ascontiguousarray(numbers.T)
-    _draw(real, *law, LEVELS.index(level), hit.set, hit.thread, hit.angle, hit.across, o, turned, i)
+    _draw(real, *law, LEVELS.index(level), hit.places, o, turned, i)
     f = _evaluate(law, level, hit, i, o)
     if level != "far" and shadow != "none":
         f *= _lit(fabric, shadow, level, places, i)
@@ -172,9 +173,7 @@ def sample(
 def _density(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats) -> Floats:
     real: Any = np.float64
     out = np.empty(wi.shape[1])
-    _densities(
-        real, *law, LEVELS.index(level), hit.set, hit.thread, hit.angle, hit.across, wi, wo, out
-    )
+    _densities(real, *law, LEVELS.index(level), hit.places, wi, wo, out)
     return out
 
 
@@ -278,15 +277,9 @@ def _evaluate(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats
         if level == "far":
             far_all(real, law.published, wi, wo, out)
         else:
-            points_all(
-                real, law.published, level == "thread",
-                hit.set, hit.thread, hit.angle, hit.across, wi, wo, out,
-            )  # fmt: skip
+            points_all(real, law.published, level == "thread", hit.places, wi, wo, out)
     if law.kind != PUBLISHED_ONLY:
-        _add_conserving(
-            real, law.conserving, LEVELS.index(level),
-            hit.set, hit.thread, hit.angle, hit.across, wi, wo, out,
-        )  # fmt: skip
+        _add_conserving(real, law.conserving, LEVELS.index(level), hit.places, wi, wo, out)
     return out
 
 
@@ -299,12 +292,15 @@ def far_all(R, tables, wi, wo, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**KERNEL, parallel=True)
-def points_all(R, tables, across_too, sets, threads, psi0, w, wi, wo, out):  # type: ignore[no-untyped-def]
-    """Level `weave`, or `thread` if `across_too`, on all workers: `levels.point_values`."""
+def points_all(R, tables, across_too, places, wi, wo, out):  # type: ignore[no-untyped-def]
+    """Level `weave`, or `thread` if `across_too`, at n `Places`, on all workers.
+
+    wi, wo, out : (3, n) of precision R, as in `levels.point_values`
+    """
     n = wi.shape[1]
     for chunk in prange((n + _CHUNK - 1) // _CHUNK):
         first, last = chunk * _CHUNK, min(n, (chunk + 1) * _CHUNK)
-        point_values(R, tables, across_too, sets, threads, psi0, w, wi, wo, out, first, last)
+        point_values(R, tables, across_too, places, wi, wo, out, first, last)
 
 
 @njit(**KERNEL, parallel=True)
@@ -329,26 +325,25 @@ def _weave_chunk(R, cloth, shadow, tables, uv, wi, wo, out, first, last):
         look_up_block(R, cloth, shadow.table, uv, begin, size, ints, reals)
         horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
         mean_block(R, shadow, wi, begin, size, ints, reals)
-        point_block(
-            R, tables, False, ints[OF_SET:], ints[OF_THREAD:], reals[ANGLE:], reals[S:], 0,
-            wi, wo, out, begin, size, block,
-        )  # fmt: skip
+        # Level `weave` does not read the position across: any row will do.
+        places = Places(ints[OF_SET:], ints[OF_THREAD:], reals[ANGLE:], reals[S:])
+        point_block(R, tables, False, places, 0, wi, wo, out, begin, size, block)
         for c in range(3):
             for k in range(size):
                 out[c, index(begin, k)] *= reals[LIT + k]
 
 
 @njit(**KERNEL, parallel=True)
-def _add_conserving(R, tables, level, sets, threads, psi0, w, wi, wo, out):  # type: ignore[no-untyped-def]
+def _add_conserving(R, tables, level, places, wi, wo, out):  # type: ignore[no-untyped-def]
     for k in prange(wi.shape[1]):
         r, g, b = R(0), R(0), R(0)
         if level == FAR:
             r, g, b = conserving_value(
                 R, tables, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
             )
-        elif sets[k] < 2:
+        elif places.sets[k] < 2:
             r, g, b = conserving_level_value(
-                R, tables, level == THREAD, sets[k], threads[k], psi0[k], w[k],
+                R, tables, level == THREAD, place_at(places, k),
                 wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k],
             )  # fmt: skip
         out[0, k] += r
@@ -360,40 +355,38 @@ def _add_conserving(R, tables, level, sets, threads, psi0, w, wi, wo, out):  # t
 
 
 @njit(**KERNEL, parallel=True)
-def _densities(R, kind, a, b, c, d, level, sets, threads, psi0, w, wi, wo, out):  # type: ignore[no-untyped-def]
+def _densities(R, kind, a, b, c, d, level, places, wi, wo, out):  # type: ignore[no-untyped-def]
     n = out.size
     for chunk in prange((n + BLOCK - 1) // BLOCK):
         first, last = chunk * BLOCK, min(n, (chunk + 1) * BLOCK)
-        _chunk_densities(
-            R, kind, a, b, c, d, level, sets, threads, psi0, w, wi, wo, out, first, last
-        )
+        law = SurfaceLaw(kind, a, b, c, d)
+        _chunk_densities(R, law, level, places, wi, wo, out, first, last)
 
 
 @njit(**KERNEL)
-def _chunk_densities(R, kind, a, b, c, d, level, sets, threads, psi0, w, wi, wo, out, first, last):  # type: ignore[no-untyped-def]
-    law = SurfaceLaw(kind, a, b, c, d)
+def _chunk_densities(R, law, level, places, wi, wo, out, first, last):  # type: ignore[no-untyped-def]
     for k in range(first, last):
         x = k if level != FAR else 0
         out[k] = law_density(
-            R, law, level, sets[x], threads[x], psi0[x], w[x],
+            R, law, level, place_at(places, x),
             wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k],
         )  # fmt: skip
 
 
 @njit(**KERNEL, parallel=True)
-def _draw(R, kind, a, b, c, d, level, sets, threads, psi0, w, wo, u, wi):  # type: ignore[no-untyped-def]
+def _draw(R, kind, a, b, c, d, level, places, wo, u, wi):  # type: ignore[no-untyped-def]
     n = wi.shape[1]
     for chunk in prange((n + BLOCK - 1) // BLOCK):
         first, last = chunk * BLOCK, min(n, (chunk + 1) * BLOCK)
-        _chunk_draw(R, kind, a, b, c, d, level, sets, threads, psi0, w, wo, u, wi, first, last)
+        law = SurfaceLaw(kind, a, b, c, d)
+        _chunk_draw(R, law, level, places, wo, u, wi, first, last)
 
 
 @njit(**KERNEL)
-def _chunk_draw(R, kind, a, b, c, d, level, sets, threads, psi0, w, wo, u, wi, first, last):  # type: ignore[no-untyped-def]
-    law = SurfaceLaw(kind, a, b, c, d)
+def _chunk_draw(R, law, level, places, wo, u, wi, first, last):  # type: ignore[no-untyped-def]
     for k in range(first, last):
         x = k if level != FAR else 0
         wi[0, k], wi[1, k], wi[2, k] = law_direction(
-            R, law, level, sets[x], threads[x], psi0[x], w[x],
+            R, law, level, place_at(places, x),
             wo[0, k], wo[1, k], wo[2, k], u[0, k], u[1, k], u[2, k],
         )  # fmt: skip

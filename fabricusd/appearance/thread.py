@@ -195,8 +195,9 @@ def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Floats, Floats]:
     return i, o
 
 
-# The loops below read the row's constants from a tuple. If they loaded them from an array, LLVM
-# would have to assume that every store into `out` may change them, and would not vectorise.
+# In the loops below wi, wo and out are tuples of three (n,) rows. The row's constants come from a
+# tuple as well: if the loops loaded them from an array, LLVM would have to assume that every store
+# into `out` may change them, and would not vectorise.
 
 
 _constants = tuple_reader(CONSTANTS)
@@ -205,7 +206,10 @@ _HAS_TABLE = tuple(model.looked_up is not None for model in REGISTRY)
 
 
 @njit(**INLINE)
-def _direct_loop(R, model, row, ix, iy, iz, ox, oy, oz, r, g, b):
+def _direct_loop(R, model, row, wi, wo, out):
+    ix, iy, iz = wi
+    ox, oy, oz = wo
+    r, g, b = out
     for k in range(ix.size):
         cos_i, cos_o, cos_half = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
         surface, volume = factors(R, model, row, ix[k], cos_i, ox[k], cos_o, cos_half)
@@ -217,7 +221,10 @@ def _direct_loop(R, model, row, ix, iy, iz, ox, oy, oz, r, g, b):
 
 
 @njit(**INLINE)
-def _table_loop(R, model, row, scale, added, ix, iy, iz, ox, oy, oz, r, g, b):
+def _table_loop(R, model, row, scale, added, wi, wo, out):
+    ix, iy, iz = wi
+    ox, oy, oz = wo
+    r, g, b = out
     for k in range(ix.size):
         cos_i, cos_o, cos_half = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
         surface, volume = factors(R, model, row, ix[k], cos_i, ox[k], cos_o, cos_half)
@@ -233,19 +240,21 @@ _by_table = specialised(_table_loop, [k for k in ALL if _HAS_TABLE[k]])
 
 
 @njit(**KERNEL)
-def _direct_block(R, model, row, ix, iy, iz, ox, oy, oz, r, g, b):
-    _directly(R, model, row, ix, iy, iz, ox, oy, oz, r, g, b)
+def _direct_block(R, model, row, wi, wo, out):
+    _directly(R, model, row, wi, wo, out)
 
 
 @njit(**KERNEL)
-def _table_block(R, model, row, scale, added, ix, iy, iz, ox, oy, oz, r, g, b):
-    _by_table(R, model, row, scale, added, ix, iy, iz, ox, oy, oz, r, g, b)
+def _table_block(R, model, row, scale, added, wi, wo, out):
+    _by_table(R, model, row, scale, added, wi, wo, out)
 
 
 @njit(**KERNEL)
-def _looked_up_block(R, model, row, iy, iz, oy, oz, scale, added):
+def _looked_up_block(R, model, row, wi, wo, scale, added):
     """The values that models look up in tables, in a loop of their own: the loops above then
     contain no gathers."""
+    _, iy, iz = wi
+    _, oy, oz = wo
     for k in range(scale.size):
         cos_i, cos_o, _ = pair_angles(R, iy[k], iz[k], oy[k], oz[k])
         scale[k], added[k] = looked_up(R, model, row, cos_i, cos_o)
@@ -258,15 +267,15 @@ def _evaluate_soa(R, row, wi, wo, out):
     model = int(row[MODEL])
     for block in prange((n + CHUNK - 1) // CHUNK):
         s = slice(block * CHUNK, min(n, (block + 1) * CHUNK))
-        ix, iy, iz = wi[0, s], wi[1, s], wi[2, s]
-        ox, oy, oz = wo[0, s], wo[1, s], wo[2, s]
-        r, g, b = out[0, s], out[1, s], out[2, s]
+        i, o = (wi[0, s], wi[1, s], wi[2, s]), (wo[0, s], wo[1, s], wo[2, s])
+        channels = (out[0, s], out[1, s], out[2, s])
         if _HAS_TABLE[model]:
-            scale, added = np.empty(ix.size, R), np.empty(ix.size, R)
-            _looked_up_block(R, model, row, iy, iz, oy, oz, scale, added)
-            _table_block(R, model, constants, scale, added, ix, iy, iz, ox, oy, oz, r, g, b)
+            size = out[0, s].size
+            scale, added = np.empty(size, R), np.empty(size, R)
+            _looked_up_block(R, model, row, i, o, scale, added)
+            _table_block(R, model, constants, scale, added, i, o, channels)
         else:
-            _direct_block(R, model, constants, ix, iy, iz, ox, oy, oz, r, g, b)
+            _direct_block(R, model, constants, i, o, channels)
 
 
 @njit(**KERNEL, parallel=True)

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.weave.bands import bands
 from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.appearance.weave.coverage import sets
+from fabricusd.appearance.weave.coverage import coverage, sets
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.geometry.centre import RINGS, centre_line
@@ -97,7 +96,7 @@ def repeat_lines(fabric: Fabric, squash: float = 1.0) -> Repeat:
         )
     weave = fabric.weave
     grid = np.tile(weave.cells, (ends // weave.ends, picks // weave.picks))
-    width = bands(fabric).width
+    width = coverage(fabric).width
     pitch = np.array([s.pitch for s in sets(fabric)])
     found: dict[int, list[Line]] = {WEFT: [], WARP: []}
     for which, count in ((WARP, ends), (WEFT, picks)):

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.weave.bands import bands, seen_length
+from fabricusd.appearance.weave.bands import seen_length
 from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.appearance.weave.coverage import sets
+from fabricusd.appearance.weave.coverage import coverage, sets
 from fabricusd.appearance.weave.curve import Pieces, pieces
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -51,7 +51,7 @@ def tuft_repeat(fabric: Fabric, squash: float) -> tuple[Repeat, Mesh]:
     ends, picks = true_repeat(fabric)
     weave = fabric.weave
     grid = np.tile(weave.cells, (ends // weave.ends, picks // weave.picks))
-    width = bands(fabric).width
+    width = coverage(fabric).width
     pitch = np.array([s.pitch for s in sets(fabric)])
     size = np.array([ends * pitch[WARP], picks * pitch[WEFT]])
     lines: list[Line] = []

@@ -14,6 +14,7 @@ from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.scattering import models
 from fabricusd.appearance.scattering.model import PUBLISHED as LAW
+from fabricusd.appearance.weave.place import Places
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEGREE, MODELS, Fabric, TangentCurve, Thread, ThreadSet, Weave
 from tests.appearance.directions import VIEWS, direction, random_directions
@@ -70,7 +71,8 @@ def test_two_million_random_pairs_on_every_fabric_give_sound_values(model, preci
         across = np.linspace(-1, 1, n).astype(precision)
         sets = (np.arange(n) % 3).astype(np.uint8)
         threads = (np.arange(n) % 2).astype(np.int32)
-        point_values(precision, tables, True, sets, threads, angle, across, wi, wo, out, 0, n)
+        places = Places(sets, threads, angle, across)
+        point_values(precision, tables, True, places, wi, wo, out, 0, n)
         assert sound(out), name
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.weave.bands import bands
+from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEGREE, TangentCurve, Weave
 from fabricusd.geometry import tubes
@@ -30,7 +30,7 @@ def test_presets_have_a_geometry(name: str) -> None:
     assert (cloth.flatness <= 1.001).all()
     widths = [ln.half_width for ln in cloth.repeat.lines]
     pitch = {WARP: fabric.warp.pitch, WEFT: fabric.weft.pitch}
-    stated = [0.5 * bands(fabric).width[ln.which] * pitch[ln.which] for ln in cloth.repeat.lines]
+    stated = [0.5 * coverage(fabric).width[ln.which] * pitch[ln.which] for ln in cloth.repeat.lines]
     np.testing.assert_allclose(widths, stated, rtol=2e-3)
 
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.weave.bands import bands
 from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.appearance.weave.coverage import GAP
+from fabricusd.appearance.weave.coverage import GAP, coverage
 from fabricusd.fabric import Fabric
 from fabricusd.geometry import lit_share, seen, tubes
 from fabricusd.schema import load
@@ -26,7 +25,7 @@ def places(fabric: Fabric, count: int = 20000) -> np.ndarray:
 
 def by_bands(fabric: Fabric, uv: np.ndarray) -> np.ndarray:
     """(n, 2) set and number in the set at each place, as the bands and the grid say."""
-    x = bands(fabric).width
+    x = coverage(fabric).width
     cell = np.floor(uv).astype(int)
     off = np.abs(uv - cell - 0.5)
     warp, weft = off[:, 0] < 0.5 * x[WARP], off[:, 1] < 0.5 * x[WEFT]
@@ -61,7 +60,7 @@ def test_angle_and_place_across_are_those_of_the_curve() -> None:
     v = np.flatnonzero(grid[0])[0] + np.array([0.1, 0.5, 0.9])
     cloth = tubes(fabric)
     found = seen(cloth, np.stack((np.full(3, 0.5), v), axis=1))
-    length = 2.0 - bands(fabric).width[WEFT]
+    length = 2.0 - coverage(fabric).width[WEFT]
     # The crown of a section lies off its middle, out along the normal.
     high = cloth.lines.half_height[0] / fabric.weft.pitch
     middle = v - v[1] - high * np.sin(found.angle)
@@ -69,7 +68,7 @@ def test_angle_and_place_across_are_those_of_the_curve() -> None:
     np.testing.assert_allclose(found.across, 0.0, atol=0.02)
     beside = seen(cloth, np.array([[0.5 + 0.15, v[1]]]))
     # b of a warp thread points along -U.
-    assert beside.across[0] == pytest.approx(-0.3 / bands(fabric).width[WARP], abs=0.02)
+    assert beside.across[0] == pytest.approx(-0.3 / coverage(fabric).width[WARP], abs=0.02)
 
 
 def test_seen_is_periodic_in_the_repeat() -> None:

@@ -15,22 +15,20 @@ from fabricusd.kernels.real import PART, cos, sin
 
 
 @njit(**PART)
-def conserving_level_value(
-    R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz
-):  # type: ignore[no-untyped-def]
+def conserving_level_value(R, tables, across_too, place, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """`multiple.conserving_point_value`, times the factors across the width if `across_too`."""
-    row = tables.threads[thread]
+    row = tables.threads[place.thread]
     if not across_too or row[LAW] != R(CONSERVING):
-        return conserving_point_value(R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz)
+        return conserving_point_value(R, tables, place, ix, iy, iz, ox, oy, oz)
     scale = visible(R, tables, ix, iy, iz) * visible(R, tables, ox, oy, oz) * abs(iz)
     if tables.opaque != 0 and (iz > R(0)) != (oz > R(0)):
         scale = R(0)
-    angle = min(max(psi0, R(-PILE_ANGLE)), R(PILE_ANGLE))
+    angle = min(max(place.psi0, R(-PILE_ANGLE)), R(PILE_ANGLE))
     c, s = cos(R, angle), sin(R, angle)
-    surface, volume = facet_terms(R, tables, thread_set, thread, c, s, ix, iy, iz, ox, oy, oz)
-    _, b_i, n_i = to_thread(R, thread_set, c, s, ix, iy, iz)
-    _, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
-    on_surface, on_volume = across_at(R, row, w, b_i, n_i, b_o, n_o)
+    surface, volume = facet_terms(R, row, place.thread_set, c, s, ix, iy, iz, ox, oy, oz)
+    _, b_i, n_i = to_thread(R, place.thread_set, c, s, ix, iy, iz)
+    _, b_o, n_o = to_thread(R, place.thread_set, c, s, ox, oy, oz)
+    on_surface, on_volume = across_at(R, row, place.w, b_i, n_i, b_o, n_o)
     scale /= c
     surface, volume = surface * on_surface * scale, volume * on_volume * scale
     share = multiple_share(R, tables, ix, iy, iz, ox, oy, oz) / tables.covered

@@ -333,14 +333,12 @@ def conserving_value(R, tables, ix, iy, iz, ox, oy, oz):
 
 
 @njit(**PART)
-def conserving_point_value(R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):
-    """(r, g, b) of the thread under a point; the mean over the repeat is `conserving_value`.
+def conserving_point_value(R, tables, place, ix, iy, iz, ox, oy, oz):
+    """(r, g, b) at a `Place` on a thread; the mean over the repeat is `conserving_value`.
 
     The multiple-scattering term belongs to the covered area: there is none in a gap.
     """
-    red, green, blue = conserving_point_single(
-        R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz
-    )
+    red, green, blue = conserving_point_single(R, tables, place, ix, iy, iz, ox, oy, oz)
     share = multiple_share(R, tables, ix, iy, iz, ox, oy, oz) / tables.covered
     return (
         red + share * tables.strength[0],

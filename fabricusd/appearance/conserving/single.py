@@ -149,14 +149,14 @@ def visible(R, tables, x, y, z):
 
 
 @njit(**PART)
-def facet_terms(R, tables, thread_set, thread, c, s, ix, iy, iz, ox, oy, oz):
+def facet_terms(R, row, thread_set, c, s, ix, iy, iz, ox, oy, oz):
     """`f_s mu(wi) mu(wo)` as (surface, volume without A); c, s : cos and sin of tangent angle."""
     ta, tb, tn = to_thread(R, thread_set, c, s, ix, iy, iz)
     va, vb, vn = to_thread(R, thread_set, c, s, ox, oy, oz)
     seen = max(R(0), tn if iz > R(0) else -tn) * max(R(0), vn if oz > R(0) else -vn)
     if seen == R(0):
         return R(0), R(0)
-    surface, volume = conserving_terms(R, tables.threads[thread], ta, tb, tn, va, vb, vn)
+    surface, volume = conserving_terms(R, row, ta, tb, tn, va, vb, vn)
     return surface * seen, volume * seen
 
 
@@ -172,13 +172,12 @@ def conserving_single(R, tables, ix, iy, iz, ox, oy, oz):
     for k in range(tables.nodes.shape[0]):
         if tables.scatters[k] == 0:
             continue
-        thread = tables.node_thread[k]
+        row = tables.threads[tables.node_thread[k]]
         surface, volume = facet_terms(
-            R, tables, WARP if k >= tables.warp_start else WEFT, thread,
+            R, row, WARP if k >= tables.warp_start else WEFT,
             tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN], ix, iy, iz, ox, oy, oz,
         )  # fmt: skip
         weight = tables.nodes[k, NODE_WEIGHT] * scale
-        row = tables.threads[thread]
         red += weight * (surface + volume * row[ALBEDO_R])
         green += weight * (surface + volume * row[ALBEDO_G])
         blue += weight * (surface + volume * row[ALBEDO_B])
@@ -186,22 +185,20 @@ def conserving_single(R, tables, ix, iy, iz, ox, oy, oz):
 
 
 @njit(**PART)
-def conserving_point_single(R, tables, thread_set, thread, psi0, ix, iy, iz, ox, oy, oz):
-    """`conserving_single` of the thread under a point; the mean over the repeat is that value.
+def conserving_point_single(R, tables, place, ix, iy, iz, ox, oy, oz):
+    """`conserving_single` at a `Place` on a thread; the mean over the repeat is that value.
 
-    psi0 : tangent angle at the point [rad]
-
-    The value is 0 on a thread of another model.
+    The value is 0 on a thread of another model. `place.w` is not read.
     """
-    row = tables.threads[thread]
+    row = tables.threads[place.thread]
     scale = visible(R, tables, ix, iy, iz) * visible(R, tables, ox, oy, oz) * abs(iz)
     if tables.opaque != 0 and (iz > R(0)) != (oz > R(0)):
         scale = R(0)
     if scale == R(0) or row[LAW] != R(CONSERVING):
         return R(0), R(0), R(0)
-    angle = min(max(psi0, R(-PILE_ANGLE)), R(PILE_ANGLE))
+    angle = min(max(place.psi0, R(-PILE_ANGLE)), R(PILE_ANGLE))
     c, s = cos(R, angle), sin(R, angle)
-    surface, volume = facet_terms(R, tables, thread_set, thread, c, s, ix, iy, iz, ox, oy, oz)
+    surface, volume = facet_terms(R, row, place.thread_set, c, s, ix, iy, iz, ox, oy, oz)
     scale /= max(c, R(_STEEPEST_COS))
     return (
         scale * (surface + volume * row[ALBEDO_R]),

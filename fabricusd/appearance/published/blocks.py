@@ -9,15 +9,15 @@ from __future__ import annotations
 from numba import njit
 
 from fabricusd.appearance.frame import WARP
-from fabricusd.appearance.published.segment import along_set, seen_along
+from fabricusd.appearance.published.segment import SetPair, along_set, seen_along
 from fabricusd.appearance.published.tables import NODE_COS, NODE_SIN, NODE_WEIGHT
 from fabricusd.kernels.real import BLOCK, INLINE, index
 
-AXIS_I, ACROSS_I, UP_I, SCALE_I = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
-AXIS_O, ACROSS_O, UP_O, SCALE_O = 4 * BLOCK, 5 * BLOCK, 6 * BLOCK, 7 * BLOCK
+ALONG_I, ACROSS_I, UP_I, SCALE_I = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
+ALONG_O, ACROSS_O, UP_O, SCALE_O = 4 * BLOCK, 5 * BLOCK, 6 * BLOCK, 7 * BLOCK
 OVERLAP = 8 * BLOCK
 NORMALIZATION, RED, GREEN, BLUE = 9 * BLOCK, 10 * BLOCK, 11 * BLOCK, 12 * BLOCK
-"""Offsets of the rows: the results of `segment.along_set` (UP is N.w), then the sums."""
+"""Offsets of the rows: the fields of `segment.SetPair`, then the sums."""
 
 ROWS = 13
 
@@ -39,23 +39,21 @@ def prepare(R, thread_set, precision, wi, wo, start, size, block, at=0):
     for y in range(size):
         x, k = at + y, index(start, y)
         iz, oz = wi[2, k], wo[2, k]
-        a_i, b_i, scale_i, a_o, b_o, scale_o, u = along_set(
-            R, thread_set, precision,
-            wi[0, k], wi[1, k], iz, wo[0, k], wo[1, k], oz,
-        )  # fmt: skip
-        block[AXIS_I + x], block[ACROSS_I + x] = a_i, b_i
-        block[UP_I + x], block[SCALE_I + x] = iz, scale_i
-        block[AXIS_O + x], block[ACROSS_O + x] = a_o, b_o
-        block[UP_O + x], block[SCALE_O + x] = oz, scale_o
-        block[OVERLAP + x] = u
+        pair = along_set(R, thread_set, precision, wi[0, k], wi[1, k], iz, wo[0, k], wo[1, k], oz)
+        block[ALONG_I + x], block[ACROSS_I + x] = pair.along_i, pair.across_i
+        block[UP_I + x], block[SCALE_I + x] = pair.up_i, pair.scale_i
+        block[ALONG_O + x], block[ACROSS_O + x] = pair.along_o, pair.across_o
+        block[UP_O + x], block[SCALE_O + x] = pair.up_o, pair.scale_o
+        block[OVERLAP + x] = pair.overlap
 
 
 @njit(**INLINE)
-def masking_at(R, c, s, block, x):
-    """`P` of entry x of a block."""
-    return seen_along(
-        R, c, s, block[AXIS_I + x], block[UP_I + x], block[SCALE_I + x],
-        block[AXIS_O + x], block[UP_O + x], block[SCALE_O + x], block[OVERLAP + x],
+def pair_at(block, x):
+    """The `SetPair` of entry x of a block."""
+    return SetPair(
+        block[ALONG_I + x], block[ACROSS_I + x], block[UP_I + x], block[SCALE_I + x],
+        block[ALONG_O + x], block[ACROSS_O + x], block[UP_O + x], block[SCALE_O + x],
+        block[OVERLAP + x],
     )  # fmt: skip
 
 
@@ -68,7 +66,7 @@ def add_masking(R, tables, k, size, block, at=0):
         tables.nodes[k, NODE_WEIGHT],
     )
     for x in range(size):
-        block[NORMALIZATION + x] += weight * masking_at(R, c, s, block, at + x)
+        block[NORMALIZATION + x] += weight * seen_along(R, c, s, pair_at(block, at + x))
 
 
 @njit(**INLINE)

@@ -13,22 +13,16 @@ from numba import njit
 
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.published.blocks import (
-    ACROSS_I,
-    ACROSS_O,
-    AXIS_I,
-    AXIS_O,
     BLUE,
     GREEN,
     NORMALIZATION,
     NOTHING,
     RED,
     ROWS,
-    UP_I,
-    UP_O,
     add_masking,
     divide,
-    masking_at,
     node_range,
+    pair_at,
     prepare,
 )
 from fabricusd.appearance.published.segment import (
@@ -51,29 +45,22 @@ def normalization(R, tables, ix, iy, iz, ox, oy, oz):
     q = tables.gap * oz
     for thread_set in (WEFT, WARP):
         first, last = node_range(tables, thread_set)
-        a_i, _, scale_i, a_o, _, scale_o, u = along_set(
-            R, thread_set, tables.overlap_precision, ix, iy, iz, ox, oy, oz
-        )
+        pair = along_set(R, thread_set, tables.overlap_precision, ix, iy, iz, ox, oy, oz)
         for k in range(first, last):
-            p = seen_along(
-                R, tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN],
-                a_i, iz, scale_i, a_o, oz, scale_o, u,
-            )  # fmt: skip
+            p = seen_along(R, tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN], pair)
             q += tables.nodes[k, NODE_WEIGHT] * p
     return q
 
 
 @njit(**INLINE)
-def node_terms(R, tables, k, a_i, b_i, iz, a_o, b_o, oz):
+def node_terms(R, tables, k, pair):
     """`f_s M cos theta_i` at node k: (surface, volume without `A`)."""
     c, s, half = tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN], tables.nodes[k, NODE_HALF]
     row = tables.threads[tables.node_thread[k]]
     model = int(row[MODEL])
     if half > R(0):
-        return mean_segment(
-            R, model, row, half, tables.overlap_precision, c, s, a_i, b_i, iz, a_o, b_o, oz
-        )
-    return segment(R, model, row, tables.overlap_precision, c, s, a_i, b_i, iz, a_o, b_o, oz)
+        return mean_segment(R, model, row, half, tables.overlap_precision, c, s, pair)
+    return segment(R, model, row, tables.overlap_precision, c, s, pair)
 
 
 @njit(**PART)
@@ -86,20 +73,15 @@ def far_value(R, tables, ix, iy, iz, ox, oy, oz):
     red, green, blue = none, none, none
     for thread_set in (WEFT, WARP):
         first, last = node_range(tables, thread_set)
-        a_i, b_i, scale_i, a_o, b_o, scale_o, u = along_set(
-            R, thread_set, tables.overlap_precision, ix, iy, iz, ox, oy, oz
-        )
+        pair = along_set(R, thread_set, tables.overlap_precision, ix, iy, iz, ox, oy, oz)
         for k in range(first, last):
-            p = seen_along(
-                R, tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN],
-                a_i, iz, scale_i, a_o, oz, scale_o, u,
-            )  # fmt: skip
+            p = seen_along(R, tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN], pair)
             p *= tables.nodes[k, NODE_WEIGHT]
             q += p
             # A node that faces away from either direction adds nothing; NaN is passed on.
             if p == none or tables.published[k] == 0:
                 continue
-            surface, volume = node_terms(R, tables, k, a_i, b_i, iz, a_o, b_o, oz)
+            surface, volume = node_terms(R, tables, k, pair)
             row = tables.threads[tables.node_thread[k]]
             red += p * (surface + volume * row[ALBEDO_R])
             green += p * (surface + volume * row[ALBEDO_G])
@@ -142,12 +124,9 @@ def _add_point(R, model, tables, k, row, size, block):
     )
     red, green, blue = row[ALBEDO_R], row[ALBEDO_G], row[ALBEDO_B]
     for x in range(size):
-        p = weight * masking_at(R, c, s, block, x)
-        surface, volume = segment(
-            R, model, row, tables.overlap_precision, c, s,
-            block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x],
-            block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x],
-        )  # fmt: skip
+        pair = pair_at(block, x)
+        p = weight * seen_along(R, c, s, pair)
+        surface, volume = segment(R, model, row, tables.overlap_precision, c, s, pair)
         block[NORMALIZATION + x] += p
         block[RED + x] += p * (surface + volume * red)
         block[GREEN + x] += p * (surface + volume * green)
@@ -164,12 +143,9 @@ def _add_cell(R, model, tables, k, row, size, block):
     half = tables.nodes[k, NODE_HALF]
     red, green, blue = row[ALBEDO_R], row[ALBEDO_G], row[ALBEDO_B]
     for x in range(size):
-        p = weight * masking_at(R, c, s, block, x)
-        surface, volume = mean_segment(
-            R, model, row, half, tables.overlap_precision, c, s,
-            block[AXIS_I + x], block[ACROSS_I + x], block[UP_I + x],
-            block[AXIS_O + x], block[ACROSS_O + x], block[UP_O + x],
-        )  # fmt: skip
+        pair = pair_at(block, x)
+        p = weight * seen_along(R, c, s, pair)
+        surface, volume = mean_segment(R, model, row, half, tables.overlap_precision, c, s, pair)
         block[NORMALIZATION + x] += p
         block[RED + x] += p * (surface + volume * red)
         block[GREEN + x] += p * (surface + volume * green)

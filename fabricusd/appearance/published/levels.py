@@ -16,8 +16,8 @@ from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.published.blocks import (
     ACROSS_I,
     ACROSS_O,
-    AXIS_I,
-    AXIS_O,
+    ALONG_I,
+    ALONG_O,
     BLUE,
     GREEN,
     NORMALIZATION,
@@ -33,7 +33,7 @@ from fabricusd.appearance.published.blocks import (
     prepare,
 )
 from fabricusd.appearance.published.far import normalization
-from fabricusd.appearance.published.segment import along_set, seen_along, segment
+from fabricusd.appearance.published.segment import SetPair, along_set, seen_along, segment
 from fabricusd.appearance.scattering.across import across_at
 from fabricusd.appearance.scattering.columns import (
     ALBEDO_B,
@@ -59,27 +59,24 @@ _NO_MODEL = -1.0
 
 
 @njit(**PART)
-def point_value(R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, ox, oy, oz):
-    """(r, g, b) of the published models on `thread` of `thread_set` at tangent angle psi0 [rad].
+def point_value(R, tables, across_too, place, ix, iy, iz, ox, oy, oz):
+    """(r, g, b) of the published models at a `Place` on a thread.
 
-    across_too : evaluate level `thread` at `w` in [-1, 1] across the visible width, not `weave`
+    across_too : evaluate level `thread` at `place.w`, not level `weave`
     """
     none = R(0)
-    row = tables.threads[thread]
+    row = tables.threads[place.thread]
     if iz <= none or oz <= none or row[LAW] != R(PUBLISHED):
         return none, none, none
     q = normalization(R, tables, ix, iy, iz, ox, oy, oz)
     if q <= R(NOTHING):
         return none, none, none
-    a_i, b_i, scale_i, a_o, b_o, scale_o, u = along_set(
-        R, thread_set, tables.overlap_precision, ix, iy, iz, ox, oy, oz
+    pair = along_set(R, place.thread_set, tables.overlap_precision, ix, iy, iz, ox, oy, oz)
+    c, s = cos(R, place.psi0), sin(R, place.psi0)
+    p = seen_along(R, c, s, pair)
+    surface, volume = _segment_at(
+        R, int(row[MODEL]), across_too, row, tables.overlap_precision, c, s, place.w, pair
     )
-    c, s = cos(R, psi0), sin(R, psi0)
-    p = seen_along(R, c, s, a_i, iz, scale_i, a_o, oz, scale_o, u)
-    surface, volume = _bit_of_thread(
-        R, int(row[MODEL]), across_too, row, tables.overlap_precision,
-        c, s, w, a_i, b_i, iz, a_o, b_o, oz,
-    )  # fmt: skip
     p /= q
     surface *= p
     volume *= p
@@ -91,34 +88,27 @@ def point_value(R, tables, across_too, thread_set, thread, psi0, w, ix, iy, iz, 
 
 
 @njit(**INLINE)
-def _bit_of_thread(R, model, across_too, row, precision, c, s, w, a_i, b_i, iz, a_o, b_o, oz):
+def _segment_at(R, model, across_too, row, precision, c, s, w, pair):
     """`segment`, times the factors across the width if `across_too`."""
-    surface, volume = segment(R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz)
+    surface, volume = segment(R, model, row, precision, c, s, pair)
     if across_too:
-        n_i, n_o = s * a_i + c * iz, s * a_o + c * oz
-        on_surface, on_volume = across_at(R, row, w, b_i, n_i, b_o, n_o)
+        n_i, n_o = s * pair.along_i + c * pair.up_i, s * pair.along_o + c * pair.up_o
+        on_surface, on_volume = across_at(R, row, w, pair.across_i, n_i, pair.across_o, n_o)
         return surface * on_surface, volume * on_volume
     return surface, volume
 
 
 @njit(**KERNEL)
-def point_values(R, tables, across_too, sets, threads, psi0, w, wi, wo, out, begin, end):
-    """`point_value` at the places from `begin` to `end` - 1.
-
-    sets, threads : (n,) ints; psi0, w : (n,) real; wi, wo, out : (3, n) real
-    """
+def point_values(R, tables, across_too, places, wi, wo, out, begin, end):
+    """`point_value` at the n `Places` from `begin` to `end` - 1; wi, wo, out : (3, n) real."""
     block = np.empty(POINT_ROWS * BLOCK, wi.dtype)
     for start in range(begin, end, BLOCK):
-        point_block(
-            R, tables, across_too, sets, threads, psi0, w, start, wi, wo, out, start,
-            min(BLOCK, end - start), block,
-        )  # fmt: skip
+        size = min(BLOCK, end - start)
+        point_block(R, tables, across_too, places, start, wi, wo, out, start, size, block)
 
 
 @njit(**PART)
-def point_block(
-    R, tables, across_too, sets, threads, psi0, w, first, wi, wo, out, start, size, block
-):
+def point_block(R, tables, across_too, places, first, wi, wo, out, start, size, block):
     """`size` entries of `point_values`.
 
     first : index of the first place; start : index of the first pair of directions and result
@@ -136,7 +126,7 @@ def point_block(
         add_masking(R, tables, k, size, block)
     for k in range(tables.warp_start, tables.nodes.shape[0]):
         add_masking(R, tables, k, size, block, _WARP)
-    _copy_threads(R, tables, sets, threads, psi0, w, first, size, block)
+    _copy_threads(R, tables, places, first, size, block)
     _of_models(R, tables, across_too, size, block)
     divide(R, out, start, size, block)
 
@@ -150,20 +140,20 @@ def _has_model(R, tables, model):
 
 
 @njit(**INLINE)
-def _copy_threads(R, tables, sets, threads, psi0, w, first, size, block):
+def _copy_threads(R, tables, places, first, size, block):
     """Copy set, tangent angle, place across and the thread's numbers for a block of points."""
     for x in range(size):
         k = index(first, x)
-        which, thread = sets[k], np.uintp(threads[k])
+        which, thread = places.sets[k], np.uintp(places.threads[k])
         block[_IS_WARP + x] = R(1) if which == WARP else R(0)
-        block[_ACROSS + x] = w[k]
+        block[_ACROSS + x] = places.w[k]
         for column in range(POINT_COLUMNS):
             block[_THREAD + column * BLOCK + x] = tables.threads[thread, column]
         if which != WEFT and which != WARP:
             block[_THREAD + MODEL * BLOCK + x] = R(_NO_MODEL)
     for x in range(size):
         k = index(first, x)
-        block[_COS + x], block[_SIN + x] = cos(R, psi0[k]), sin(R, psi0[k])
+        block[_COS + x], block[_SIN + x] = cos(R, places.psi0[k]), sin(R, places.psi0[k])
 
 
 _row_at = tuple_reader(POINT_COLUMNS, BLOCK)
@@ -186,16 +176,16 @@ def _of_model(R, model, tables, across_too, size, block):
     for x in range(size):
         row = _row_at(block, _THREAD + x)
         c, s, warp = block[_COS + x], block[_SIN + x], block[_IS_WARP + x] > R(0)
-        iz, oz = block[UP_I + x], block[UP_O + x]
-        a_i, b_i = _own(block, AXIS_I + x, warp), _own(block, ACROSS_I + x, warp)
-        a_o, b_o = _own(block, AXIS_O + x, warp), _own(block, ACROSS_O + x, warp)
-        scale_i, scale_o = _own(block, SCALE_I + x, warp), _own(block, SCALE_O + x, warp)
-        u = _own(block, OVERLAP + x, warp)
-        p = seen_along(R, c, s, a_i, iz, scale_i, a_o, oz, scale_o, u)
-        surface, volume = _bit_of_thread(
-            R, model, across_too, row, precision, c, s, block[_ACROSS + x],
-            a_i, b_i, iz, a_o, b_o, oz,
+        pair = SetPair(
+            _own(block, ALONG_I + x, warp), _own(block, ACROSS_I + x, warp), block[UP_I + x],
+            _own(block, SCALE_I + x, warp), _own(block, ALONG_O + x, warp),
+            _own(block, ACROSS_O + x, warp), block[UP_O + x], _own(block, SCALE_O + x, warp),
+            _own(block, OVERLAP + x, warp),
         )  # fmt: skip
+        p = seen_along(R, c, s, pair)
+        surface, volume = _segment_at(
+            R, model, across_too, row, precision, c, s, block[_ACROSS + x], pair
+        )
         share = p if row[MODEL] == R(model) else R(0)
         block[RED + x] += share * (surface + volume * row[ALBEDO_R])
         block[GREEN + x] += share * (surface + volume * row[ALBEDO_G])

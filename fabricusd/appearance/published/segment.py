@@ -7,6 +7,7 @@ tracer. Both directions are above the cloth. Source: `docs/model.md` section 4, 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from numba import njit
 
@@ -22,6 +23,26 @@ from fabricusd.appearance.scattering.terms import (
     published_lobes,
 )
 from fabricusd.kernels.real import INLINE, acos, exp
+
+
+class SetPair(NamedTuple):
+    """A pair of directions in the frame of a thread set: what all threads of the set share.
+
+    along, across : real - components along the axis of the set and across it
+    up : real - N.w
+    scale : real - 1/|w without across|, so that cos psi = n_t.w scale at any tangent angle
+    overlap : real - `overlap` of the longitudes psi, which a tangent angle shifts equally
+    """
+
+    along_i: Any
+    across_i: Any
+    up_i: Any
+    scale_i: Any
+    along_o: Any
+    across_o: Any
+    up_o: Any
+    scale_o: Any
+    overlap: Any
 
 
 @njit(**INLINE)
@@ -42,31 +63,27 @@ def overlap(R, cos_half, precision):
 
 @njit(**INLINE)
 def along_set(R, thread_set, precision, ix, iy, iz, ox, oy, oz):
-    """The quantities that all threads of a set share: (a_i, b_i, scale_i, a_o, b_o, scale_o, u).
-
-    a, b : components along the axis of the set and across it
-    scale : 1/|w without b|, so that cos psi = n_t.w scale at any tangent angle
-    u : `overlap` of the longitudes psi, which a tangent angle shifts by the same amount
-    """
+    """The `SetPair` of two directions in the surface frame."""
     warp = thread_set == WARP
     a_i, b_i = (iy, -ix) if warp else (ix, iy)
     a_o, b_o = (oy, -ox) if warp else (ox, oy)
     scale_i = R(1) / math.sqrt(a_i * a_i + iz * iz)
     scale_o = R(1) / math.sqrt(a_o * a_o + oz * oz)
     cos_half = cos_half_difference(R, a_i * scale_i, iz * scale_i, a_o * scale_o, oz * scale_o)
-    return a_i, b_i, scale_i, a_o, b_o, scale_o, overlap(R, cos_half, precision)
+    u = overlap(R, cos_half, precision)
+    return SetPair(a_i, b_i, iz, scale_i, a_o, b_o, oz, scale_o, u)
 
 
 @njit(**INLINE)
-def seen_along(R, c, s, a_i, iz, scale_i, a_o, oz, scale_o, u):
+def seen_along(R, c, s, pair):
     """`P` at the tangent angle with cosine c and sine s."""
-    x = max(s * a_i + c * iz, R(0)) * scale_i
-    y = max(s * a_o + c * oz, R(0)) * scale_o
-    return masked(R, x, y, u)
+    x = max(s * pair.along_i + c * pair.up_i, R(0)) * pair.scale_i
+    y = max(s * pair.along_o + c * pair.up_o, R(0)) * pair.scale_o
+    return masked(R, x, y, pair.overlap)
 
 
 @njit(**INLINE)
-def segment(R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
+def segment(R, model, row, precision, c, s, pair):
     """`f_s M cos theta_i` as (surface, volume without `A`); 0 where `M` is 0.
 
     model : the number of the row's model, which must be a published one
@@ -74,17 +91,17 @@ def segment(R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
     Multiplied by `seen_along`, this is the integrand of level `far`.
     """
     t_i, cos_i, _, t_o, cos_o, _, surface, volume = _masked_factors(
-        R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz
+        R, model, row, precision, c, s, pair
     )
     on_surface, on_volume = published_lobes(R, model, row, t_i, cos_i, t_o, cos_o)
     return surface * on_surface, volume * on_volume
 
 
 @njit(**INLINE)
-def mean_segment(R, model, row, half, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
+def mean_segment(R, model, row, half, precision, c, s, pair):
     """`segment` with its lobes averaged over tangent angles `half` [rad] to each side."""
     t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o, surface, volume = _masked_factors(
-        R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz
+        R, model, row, precision, c, s, pair
     )
     on_surface, on_volume = cell_lobes(
         R, model, row, half, t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o
@@ -93,12 +110,14 @@ def mean_segment(R, model, row, half, precision, c, s, a_i, b_i, iz, a_o, b_o, o
 
 
 @njit(**INLINE)
-def _masked_factors(R, model, row, precision, c, s, a_i, b_i, iz, a_o, b_o, oz):
+def _masked_factors(R, model, row, precision, c, s, pair):
     """(t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o, surface, volume).
 
     The first six are the sine and cosine of the inclination and the cosine of the azimuth of wi and
     of wo; the last two are the factors of the model times `M cos theta_i`.
     """
+    a_i, b_i, iz = pair.along_i, pair.across_i, pair.up_i
+    a_o, b_o, oz = pair.along_o, pair.across_o, pair.up_o
     t_i, n_i = c * a_i - s * iz, s * a_i + c * iz
     t_o, n_o = c * a_o - s * oz, s * a_o + c * oz
     cos_i, cos_o = cos_inclination(R, b_i, n_i), cos_inclination(R, b_o, n_o)

@@ -13,6 +13,7 @@ from fabricusd.appearance.published.tables import SurfaceTables
 from fabricusd.appearance.sampling.fit import Singles, fitted_mixture
 from fabricusd.appearance.sampling.mixture import Mixture
 from fabricusd.appearance.sampling.stretches import OF_SET, OF_THREAD, PSI0
+from fabricusd.appearance.weave.place import Place
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import KERNEL
 
@@ -57,7 +58,7 @@ def _in_single_precision(tables: SurfaceTables) -> SurfaceTables:
 def _point_values(R, tables, stretch, wi, wo, out):
     """`point_value` at level `weave` of all pairs on a stretch: wi, wo, out are (3, n)."""
     for k in range(wi.shape[1]):
+        place = Place(int(stretch[OF_SET]), int(stretch[OF_THREAD]), stretch[PSI0], R(0))
         out[0, k], out[1, k], out[2, k] = point_value(
-            R, tables, False, int(stretch[OF_SET]), int(stretch[OF_THREAD]), stretch[PSI0], R(0),
-            wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k],
-        )  # fmt: skip
+            R, tables, False, place, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
+        )

@@ -10,9 +10,11 @@ overlap.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from fabricusd.appearance.sampling.lobes import (
     STEEPEST,
@@ -35,6 +37,7 @@ from fabricusd.appearance.sampling.stretches import (
     SURFACE_WIDTH,
     TAN,
     VOLUME_WIDTH,
+    Stretch,
     nearest_stretch,
 )
 from fabricusd.appearance.sampling.views import share_at, view_corner
@@ -62,20 +65,56 @@ _shares_of = tuple_reader(THREAD_LOBES, BLOCK)
 """Called with (block, _OURS + x): the shares of the lobes of the current stretch."""
 
 
+class Drawn(NamedTuple):
+    """The arrays that the samplers write; `real` is their precision.
+
+    go : (3, n) real - the drawn directions
+    p_light, p_go : real - the densities [1/sr] of the direction to the light and of `go`
+    """
+
+    go: NDArray[Any]
+    p_light: NDArray[Any]
+    p_go: NDArray[Any]
+
+
 @njit(**INLINE)
-def _into(R, warp, c, s, x, y, z):
-    """`frame.to_thread` without a branch: (w.t, w.b, w.n_t); warp : 1 on the warp, 0 on the
-    weft."""
+def _stretch_at(block, x):
+    """The `Stretch` of entry x, whose set is a number of type R."""
+    return Stretch(
+        block[_WARP + x], block[_PSI0 + x], block[_COS + x], block[_SIN + x], block[_TAN + x],
+        block[_ON_SURFACE + x], block[_ON_VOLUME + x],
+    )  # fmt: skip
+
+
+@njit(**INLINE)
+def _into(R, stretch, x, y, z):
+    """`frame.to_thread` without a branch: (w.t, w.b, w.n_t)."""
+    warp, c, s = stretch.thread_set, stretch.cos, stretch.sin
     along = warp * y + (R(1) - warp) * x
     across = (R(1) - warp) * y - warp * x
     return c * along - s * z, across, s * along + c * z
 
 
 @njit(**INLINE)
-def _lobes_at(R, warp, psi0, c, s, tangent, surface, volume, theta_o, x, y, z, shares, narrow):
+def _viewer(R, stretch, block, x):
+    """(theta_o [rad], w.b, w.n_t) of entry x's viewer in the frame of a stretch."""
+    t_o, b_o, n_o = _into(R, stretch, block[_OX + x], block[_OY + x], block[_OZ + x])
+    return atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o)), b_o, n_o
+
+
+@njit(**INLINE)
+def _outwards(R, stretch, t, b, n):
+    """`frame.from_thread` without a branch."""
+    warp, c, s = stretch.thread_set, stretch.cos, stretch.sin
+    along, z = c * t + s * n, c * n - s * t
+    return warp * -b + (R(1) - warp) * along, warp * along + (R(1) - warp) * b, z
+
+
+@njit(**INLINE)
+def _lobes_at(R, stretch, theta_o, x, y, z, shares, narrow):
     """The sum of the lobes' densities at a direction times their shares; 0 behind the thread."""
-    t, across, n = _into(R, warp, c, s, x, y, z)
-    found = lobe_densities(R, psi0, tangent, surface, volume, theta_o, t, across, max(n, R(1e-12)))
+    t, across, n = _into(R, stretch, x, y, z)
+    found = lobe_densities(R, stretch, theta_o, t, across, max(n, R(1e-12)))
     p = mixed(shares, narrowed(found, narrow))
     return p if n > R(0) else R(0)
 
@@ -148,17 +187,11 @@ def _choose(R, even, shares, count, u0, block, x):
 def _draw(R, size, block):
     """Draw directions from the chosen lobes, in the surface frame."""
     for x in range(size):
-        warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
-        lobe = block[_LOBE + x]
+        stretch, lobe = _stretch_at(block, x), block[_LOBE + x]
         u1, u2 = block[_U1 + x], block[_U2 + x]
-        t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
-        theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-        t, b, n = sample_any_lobe(
-            R, lobe, block[_PSI0 + x], block[_TAN + x], block[_ON_SURFACE + x],
-            block[_ON_VOLUME + x], theta_o, u1, u2,
-        )  # fmt: skip
-        along, z = c * t + s * n, c * n - s * t
-        gx, gy = warp * -b + (R(1) - warp) * along, warp * along + (R(1) - warp) * b
+        theta_o, _, _ = _viewer(R, stretch, block, x)
+        t, b, n = sample_any_lobe(R, lobe, stretch, theta_o, u1, u2)
+        gx, gy, z = _outwards(R, stretch, t, b, n)
         flat = math.sqrt(max(R(0), (R(1) - u1) * (R(1) + u1)))
         phi = R(2 * math.pi) * u2
         even = lobe == R(_EVEN)
@@ -168,13 +201,13 @@ def _draw(R, size, block):
 
 
 @njit(**INLINE)
-def _store(R, start, size, block, go, p_light, p_go, first):
+def _store(R, start, size, block, drawn, first):
     """Write the directions and densities of a block; the densities are 0 at or below the cloth."""
     for row in range(3):
-        drawn = go[row][start:]
+        go = drawn.go[row][start:]
         for x in range(size):
-            drawn[x] = block[_GX + row * BLOCK + x]
-    to_light, onwards = p_light[first + start :], p_go[first + start :]
+            go[x] = block[_GX + row * BLOCK + x]
+    to_light, onwards = drawn.p_light[first + start :], drawn.p_go[first + start :]
     for x in range(size):
         lit = block[_IZ + x] > R(0) and block[_OZ + x] > R(0)
         to_light[x] = block[_P_LIGHT + x] if lit else R(0)
@@ -183,15 +216,15 @@ def _store(R, start, size, block, go, p_light, p_go, first):
 
 
 @njit(**KERNEL)
-def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first, n):
+def sample_far(R, sampling, wo, wi, numbers, drawn, first, n):
     """`mixture.direction` for `n` viewers, and `mixture.density` of it and of the light's
     direction.
 
     wo, wi : (3, n) real - directions to the viewer and to the light
-    go : (3, n) real - receives the drawn directions
-    u0, u1, u2 : real - uniform numbers, read from `first` to `first + n - 1`
-    p_light, p_go : real - receive the densities of wi and of go, at the same indices
+    numbers : three rows of uniform reals, read from `first` to `first + n - 1`
+    drawn : a `Drawn`; the densities are written from `first` to `first + n - 1`
     """
+    u0, u1, u2 = numbers
     stretches = sampling.stretches
     lobes = THREAD_LOBES * stretches.shape[0]
     block = np.empty(_SHARES + lobes * BLOCK, wo.dtype)
@@ -220,51 +253,49 @@ def sample_far(R, sampling, wo, wi, u0, u1, u2, go, p_light, p_go, first, n):
             block[_P_LIGHT + x] = block[_P_GO + x] = sampling.even * R(1 / (2 * math.pi))
         for y in range(stretches.shape[0]):
             _add_stretch(R, stretches[y], _SHARES + THREAD_LOBES * y * BLOCK, size, block)
-        _store(R, start, size, block, go, p_light, p_go, first)
+        _store(R, start, size, block, drawn, first)
 
 
 @njit(**PART)
 def _add_stretch(R, row, shares, size, block):
     """Add a stretch's part of both densities."""
-    warp = R(1) if int(row[OF_SET]) == WARP else R(0)
-    psi0, c, s, tangent = row[PSI0], row[COS], row[SIN], row[TAN]
-    surface, volume = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
+    stretch = Stretch(
+        R(1) if int(row[OF_SET]) == WARP else R(0), row[PSI0], row[COS], row[SIN], row[TAN],
+        row[SURFACE_WIDTH], row[VOLUME_WIDTH],
+    )  # fmt: skip
     # Copy the shares to a fixed offset: with an offset unknown to the compiler, the loop below
     # would stay scalar.
     for x in range(THREAD_LOBES * BLOCK):
         block[_OURS + x] = block[shares + x]
     for x in range(size):
-        t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
-        theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
+        theta_o, _, _ = _viewer(R, stretch, block, x)
         ours = _shares_of(block, _OURS + x)
         block[_P_LIGHT + x] += _lobes_at(
-            R, warp, psi0, c, s, tangent, surface, volume, theta_o,
-            block[_IX + x], block[_IY + x], block[_IZ + x], ours, R(1),
-        )  # fmt: skip
+            R, stretch, theta_o, block[_IX + x], block[_IY + x], block[_IZ + x], ours, R(1)
+        )
         block[_P_GO + x] += _lobes_at(
-            R, warp, psi0, c, s, tangent, surface, volume, theta_o,
-            block[_GX + x], block[_GY + x], block[_GZ + x], ours, R(1),
-        )  # fmt: skip
+            R, stretch, theta_o, block[_GX + x], block[_GY + x], block[_GZ + x], ours, R(1)
+        )
 
 
 @njit(**KERNEL)
-def sample_points(R, table, sampling, across_too, sets, threads, psi0, w, wo, wi, u0, u1, u2, go,
-                  p_light, p_go, first, n):  # fmt: skip
+def sample_points(R, table, sampling, across_too, places, wo, wi, numbers, drawn, first, n):
     """`sample_far` with `point_direction` and `point_density`, at the threads under the hits.
 
     table : rows of `pack_threads`
-    sets, threads, psi0, w : (n,) - what lies under each hit; a gap is sampled uniformly
+    places : `Places` of n hits; a gap is sampled uniformly
     """
+    u0, u1, u2 = numbers
     block = np.empty(_SHARES, wo.dtype)
     for start in range(0, n, BLOCK):
         size = min(BLOCK, n - start)
         _load(wo, wi, start, size, block)
         _find_views(R, size, block)
-        _find_threads(R, table, sampling, sets, threads, psi0, w, start, size, block)
+        _find_threads(R, table, sampling, places, start, size, block)
         for x in range(size):
             h = first + start + x
             block[_U1 + x], block[_U2 + x] = u1[h], u2[h]
-            on_thread = sets[start + x] <= WARP and sampling.stretches.shape[0] > 0
+            on_thread = places.sets[start + x] <= WARP and sampling.stretches.shape[0] > 0
             count = THREAD_LOBES if on_thread else 0
             k = _choose(R, sampling.even, _OURS, count, u0[h], block, x)
             block[_LOBE + x] = R(_EVEN) if k < 0 else R(k)
@@ -277,12 +308,13 @@ def sample_points(R, table, sampling, across_too, sets, threads, psi0, w, wo, wi
         if across_too:
             _narrow(R, size, block)
         _add_points(R, sampling.even, size, block)
-        _store(R, start, size, block, go, p_light, p_go, first)
+        _store(R, start, size, block, drawn, first)
 
 
 @njit(**PART)
-def _find_threads(R, table, sampling, sets, threads, psi0, w, start, size, block):
+def _find_threads(R, table, sampling, places, start, size, block):
     """Read the thread under each hit and the shares of its lobes, which are 0 in a gap."""
+    sets, threads, psi0, w = places
     for x in range(size):
         on_thread = sets[start + x] <= WARP and sampling.stretches.shape[0] > 0
         thread_set, thread, angle = 0, 0, R(0)
@@ -318,17 +350,15 @@ def _turn(R, size, block):
 def _draw_across(R, size, block):
     """Draw from the surface lobe at level `thread`, in place of the directions of `_draw`."""
     for x in range(size):
-        warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
-        t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
-        theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-        width = block[_ON_SURFACE + x]
+        stretch = _stretch_at(block, x)
+        theta_o, b_o, n_o = _viewer(R, stretch, block, x)
         t, b, n = sample_across(
-            R, block[_PSI0 + x], block[_TAN + x], width, theta_o, azimuth_seen(R, b_o, n_o),
-            block[_W + x], across_deviation(R, block[_GAMMA + x]), block[_U1 + x], block[_U2 + x],
+            R, stretch.psi0, stretch.tan, stretch.surface_width, theta_o,
+            azimuth_seen(R, b_o, n_o), block[_W + x], across_deviation(R, block[_GAMMA + x]),
+            block[_U1 + x], block[_U2 + x],
         )  # fmt: skip
-        along, z = c * t + s * n, c * n - s * t
+        gx, gy, z = _outwards(R, stretch, t, b, n)
         ours = block[_LOBE + x] == R(SURFACE)
-        gx, gy = warp * -b + (R(1) - warp) * along, warp * along + (R(1) - warp) * b
         block[_GX + x] = gx if ours else block[_GX + x]
         block[_GY + x] = gy if ours else block[_GY + x]
         block[_GZ + x] = z if ours else block[_GZ + x]
@@ -338,15 +368,15 @@ def _draw_across(R, size, block):
 def _narrow(R, size, block):
     """Compute the factors of the position across the thread on both surface densities."""
     for x in range(size):
-        warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
-        _, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
+        stretch = _stretch_at(block, x)
+        _, b_o, n_o = _into(R, stretch, block[_OX + x], block[_OY + x], block[_OZ + x])
         phi_o, w = azimuth_seen(R, b_o, n_o), block[_W + x]
-        beta, tangent = across_deviation(R, block[_GAMMA + x]), block[_TAN + x]
-        t, b, n = _into(R, warp, c, s, block[_IX + x], block[_IY + x], block[_IZ + x])
+        beta, tangent = across_deviation(R, block[_GAMMA + x]), stretch.tan
+        t, b, n = _into(R, stretch, block[_IX + x], block[_IY + x], block[_IZ + x])
         block[_NARROW_LIGHT + x] = density_across(
             R, tangent, phi_o, w, beta, t, b, max(n, R(1e-12))
         )
-        t, b, n = _into(R, warp, c, s, block[_GX + x], block[_GY + x], block[_GZ + x])
+        t, b, n = _into(R, stretch, block[_GX + x], block[_GY + x], block[_GZ + x])
         block[_NARROW_GO + x] = density_across(R, tangent, phi_o, w, beta, t, b, max(n, R(1e-12)))
 
 
@@ -354,20 +384,17 @@ def _narrow(R, size, block):
 def _add_points(R, uniform, size, block):
     """Compute both densities from the lobes of each hit's own thread."""
     for x in range(size):
-        warp, c, s = block[_WARP + x], block[_COS + x], block[_SIN + x]
-        t_o, b_o, n_o = _into(R, warp, c, s, block[_OX + x], block[_OY + x], block[_OZ + x])
-        theta_o = atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
+        stretch = _stretch_at(block, x)
+        theta_o, _, _ = _viewer(R, stretch, block, x)
         ours = _shares_of(block, _OURS + x)
-        angle, tangent = block[_PSI0 + x], block[_TAN + x]
-        surface, volume = block[_ON_SURFACE + x], block[_ON_VOLUME + x]
         # In a gap all shares are 0 and every direction is drawn uniformly.
         even = R(1 / (2 * math.pi))
         even = uniform * even if mixed(ours, ours) > R(0) else even
         block[_P_LIGHT + x] = even + _lobes_at(
-            R, warp, angle, c, s, tangent, surface, volume, theta_o,
-            block[_IX + x], block[_IY + x], block[_IZ + x], ours, block[_NARROW_LIGHT + x],
+            R, stretch, theta_o, block[_IX + x], block[_IY + x], block[_IZ + x], ours,
+            block[_NARROW_LIGHT + x],
         )  # fmt: skip
         block[_P_GO + x] = even + _lobes_at(
-            R, warp, angle, c, s, tangent, surface, volume, theta_o,
-            block[_GX + x], block[_GY + x], block[_GZ + x], ours, block[_NARROW_GO + x],
+            R, stretch, theta_o, block[_GX + x], block[_GY + x], block[_GZ + x], ours,
+            block[_NARROW_GO + x],
         )  # fmt: skip

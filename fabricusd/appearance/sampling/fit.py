@@ -36,15 +36,11 @@ from fabricusd.appearance.sampling.share_fit import (
     stratum,
 )
 from fabricusd.appearance.sampling.stretches import (
-    COS,
-    OF_SET,
     OF_THREAD,
-    PSI0,
-    SIN,
     STRETCH_COLUMNS,
     SURFACE_WIDTH,
-    TAN,
     VOLUME_WIDTH,
+    stretch_of,
     stretches_of,
 )
 from fabricusd.appearance.scattering import columns
@@ -207,12 +203,10 @@ _store = tuple_writer(THREAD_LOBES, BLOCK)
 
 @njit(**INLINE)
 def _describe_block(R, row, size, block):
-    c, s, psi0, tangent, thread_set = row[COS], row[SIN], row[PSI0], row[TAN], int(row[OF_SET])
-    surface, volume = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
+    stretch = stretch_of(row)
     for x in range(size):
         found = stretch_densities(
-            R, c, s, psi0, tangent, surface, volume, thread_set,
-            block[x], block[BLOCK + x], block[2 * BLOCK + x],
+            R, stretch, block[x], block[BLOCK + x], block[2 * BLOCK + x],
             block[3 * BLOCK + x], block[4 * BLOCK + x], block[5 * BLOCK + x],
         )  # fmt: skip
         _store(block, _OUT + x, found)

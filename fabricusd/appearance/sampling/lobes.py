@@ -72,26 +72,24 @@ def sample_cut_normal(R, u, mean, deviation, low, high):
 
 
 @njit(**INLINE)
-def lobe_densities(R, psi0, tangent, surface, volume, theta_o, t, b, n):
-    """Densities [1/sr] of the lobes at a direction (t, b, n) of the thread frame.
+def lobe_densities(R, stretch, theta_o, t, b, n):
+    """Densities [1/sr] of a `Stretch`'s lobes at a direction (t, b, n) of the thread frame.
 
     The direction must be above the cloth, with n > 0.
-
-    tangent : tan psi0
-    surface, volume : standard deviations of the two normal distributions [rad]
     """
+    tangent = stretch.tan
     cos_theta = math.sqrt(b * b + n * n)
     inverse = R(1) / max(cos_theta, R(1e-9))
     theta = atan2(R, t, cos_theta)
-    low, high = theta_range(R, psi0)
+    low, high = theta_range(R, stretch.psi0)
     mean = min(max(-theta_o, low), high)
     edge = min(max(t * tangent * inverse, R(0)), R(1))
     sin_m = math.sqrt(max((R(1) - edge) * (R(1) + edge), R(1e-12)))
     around = R(0.5) * n * inverse / sin_m
-    on_surface = cut_normal(R, theta, mean, surface, low, high) * inverse * around
-    on_volume = cut_normal(R, theta, mean, volume, low, high) * inverse * around
+    surface = cut_normal(R, theta, mean, stretch.surface_width, low, high) * inverse * around
+    volume = cut_normal(R, theta, mean, stretch.volume_width, low, high) * inverse * around
     cosine = R(1) / math.sqrt(R(1) + tangent * tangent)
-    return on_surface, on_volume, R(2 / math.pi) * n / (R(1) + cosine)
+    return surface, volume, R(2 / math.pi) * n / (R(1) + cosine)
 
 
 @njit(**INLINE)
@@ -165,23 +163,20 @@ def sample_across(R, psi0, tangent, deviation, theta_o, phi_o, w, beta, u1, u2):
 
 
 @njit(**INLINE)
-def sample_lobe(R, lobe, psi0, tangent, surface, volume, theta_o, u1, u2):
-    """A direction (t, b, n) of the thread frame, drawn from `lobe`.
-
-    surface, volume : standard deviations of the two normal distributions [rad]
-    """
+def sample_lobe(R, lobe, stretch, theta_o, u1, u2):
+    """A direction (t, b, n) of the thread frame, drawn from a `Stretch`'s `lobe`."""
     if lobe == ISOTROPIC:
-        return _sample_cosine(R, tangent, u1, u2)
-    width = surface if lobe == SURFACE else volume
-    return _sample_normal(R, psi0, tangent, width, theta_o, u1, u2)
+        return _sample_cosine(R, stretch.tan, u1, u2)
+    width = stretch.surface_width if lobe == SURFACE else stretch.volume_width
+    return _sample_normal(R, stretch.psi0, stretch.tan, width, theta_o, u1, u2)
 
 
 @njit(**INLINE)
-def sample_any_lobe(R, lobe, psi0, tangent, surface, volume, theta_o, u1, u2):
+def sample_any_lobe(R, lobe, stretch, theta_o, u1, u2):
     """`sample_lobe` without a branch, for vectorised loops; lobe : a number of type R."""
-    width = surface if lobe == R(SURFACE) else volume
-    t, b, n = _sample_normal(R, psi0, tangent, width, theta_o, u1, u2)
-    ti, bi, ni = _sample_cosine(R, tangent, u1, u2)
+    width = stretch.surface_width if lobe == R(SURFACE) else stretch.volume_width
+    t, b, n = _sample_normal(R, stretch.psi0, stretch.tan, width, theta_o, u1, u2)
+    ti, bi, ni = _sample_cosine(R, stretch.tan, u1, u2)
     isotropic = lobe == R(ISOTROPIC)
     return (ti if isotropic else t), (bi if isotropic else b), (ni if isotropic else n)
 

@@ -33,16 +33,7 @@ from fabricusd.appearance.sampling.lobes import (
     narrowed,
     sample_lobe,
 )
-from fabricusd.appearance.sampling.stretches import (
-    COS,
-    OF_SET,
-    PSI0,
-    SIN,
-    SURFACE_WIDTH,
-    TAN,
-    VOLUME_WIDTH,
-    nearest_stretch,
-)
+from fabricusd.appearance.sampling.stretches import Stretch, nearest_stretch, stretch_of
 from fabricusd.appearance.sampling.views import share_at, uniform_direction, view_corner
 from fabricusd.appearance.scattering import columns
 from fabricusd.appearance.weave.coverage import WARP
@@ -103,16 +94,14 @@ def even_direction(R, mixture, u0, u1, u2):
 
 
 @njit(**INLINE)
-def stretch_densities(R, c, s, psi0, tangent, surface_width, volume_width, thread_set,
-                      ix, iy, iz, ox, oy, oz):  # fmt: skip
-    """Densities [1/sr] of one tangent angle's lobes on the side of wi, for a viewer above."""
+def stretch_densities(R, stretch, ix, iy, iz, ox, oy, oz):
+    """Densities [1/sr] of a `Stretch`'s lobes on the side of wi, for a viewer above."""
+    c, s = stretch.cos, stretch.sin
     turn = R(1) if iz > R(0) else R(-1)
-    t, b, n = to_thread(R, thread_set, c, s, turn * ix, turn * iy, turn * iz)
-    t_o, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
+    t, b, n = to_thread(R, stretch.thread_set, c, s, turn * ix, turn * iy, turn * iz)
+    t_o, b_o, n_o = to_thread(R, stretch.thread_set, c, s, ox, oy, oz)
     theta_o = turn * atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-    found = lobe_densities(
-        R, psi0, tangent, surface_width, volume_width, theta_o, t, b, max(n, R(1e-12))
-    )
+    found = lobe_densities(R, stretch, theta_o, t, b, max(n, R(1e-12)))
     # The density is 0 behind the thread; a product instead of a branch lets LLVM vectorise loops.
     return _times(R, R(1) if n > R(0) else R(0), found)
 
@@ -150,11 +139,8 @@ def density(R, mixture, ix, iy, iz, ox, oy, oz):
         share = share_at(R, mixture.shares, corner, mixture.sides * lobes + side)
         p += share * abs(iz) * R(1 / math.pi)
     for y in range(mixture.stretches.shape[0]):
-        row = mixture.stretches[y]
-        found = stretch_densities(
-            R, row[COS], row[SIN], row[PSI0], row[TAN], row[SURFACE_WIDTH], row[VOLUME_WIDTH],
-            int(row[OF_SET]), ix, iy, iz, ox, oy, oz,
-        )  # fmt: skip
+        stretch = stretch_of(mixture.stretches[y])
+        found = stretch_densities(R, stretch, ix, iy, iz, ox, oy, oz)
         first = side * lobes + THREAD_LOBES * y
         p += mixed(_thread_shares(R, mixture.shares, corner, first), found)
     return p
@@ -210,31 +196,36 @@ def lobe_direction(R, mixture, k, ox, oy, oz, u1, u2):
         x, y, z = uniform_direction(R, math.sqrt(u1), u2)
         turn = R(-1) if below else R(1)
         return turn * x, turn * y, turn * z
-    row = mixture.stretches[(k % lobes) // THREAD_LOBES]
-    return _stretch_direction(
-        R, k % THREAD_LOBES, k >= lobes, row[COS], row[SIN], row[PSI0], row[TAN],
-        row[SURFACE_WIDTH], row[VOLUME_WIDTH], int(row[OF_SET]), ox, oy, oz, u1, u2,
-    )  # fmt: skip
+    stretch = stretch_of(mixture.stretches[(k % lobes) // THREAD_LOBES])
+    return _stretch_direction(R, k % THREAD_LOBES, k >= lobes, stretch, ox, oy, oz, u1, u2)
 
 
 @njit(**INLINE)
-def _stretch_direction(R, lobe, below, c, s, psi0, tangent, surface_width, volume_width, thread_set,
-                       ox, oy, oz, u1, u2):  # fmt: skip
-    """A direction of a lobe of one tangent angle, above the cloth or below it."""
+def _stretch_direction(R, lobe, below, stretch, ox, oy, oz, u1, u2):
+    """A direction of a lobe of a `Stretch`, above the cloth or below it."""
+    c, s = stretch.cos, stretch.sin
     turn = R(-1) if below else R(1)
-    t_o, b_o, n_o = to_thread(R, thread_set, c, s, ox, oy, oz)
+    t_o, b_o, n_o = to_thread(R, stretch.thread_set, c, s, ox, oy, oz)
     theta_o = turn * atan2(R, t_o, math.sqrt(b_o * b_o + n_o * n_o))
-    t, b, n = sample_lobe(R, lobe, psi0, tangent, surface_width, volume_width, theta_o, u1, u2)
-    x, y, z = from_thread(R, thread_set, c, s, t, b, n)
+    t, b, n = sample_lobe(R, lobe, stretch, theta_o, u1, u2)
+    x, y, z = from_thread(R, stretch.thread_set, c, s, t, b, n)
     return turn * x, turn * y, turn * z
 
 
+@njit(**INLINE)
+def _stretch_at(R, threads, place):
+    """The `Stretch` of the thread at a `Place`, with lobes as wide as the thread's own."""
+    psi0 = min(max(place.psi0, R(-STEEPEST)), R(STEEPEST))
+    c, s = cos(R, psi0), sin(R, psi0)
+    row = threads[place.thread]
+    return Stretch(place.thread_set, psi0, c, s, s / c, row[_ON_SURFACE], row[_ON_VOLUME])
+
+
 @njit(**PART)
-def point_density(R, threads, mixture, across_too, thread_set, thread, psi0, w,
-                  ix, iy, iz, ox, oy, oz):  # fmt: skip
+def point_density(R, threads, mixture, across_too, place, ix, iy, iz, ox, oy, oz):
     """pdf(wi) [1/sr] of `point_direction`; 0 at the horizon and where it never draws.
 
-    threads : rows of `pack_threads`; thread_set, thread, psi0, w : what `weave.find` returns
+    threads : rows of `pack_threads`; place : a `Place`
     """
     if iz == R(0) or oz == R(0) or (mixture.sides == 1 and min(iz, oz) < R(0)):
         return R(0)
@@ -243,20 +234,15 @@ def point_density(R, threads, mixture, across_too, thread_set, thread, psi0, w,
     if oz < R(0):
         ix, iy, iz, ox, oy, oz = -ix, -iy, -iz, -ox, -oy, -oz
     even = even_density(R, mixture, iz)
-    if thread_set > WARP or even == R(0) or mixture.stretches.shape[0] == 0:
+    if place.thread_set > WARP or even == R(0) or mixture.stretches.shape[0] == 0:
         return even
-    psi0 = min(max(psi0, R(-STEEPEST)), R(STEEPEST))
-    c, s = cos(R, psi0), sin(R, psi0)
-    row = threads[thread]
-    found = stretch_densities(
-        R, c, s, psi0, s / c, row[_ON_SURFACE], row[_ON_VOLUME], thread_set,
-        ix, iy, iz, ox, oy, oz,
-    )  # fmt: skip
+    stretch = _stretch_at(R, threads, place)
+    found = stretch_densities(R, stretch, ix, iy, iz, ox, oy, oz)
     if narrow:
-        by = narrower(R, row[_GAMMA], c, s, thread_set, w, ix, iy, iz, ox, oy, oz)
-        found = narrowed(found, by)
+        gamma = threads[place.thread, _GAMMA]
+        found = narrowed(found, narrower(R, gamma, stretch, place.w, ix, iy, iz, ox, oy, oz))
     corner = view_corner(R, ox, oy, oz)
-    first = _first_at(R, mixture, thread_set, thread, psi0)
+    first = _first_at(R, mixture, place, stretch.psi0)
     side = 0 if iz > R(0) else 1
     p = mixture.even * even
     if mixture.cosines != 0:
@@ -273,40 +259,35 @@ def _lobes_at(mixture):
 
 
 @njit(**INLINE)
-def _first_at(R, mixture, thread_set, thread, psi0):
+def _first_at(R, mixture, place, psi0):
     """Index into `point_shares` of the first lobe of the stretch that a tangent angle is in."""
-    stretch = nearest_stretch(R, mixture.stretches, thread_set, thread, psi0)
+    stretch = nearest_stretch(R, mixture.stretches, place.thread_set, place.thread, psi0)
     return _lobes_at(mixture) * stretch
 
 
 @njit(**PART)
-def point_direction(R, threads, mixture, across_too, thread_set, thread, psi0, w,
-                    ox, oy, oz, u0, u1, u2):  # fmt: skip
+def point_direction(R, threads, mixture, across_too, place, ox, oy, oz, u0, u1, u2):
     """wi (x, y, z) at level `weave`, or `thread` if `across_too`; uniform in a gap."""
     flip = R(-1) if oz < R(0) and mixture.sides == 2 else R(1)
     ox, oy, oz = flip * ox, flip * oy, flip * oz
-    gap = thread_set > WARP or mixture.stretches.shape[0] == 0
+    gap = place.thread_set > WARP or mixture.stretches.shape[0] == 0
     left = u0 - mixture.even
     if gap or left < R(0):
         x, y, z = even_direction(R, mixture, u0 * mixture.even if gap else u0, u1, u2)
         return flip * x, flip * y, flip * z
-    psi0 = min(max(psi0, R(-STEEPEST)), R(STEEPEST))
-    c, s = cos(R, psi0), sin(R, psi0)
+    stretch = _stretch_at(R, threads, place)
     corner = view_corner(R, ox, oy, oz)
-    first = _first_at(R, mixture, thread_set, thread, psi0)
+    first = _first_at(R, mixture, place, stretch.psi0)
     k = _choose(R, mixture.point_shares, corner, first, _lobes_at(mixture), left)
     k = _drawn_lobe(mixture, 1, k)
-    row = threads[thread]
     if across_too and flip > R(0) and k == SURFACE:
-        return narrow_direction(
-            R, row[_GAMMA], row[_ON_SURFACE], c, s, psi0, thread_set, w, ox, oy, oz, u1, u2
-        )
+        gamma = threads[place.thread, _GAMMA]
+        return narrow_direction(R, gamma, stretch, place.w, ox, oy, oz, u1, u2)
     if k >= mixture.sides * THREAD_LOBES:
         x, y, z = uniform_direction(R, math.sqrt(u1), u2)
         turn = flip if k == mixture.sides * THREAD_LOBES else -flip
         return turn * x, turn * y, turn * z
     x, y, z = _stretch_direction(
-        R, k % THREAD_LOBES, k >= THREAD_LOBES, c, s, psi0, s / c, row[_ON_SURFACE],
-        row[_ON_VOLUME], thread_set, ox, oy, oz, u1, u2,
-    )  # fmt: skip
+        R, k % THREAD_LOBES, k >= THREAD_LOBES, stretch, ox, oy, oz, u1, u2
+    )
     return flip * x, flip * y, flip * z

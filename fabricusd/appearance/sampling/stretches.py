@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -27,6 +28,23 @@ WIDEST_STRETCH = math.radians(15.0)
 STRETCH_COLUMNS = 8
 OF_SET, OF_THREAD, PSI0, COS, SIN, TAN, SURFACE_WIDTH, VOLUME_WIDTH = range(STRETCH_COLUMNS)
 """Columns of `stretches_of`."""
+
+
+class Stretch(NamedTuple):
+    """Thread at one tangent angle, whose lobes are drawn from; `real` is the sampler's precision.
+
+    thread_set : int - WEFT or WARP; the same number as a real in vectorised loops
+    psi0 : real - tangent angle [rad]; cos, sin, tan : real - of psi0
+    surface_width, volume_width : real - standard deviations [rad] of the two normal lobes
+    """
+
+    thread_set: Any
+    psi0: Any
+    cos: Any
+    sin: Any
+    tan: Any
+    surface_width: Any
+    volume_width: Any
 
 
 def stretches_of(fabric: Fabric) -> NDArray[np.float64]:
@@ -80,6 +98,15 @@ def _curve_stretches(curve: TangentCurve, width: float) -> list[tuple[float, flo
             start, end = float(a[b > a].min()), float(b[b > a].max())
             found.append((0.5 * (start + end), (end - start) / math.sqrt(12.0)))
     return found
+
+
+@njit(**INLINE)
+def stretch_of(row):
+    """The `Stretch` in a row of `stretches_of`."""
+    return Stretch(
+        int(row[OF_SET]), row[PSI0], row[COS], row[SIN], row[TAN], row[SURFACE_WIDTH],
+        row[VOLUME_WIDTH],
+    )  # fmt: skip
 
 
 @njit(**INLINE)

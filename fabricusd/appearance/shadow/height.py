@@ -10,6 +10,7 @@ form, so the march steps from segment to segment and misses nothing in between. 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -18,7 +19,14 @@ from numpy.typing import NDArray
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.curve import peak
-from fabricusd.appearance.weave.lookup import crown_on, lookup, rise_on, wrap
+from fabricusd.appearance.weave.lookup import (
+    crown_on,
+    lookup,
+    lower_run,
+    rise_on,
+    upper_run,
+    wrap,
+)
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE, PART
@@ -35,6 +43,42 @@ to within the bend of the curve."""
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
+class Origin(NamedTuple):
+    """The point that a march starts from.
+
+    u, v : float - weave coordinates
+    thread_set : int; crown : float - thread set of the point, and `crown_of` there [m]
+    height : float - height of the point [m]
+    """
+
+    u: float
+    v: float
+    thread_set: int
+    crown: float
+    height: float
+
+
+class Track(NamedTuple):
+    """A visible segment of thread that a march crosses; t is the distance from the origin [m].
+
+    thread : int - index into `Fabric.threads`
+    half : float - height of its surface above its axis, at the middle of its width [m]
+    height : float - height of the march's origin [m]
+    length : float - length of its visible run [m]
+    s, s_t : float - the position along the run is s + s_t t
+    w, w_t : float - the position across the thread is w + w_t t
+    """
+
+    thread: int
+    half: float
+    height: float
+    length: float
+    s: float
+    s_t: float
+    w: float
+    w_t: float
+
+
 @njit(**INLINE)
 def crown_of(R, cloth, rounded, which, thread, w):
     """Height [m] of a thread's visible side above its axis at `w`; round if `rounded`, else
@@ -45,29 +89,27 @@ def crown_of(R, cloth, rounded, which, thread, w):
 
 
 @njit(**PART)
-def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first):
-    """Slope of the steepest line from a point at height `h` [m] to the height field, at least `k`.
+def steepest(cloth, rounded, highest, origin, dx, dy, k, first):
+    """Slope of the steepest line from an `Origin` to the height field, at least `k`.
 
-    u, v : weave coordinates of the point
-    dx, dy : unit direction on the cloth, in metres along U and V
-    which, crown : the thread set of the point and `crown_of` there. Along the point's own thread
-        the march treats the thread as flat at that height: `f_s` already darkens the far side of a
-        round thread, and g must not darken it again.
+    Along the origin's own thread the march treats the thread as flat at its crown there: `f_s`
+    already darkens the far side of a round thread, and g must not darken it again.
+
     highest : upper bound on the height of the field [m]
+    dx, dy : unit direction on the cloth, in metres along U and V
     first : return at the first slope above `k`, which tells whether light at slope `k` is blocked
     """
     du, dv = dx / float(cloth.pitch[WARP]), dy / float(cloth.pitch[WEFT])
     nearest = NEAREST * min(float(cloth.pitch[WARP]), float(cloth.pitch[WEFT]))
+    u, v = origin.u, origin.v
     end, pick = np.floor(u), np.floor(v)
     begin, asked = 0.0, k
     for _ in range(CELLS):
         to_end = ((end + 1.0 if du > 0.0 else end) - u) / du if du != 0.0 else np.inf
         to_pick = ((pick + 1.0 if dv > 0.0 else pick) - v) / dv if dv != 0.0 else np.inf
         leave = min(to_end, to_pick)
-        k = _cross_cell(
-            cloth, rounded, end, pick, u, v, which, crown, du, dv, max(begin, nearest), leave, h, k
-        )  # fmt: skip
-        if (first and k > asked) or leave * k > highest - h:
+        k = _cross_cell(cloth, rounded, end, pick, origin, du, dv, max(begin, nearest), leave, k)
+        if (first and k > asked) or leave * k > highest - origin.height:
             return k
         if to_end <= to_pick:
             end += 1.0 if du > 0.0 else -1.0
@@ -78,8 +120,9 @@ def steepest(cloth, rounded, highest, u, v, which, crown, h, dx, dy, k, first):
 
 
 @njit(**INLINE)
-def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h, k):
+def _cross_cell(cloth, rounded, end, pick, origin, du, dv, t0, t1, k):
     """`steepest` over the visible threads of one cell, between the distances t0 and t1 [m]."""
+    u, v, which, crown, h = origin
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
     warp = int(cloth.sequence[WARP, wrap(end, cloth.sequence_length[WARP])])
     weft = int(cloth.sequence[WEFT, wrap(pick, cloth.sequence_length[WEFT])])
@@ -95,35 +138,30 @@ def _cross_cell(cloth, rounded, end, pick, u, v, which, crown, du, dv, t0, t1, h
     low, high = 0.5 - 0.5 * width, 0.5 + 0.5 * width
     if width > 0.0 and cloth.pile[above] == 0:
         a, b = _within(over, over_t, low, high, t0, t1)
-        cells = float(cloth.runs[i, j, 0, 1])
+        start, cells = upper_run(np.float64, cloth, i, j, top)
         mine = own and which == top
-        k = _cross_thread(
-            cloth, 0 if mine else rounded, above,
-            crown if mine else float(cloth.half_thickness[top, above]),
-            a, b, h, k, cells * float(crossing),
-            (float(cloth.runs[i, j, 0, 0]) + along) / cells, along_t / cells,
+        track = Track(
+            above, crown if mine else float(cloth.half_thickness[top, above]), h,
+            cells * float(crossing), (start + along) / cells, along_t / cells,
             2.0 * (over - 0.5) / width, 2.0 * over_t / width,
         )  # fmt: skip
-    if cloth.under == 1 - top and cloth.pile[below] == 0:
-        seen = float(cloth.under_width)
+        k = _cross_thread(cloth, 0 if mine else rounded, track, a, b, k)
+    seen = float(cloth.width[1 - top])
+    if width < 1.0 and seen > 0.0 and cloth.pile[below] == 0:
         a0, b0 = _within(along, along_t, 0.5 - 0.5 * seen, 0.5 + 0.5 * seen, t0, t1)
-        share = 1.0 - width
-        cells = float(cloth.runs[i, j, 1, 1])
         for side in range(2):
             if side == 0:
                 a, b = _within(over, over_t, 0.0, low, a0, b0)
-                skipped = 0.0
             else:
                 a, b = _within(over, over_t, high, 1.0, a0, b0)
-                skipped = width
-            place = float(cloth.runs[i, j, 1, 0]) + (over - skipped) / share
+            start, cells, rises = lower_run(np.float64, cloth, i, j, top, float(side))
             mine = own and which != top
-            k = _cross_thread(
-                cloth, 0 if mine else rounded, below,
-                crown if mine else float(cloth.half_thickness[1 - top, below]),
-                a, b, h, k, cells * share * float(below_crossing), place / cells,
-                over_t / share / cells, 2.0 * (along - 0.5) / seen, 2.0 * along_t / seen,
+            track = Track(
+                below, crown if mine else float(cloth.half_thickness[1 - top, below]), h,
+                rises * cells * float(below_crossing), (start + over) / cells, over_t / cells,
+                2.0 * (along - 0.5) / seen, 2.0 * along_t / seen,
             )  # fmt: skip
+            k = _cross_thread(cloth, 0 if mine else rounded, track, a, b, k)
     return k
 
 
@@ -140,13 +178,11 @@ def _within(x, x_t, low, high, t0, t1):
 
 
 @njit(**INLINE)
-def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w_t):
-    """`steepest` over a segment of thread between the distances a and b [m].
-
-    At distance t the position along the run is s + s_t t, and across the thread w + w_t t.
-    """
+def _cross_thread(cloth, rounded, track, a, b, k):
+    """`steepest` over a `Track` between the distances a and b [m]."""
     if not b > a:
         return k
+    thread, s, s_t = track.thread, track.s, track.s_t
     pieces = cloth.curve_start.shape[1]
     for p in range(pieces):
         low = float(cloth.curve_start[thread, p])
@@ -160,19 +196,19 @@ def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w
         t0, t1 = _within(s, s_t, low, high, a, b)
         if not t1 >= t0:
             continue
-        k = max(k, _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t0))
-        k = max(k, _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t1))
+        k = max(k, _slope(cloth, rounded, track, p, t0))
+        k = max(k, _slope(cloth, rounded, track, p, t1))
         if rounded != 0:
-            t = _summit(cloth, thread, p, half, h, length, s, s_t, w, w_t, t0, t1, k)
-            k = max(k, _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t))
+            t = _summit(cloth, track, p, t0, t1, k)
+            k = max(k, _slope(cloth, rounded, track, p, t))
             continue
         bend = float(cloth.curve_slope[thread, p])
-        if bend == 0.0 or s_t == 0.0:
+        if bend == 0.0 or s_t == 0.0 or track.length == 0.0:
             continue
         for _ in range(3):
             # The thread is highest above the line of slope k where it is parallel to the line.
             # Raising k to the slope found there is Newton's method for the tangent from the point.
-            angle = -math.atan(k / (length * s_t))
+            angle = -math.atan(k / (track.length * s_t))
             turn = (
                 float(cloth.curve_start[thread, p])
                 + (angle - float(cloth.curve_angle[thread, p])) / bend
@@ -180,23 +216,24 @@ def _cross_thread(cloth, rounded, thread, half, a, b, h, k, length, s, s_t, w, w
             t = (turn - s) / s_t
             if t <= t0 or t >= t1:
                 break
-            k = max(k, _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t))
+            k = max(k, _slope(cloth, rounded, track, p, t))
     return k
 
 
 @njit(**INLINE)
-def _slope(cloth, rounded, thread, p, half, h, length, s, s_t, w, w_t, t):
-    """Slope from the point to the thread at distance `t` [m]."""
-    at = max(0.0, min(1.0, s + s_t * t))
-    crown = half
+def _slope(cloth, rounded, track, p, t):
+    """Slope from the origin to piece `p` of a `Track` at distance `t` [m]."""
+    at = max(0.0, min(1.0, track.s + track.s_t * t))
+    crown = track.half
     if rounded != 0:
-        across = w + w_t * t
+        across = track.w + track.w_t * t
         crown *= math.sqrt(max(0.0, 1.0 - across * across))
-    return (length * rise_on(np.float64, cloth, thread, p, at) + crown - h) / t
+    rise = rise_on(np.float64, cloth, track.thread, p, at)
+    return (track.length * rise + crown - track.height) / t
 
 
 @njit(**PART)
-def _summit(cloth, thread, p, half, h, length, s, s_t, w, w_t, t0, t1, k):
+def _summit(cloth, track, p, t0, t1, k):
     """Distance [m] at which a round thread is highest above the line of slope `k`.
 
     Golden-section search is valid because crown and hump are both concave, so there is one summit.
@@ -204,21 +241,17 @@ def _summit(cloth, thread, p, half, h, length, s, s_t, w, w_t, t0, t1, k):
     """
     low, high = t0, t1
     left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_left = (_slope(cloth, 1, thread, p, half, h, length, s, s_t, w, w_t, left) - k) * left
-    at_right = (_slope(cloth, 1, thread, p, half, h, length, s, s_t, w, w_t, right) - k) * right
+    at_left = (_slope(cloth, 1, track, p, left) - k) * left
+    at_right = (_slope(cloth, 1, track, p, right) - k) * right
     for _ in range(16):
         if at_left > at_right:
             high, right, at_right = right, left, at_left
             left = high - _GOLDEN * (high - low)
-            at_left = (
-                _slope(cloth, 1, thread, p, half, h, length, s, s_t, w, w_t, left) - k
-            ) * left
+            at_left = (_slope(cloth, 1, track, p, left) - k) * left
         else:
             low, left, at_left = left, right, at_right
             right = low + _GOLDEN * (high - low)
-            at_right = (
-                _slope(cloth, 1, thread, p, half, h, length, s, s_t, w, w_t, right) - k
-            ) * right
+            at_right = (_slope(cloth, 1, track, p, right) - k) * right
     return 0.5 * (low + high)
 
 
@@ -235,32 +268,32 @@ def highest_point(fabric: Fabric, cloth: CompiledFabric) -> float:
     peaks = [peak(t.curve) for t in fabric.thread_list]
     for which, sequence in ((WARP, fabric.warp.sequence), (WEFT, fabric.weft.sequence)):
         crossing = float(cloth.pitch[1 - which])
-        for longest, share in _longest_runs(cloth, which):
+        for longest in _longest_runs(cloth, which):
             common = math.gcd(len(longest), len(sequence))
             for place, kind in enumerate(sequence):
                 cells = longest[place % common :: common].max()
-                if cloth.pile[kind] or cells == 0:
+                if cloth.pile[kind] or cells < 0:
                     continue
                 half = float(cloth.half_thickness[which, kind])
-                found = max(found, peaks[kind] * float(cells) * share * crossing + half)
+                found = max(found, peaks[kind] * float(cells) * crossing + half)
     return found
 
 
-def _longest_runs(cloth: CompiledFabric, which: int) -> list[tuple[NDArray[np.int64], float]]:
-    """(longest visible run of each thread [cells], visible share of a cell) for the threads of a
-    set.
+def _longest_runs(cloth: CompiledFabric, which: int) -> list[NDArray[np.float64]]:
+    """Longest visible run [cells] of each thread of a set, -1 where there is none.
 
-    There is one entry for runs on top and, if the set is seen underneath, another for those.
+    The first entry is for runs on top, the second for strips of hidden runs, which rise nowhere.
     """
     axis = 1 if which == WARP else 0
-    on_top = cloth.grid == which
+    on_top, rim = cloth.grid == which, float(cloth.rim[which])
+    endless = float(cloth.grid.shape[axis])
     answer = []
     if cloth.width[which] > 0:
-        lengths = np.where(on_top, cloth.runs[..., 0, 1], 0).max(axis=axis)
-        answer.append((lengths.astype(np.int64), 1.0))
-    if cloth.under == which:
-        lengths = np.where(on_top, 0, cloth.runs[..., 1, 1]).max(axis=axis)
-        answer.append((lengths.astype(np.int64), 1.0 - float(cloth.width[1 - which])))
+        count = cloth.runs[..., 0, 1].astype(np.float64)
+        cells = np.where(count > 0, count + 2.0 * rim, endless)
+        answer.append(np.where(on_top, cells, -1.0).max(axis=axis))
+    if cloth.width[which] > 0 and rim > 0:
+        answer.append(np.where(on_top, -1.0, 0.0).max(axis=axis))
     return answer
 
 

@@ -16,7 +16,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.shadow.height import crown_of, steepest
+from fabricusd.appearance.shadow.height import Origin, crown_of, steepest
 from fabricusd.appearance.shadow.horizon_lookup import horizon_at
 from fabricusd.appearance.weave.compiled import CompiledFabric
 from fabricusd.appearance.weave.coverage import GAP
@@ -69,10 +69,12 @@ def horizon_table(
     """
     if azimuths < 16 or azimuths % 4:
         raise FabricError("azimuths", f"is {azimuths}; it must be a multiple of 4, at least 16")
-    if min(texels) < 2:
-        raise FabricError("texels", f"is {texels}; it must be at least 2 by 2")
+    if min(texels) < 2 or texels[0] % 2:
+        raise FabricError(
+            "texels", f"is {texels}; it must be at least 2 by 2, with an even number along a thread"
+        )
     repeat = shape_repeat(fabric)
-    slots = 1 if cloth.under == GAP else 2
+    slots = cloth.runs.shape[2]
     if math.prod((*repeat, slots, *texels, azimuths)) > MOST_BYTES:
         return None
     table = np.zeros((*repeat, slots, *texels, azimuths), np.uint8)
@@ -131,9 +133,10 @@ def _fill(cloth, rounded, highest, directions, cells, entries):
                         continue
                     crown = crown_of(np.float64, cloth, rounded, which, thread, w)
                     h = height_on(np.float64, cloth, thread, s, length) + crown
+                    origin = Origin(u, v, which, crown, h)
                     for a in range(azimuths):
                         k = steepest(
-                            cloth, rounded, highest, u, v, which, crown, h,
+                            cloth, rounded, highest, origin,
                             directions[a, 0], directions[a, 1], LOWEST, False,
                         )  # fmt: skip
                         sine = k / math.sqrt(1.0 + k * k) if k > LOWEST else 0.0
@@ -161,7 +164,7 @@ def mean_light(
         number = np.random.default_rng(0).choice(len(number), MOST_CELLS, replace=False)
     cells = np.stack(np.unravel_index(number, repeat), axis=1)
     if table is None:
-        slots = 1 if cloth.under == GAP else 2
+        slots = cloth.runs.shape[2]
         entries = np.zeros((len(cells), slots, *TEXELS, AZIMUTHS), np.uint8)
         if highest > 0:
             _fill(cloth, rounded, highest, _diamond_directions(AZIMUTHS), cells, entries)
@@ -213,7 +216,7 @@ def _describe_texels(cloth, cells, shape, psi0, sets, area):
         top = int(cloth.grid[i % cloth.grid.shape[0], j % cloth.grid.shape[1]])
         width = float(cloth.width[top])
         for slot in range(slots):
-            whole = width if slot == 0 else (1.0 - width) * float(cloth.under_width)
+            whole = width if slot == 0 else (1.0 - width) * float(cloth.width[1 - top])
             for row in range(rows):
                 for column in range(columns):
                     u, v, seen = _texel_centre(
@@ -236,8 +239,8 @@ def _texel_centre(cloth, i, j, slot, along, across):
     else:
         q = along * (1.0 - width)
         q = q if q < 0.5 * (1.0 - width) else q + width
-        p = 0.5 + float(cloth.under_width) * (across - 0.5)
-        seen = cloth.under == 1 - top and width < 1.0
+        p = 0.5 + float(cloth.width[1 - top]) * (across - 0.5)
+        seen = width < 1.0 and cloth.width[1 - top] > 0.0
     if top == WARP:
         return i + q, j + p, seen
     return i + p, j + q, seen
@@ -253,9 +256,8 @@ def _compare(cloth, rounded, highest, table, uv, angle, out):
             x, y = math.cos(angle[k]), math.sin(angle[k])
             crown = crown_of(np.float64, cloth, rounded, which, thread, w)
             h = height_on(np.float64, cloth, thread, s, length) + crown
-            slope = steepest(
-                cloth, rounded, highest, uv[k, 0], uv[k, 1], which, crown, h, x, y, LOWEST, False
-            )  # fmt: skip
+            origin = Origin(uv[k, 0], uv[k, 1], which, crown, h)
+            slope = steepest(cloth, rounded, highest, origin, x, y, LOWEST, False)
             sine = horizon_at(np.float64, cloth, table, uv[k, 0], uv[k, 1], which, x, y)
             out[k] = math.asin(min(1.0, sine)) - math.atan(slope)
 

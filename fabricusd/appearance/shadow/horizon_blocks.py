@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.shadow.horizon_lookup import cell_of_texels, diamond
+from fabricusd.appearance.shadow.horizon_lookup import cell_of_texels, diamond, rows_of_texels
 from fabricusd.appearance.shadow.place_blocks import (
     FIRST,
     LIT,
@@ -44,12 +44,14 @@ def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
         sound = p >= R(0) and which != GAP
         warp = top == WARP
         along, over = (q, p) if warp else (p, q)
-        width = warp_width if warp else weft_width
+        width, other = (warp_width, weft_width) if warp else (weft_width, warp_width)
         on_top = which == top
-        seen = (over if over < R(0.5) else over - width) / max(R(1) - width, cloth.tiny)
         across = (over if on_top else along) - R(0.5)
-        across = across / max(width if on_top else cloth.under_width, cloth.tiny) + R(0.5)
-        row, a = cell_of_texels(R, (along if on_top else seen) if sound else R(0.5), rows)
+        across = across / max(width if on_top else other, cloth.tiny) + R(0.5)
+        row, a = rows_of_texels(
+            R, on_top, along if sound else R(0.5), over if sound else R(0.25), width, rows,
+            cloth.tiny,
+        )  # fmt: skip
         column, b = cell_of_texels(R, across if sound else R(0.5), columns)
         m = index(begin, k)
         x, y = wi[0, m], wi[1, m]

@@ -33,6 +33,25 @@ def cell_of_texels(R, place, count):
 
 
 @njit(**INLINE)
+def rows_of_texels(R, on_top, along, over, width, count, tiny):
+    """Lower of the two rows of texels around a place along a thread, and the weight of the upper.
+
+    along, over : place in the cell along the thread on top and across it
+    width : of the thread on top. The thread underneath shows a strip on either side of it, and each
+        strip has half the rows: nothing is interpolated across the thread between them.
+    """
+    if on_top:
+        return cell_of_texels(R, along, count)
+    behind = over > R(0.5)
+    strip = max(R(0.5) * (R(1) - width), tiny)
+    half = count // 2
+    place = (over - (R(1) - strip) if behind else over) / strip
+    x = max(R(0), min(place * R(half) - R(0.5), R(half - 1)))
+    k = min(int(x), max(half - 2, 0))
+    return k + (half if behind else 0), x - R(k)
+
+
+@njit(**INLINE)
 def _between(R, table, i, j, slot, row, column, first, second, c):
     """A texel's horizon, interpolated from the azimuth `first` to `second` by c in [0, 1]."""
     low = R(table[i, j, slot, row, column, first])
@@ -60,12 +79,12 @@ def horizon_at(R, cloth, table, u, v, which, x, y):
     width = cloth.width[top]
     on_top = which == top
     # Select instead of branching: neither the thread nor the azimuth can be predicted.
-    seen = (over if over < R(0.5) else over - width) / max(R(1) - width, cloth.tiny)
-    across = ((over if on_top else along) - R(0.5)) / (width if on_top else cloth.under_width)
+    across = ((over if on_top else along) - R(0.5)) / max(
+        width if on_top else cloth.width[1 - top], cloth.tiny
+    )
     slot = 0 if on_top else table.shape[2] - 1
-    along, across = along if on_top else seen, across + R(0.5)
-    row, a = cell_of_texels(R, along, table.shape[3])
-    column, b = cell_of_texels(R, across, table.shape[4])
+    row, a = rows_of_texels(R, on_top, along, over, width, table.shape[3], cloth.tiny)
+    column, b = cell_of_texels(R, across + R(0.5), table.shape[4])
     azimuths = table.shape[5]
     turn = diamond(R, x, y) * R(0.25 * azimuths)
     first = min(int(turn), azimuths - 1)

@@ -24,7 +24,13 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.shadow.height import crown_of, highest_point, level_is_round, steepest
+from fabricusd.appearance.shadow.height import (
+    Origin,
+    crown_of,
+    highest_point,
+    level_is_round,
+    steepest,
+)
 from fabricusd.appearance.shadow.horizon import (
     AZIMUTHS,
     ELEVATIONS,
@@ -55,7 +61,8 @@ from fabricusd.appearance.shadow.place_blocks import (
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.curve import crest, peak
-from fabricusd.appearance.weave.lookup import find, height_on, wrap
+from fabricusd.appearance.weave.lookup import find, height_on, lower_run, upper_run, wrap
+from fabricusd.appearance.weave.place import Hit
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, index
@@ -195,28 +202,28 @@ def _between_means(shadow, which, row, column, a, b):
 
 
 @njit(**INLINE)
-def shade(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
+def shade(R, cloth, shadow, u, v, hit, x, y, z):
     """The factor of the value at a point for light from (x, y, z); see the module's docstring.
 
     The arguments are those of `lit`.
     """
-    g = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
+    g = lit(R, cloth, shadow, u, v, hit, x, y, z)
     if shadow.method < HORIZON or not g > R(0):
         return g
-    return g / mean_lit(R, shadow, which, x, y, z)
+    return g / mean_lit(R, shadow, hit.thread_set, x, y, z)
 
 
 @njit(**INLINE)
-def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
+def lit(R, cloth, shadow, u, v, hit, x, y, z):
     """`g`: the share of light from direction (x, y, z) of the surface frame that reaches a point.
 
-    u, v : weave coordinates, float64
-    which, thread, s, w, length : what `weave.find` returns at (u, v)
+    u, v : weave coordinates, float64; hit : the `Hit` at (u, v)
 
     NaN in the arguments gives NaN, and never indexes a table.
     """
     flat = math.sqrt(x * x + y * y)
-    if not (s >= R(0) and flat < R(2) and z < R(2)):
+    which, thread = hit.thread_set, hit.thread
+    if not (hit.s >= R(0) and flat < R(2) and z < R(2)):
         return R(np.nan)
     if z <= R(0):
         return R(0)
@@ -227,7 +234,7 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
     if shadow.method == HORIZON:
         sine = horizon_at(R, cloth, shadow.table, u, v, which, x, y)
         return soft_edge(R, above_horizon(R, sine, flat, z), shadow.softness)
-    axis = height_on(R, cloth, thread, s, length)
+    axis = height_on(R, cloth, thread, hit.s, hit.length)
     if shadow.method == PEAK:
         # [Bisker2011] gives a place on the thread one height at every level, so threads are flat.
         drop = shadow.highest - axis - cloth.half_thickness[which, thread]
@@ -238,11 +245,11 @@ def lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z):
         distance = R(_to_crest(cloth, shadow, u, v, float(drop / lowest)))
         reach = math.sqrt(drop * drop + distance * distance)
         return soft_edge(R, (z * distance - flat * drop) / reach, shadow.softness)
-    crown = crown_of(R, cloth, shadow.rounded, which, thread, w)
+    crown = crown_of(R, cloth, shadow.rounded, which, thread, hit.w)
+    origin = Origin(u, v, which, float(crown), float(axis + crown))
     slope = float(z) / float(flat)
     found = steepest(
-        cloth, shadow.rounded, float(shadow.highest), u, v,
-        which, float(crown), float(axis + crown),
+        cloth, shadow.rounded, float(shadow.highest), origin,
         float(x) / float(flat), float(y) / float(flat), slope, True,
     )  # fmt: skip
     return R(0) if found > slope else R(1)
@@ -270,32 +277,33 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
     """The smaller of `best` and the distance [m] to the highest points of one cell."""
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
     top = int(cloth.grid[i, j])
-    width = float(cloth.width[top])
-    low = 0.5 - 0.5 * width
-    for slot in range(2 if cloth.under == 1 - top else 1):
-        which = top if slot == 0 else 1 - top
-        visible = width if slot == 0 else float(cloth.under_width)
+    edge = 0.5 - 0.5 * float(cloth.width[top])
+    for part in range(3 if cloth.runs.shape[2] > 1 else 1):
+        # The thread on top, then the thread underneath before and behind it.
+        which = top if part == 0 else 1 - top
         if which == WARP:
             thread = int(cloth.sequence[WARP, wrap(end, cloth.sequence_length[WARP])])
         else:
             thread = int(cloth.sequence[WEFT, wrap(pick, cloth.sequence_length[WEFT])])
-        share = 1.0 if slot == 0 else 1.0 - width
-        place = float(cloth.runs[i, j, slot, 0])
-        cells = float(cloth.runs[i, j, slot, 1])
-        height = cells * share * float(cloth.pitch[1 - which]) * float(
-            shadow.crest_height[thread]
-        ) + float(cloth.half_thickness[which, thread])
+        low, high = 0.0, 1.0
+        if part == 0:
+            start, cells = upper_run(np.float64, cloth, i, j, top)
+            rises = 1.0
+        else:
+            start, cells, rises = lower_run(np.float64, cloth, i, j, top, part - 1.0)
+            low, high = (0.0, edge) if part == 1 else (1.0 - edge, 1.0)
+        visible = float(cloth.width[which]) if high > low else 0.0
+        run = rises * cells * float(cloth.pitch[1 - which])
+        half = float(cloth.half_thickness[which, thread])
+        height = run * float(shadow.crest_height[thread]) + half
         if visible <= 0.0 or cloth.pile[thread] != 0 or height < 0.999999 * shadow.highest:
             continue
         across = 0.5 * visible
         for q in range(shadow.crest_first.shape[1]):
-            a = max(0.0, float(shadow.crest_first[thread, q]) * cells - place)
-            b = min(1.0, float(shadow.crest_last[thread, q]) * cells - place)
+            a = max(low, float(shadow.crest_first[thread, q]) * cells - start)
+            b = min(high, float(shadow.crest_last[thread, q]) * cells - start)
             if a > b:
                 continue
-            if slot == 1:
-                a, b = a * share, b * share
-                a, b = a if a < low else a + width, b if b < low else b + width
             if which == WARP:
                 du = max(0.0, abs(u - end - 0.5) - across)
                 dv = max(0.0, a - (v - pick), (v - pick) - b)
@@ -356,7 +364,7 @@ def _one_by_one(R, cloth, shadow, shaded, uv, begin, wi, out):
         u, v = uv[begin + k, 0], uv[begin + k, 1]
         x, y, z = wi[0, begin + k], wi[1, begin + k], wi[2, begin + k]
         which, thread, s, w, _, length = find(R, cloth, u, v)
-        g = lit(R, cloth, shadow, u, v, which, thread, s, w, length, x, y, z)
+        g = lit(R, cloth, shadow, u, v, Hit(which, thread, s, w, length), x, y, z)
         if shaded and shadow.method >= HORIZON and g > R(0):
             g /= mean_lit(R, shadow, which, x, y, z)
         out[k] = g

@@ -14,7 +14,15 @@ from numba import njit
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.shadow.horizon_lookup import split_table
 from fabricusd.appearance.weave.coverage import GAP
-from fabricusd.appearance.weave.lookup import angle_on, cell_of, place_on, whole_threads, wrap
+from fabricusd.appearance.weave.lookup import (
+    angle_on,
+    cell_of,
+    lower_run,
+    place_on,
+    upper_run,
+    whole_threads,
+    wrap,
+)
 from fabricusd.kernels.real import BLOCK, INLINE, PART, index
 
 CELL_I, CELL_J, END, PICK = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
@@ -35,7 +43,7 @@ X, Y, S, ANGLE = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
 SHARES, LIT = 4 * BLOCK, 7 * BLOCK
 """Three rows filled by `horizon_blocks.choose_texels`; the share of light that reaches the
 place."""
-_UPPER_PLACE, _UPPER_CELLS, _LOWER_PLACE, _LOWER_CELLS = (row * BLOCK for row in range(8, 12))
+_UPPER_START, _UPPER_CELLS, _LOWER_START, _LOWER_CELLS = (row * BLOCK for row in range(8, 12))
 REAL_ROWS = 12
 
 
@@ -49,7 +57,7 @@ def look_up_block(R, cloth, table, uv, begin, size, ints, reals):
     """
     _cells(R, cloth, uv, begin, size, ints, reals)
     _cells_of_table(cloth, table, uv, begin, size, ints)
-    _gather(cloth, size, ints, reals)
+    _gather(R, cloth, size, ints, reals)
     _place(R, cloth, size, ints, reals)
     for k in range(size):
         thread = np.uintp(ints[OF_THREAD + k])
@@ -103,18 +111,18 @@ def _cells_of_table(cloth, table, uv, begin, size, ints):
 
 
 @njit(**INLINE)
-def _gather(cloth, size, ints, reals):
+def _gather(R, cloth, size, ints, reals):
     """Read what the tables hold for each cell, its end and its pick."""
-    lower = cloth.runs.shape[2] - 1
     for k in range(size):
         i, j = np.uintp(ints[CELL_I + k]), np.uintp(ints[CELL_J + k])
-        ints[TOP + k] = cloth.grid[i, j]
+        top = int(cloth.grid[i, j])
+        ints[TOP + k] = top
         ints[_WARP_THREAD + k] = cloth.sequence[WARP, np.uintp(ints[END + k])]
         ints[_WEFT_THREAD + k] = cloth.sequence[WEFT, np.uintp(ints[PICK + k])]
-        reals[_UPPER_PLACE + k] = cloth.runs[i, j, 0, 0]
-        reals[_UPPER_CELLS + k] = cloth.runs[i, j, 0, 1]
-        reals[_LOWER_PLACE + k] = cloth.runs[i, j, lower, 0]
-        reals[_LOWER_CELLS + k] = cloth.runs[i, j, lower, 1]
+        over = reals[X + k] if top == WARP else reals[Y + k]
+        reals[_UPPER_START + k], reals[_UPPER_CELLS + k] = upper_run(R, cloth, i, j, top)
+        start, cells, _ = lower_run(R, cloth, i, j, top, over)
+        reals[_LOWER_START + k], reals[_LOWER_CELLS + k] = start, cells
 
 
 @njit(**INLINE)
@@ -125,8 +133,9 @@ def _place(R, cloth, size, ints, reals):
         top, x = ints[TOP + k], reals[X + k]
         which, s, _, _ = place_on(
             R, cloth, top, warp_width if top == WARP else weft_width,
-            reals[_UPPER_PLACE + k], reals[_UPPER_CELLS + k],
-            reals[_LOWER_PLACE + k], reals[_LOWER_CELLS + k], x, reals[Y + k],
+            weft_width if top == WARP else warp_width,
+            reals[_UPPER_START + k], reals[_UPPER_CELLS + k],
+            reals[_LOWER_START + k], reals[_LOWER_CELLS + k], x, reals[Y + k],
         )  # fmt: skip
         warp_thread, weft_thread = ints[_WARP_THREAD + k], ints[_WEFT_THREAD + k]
         thread = warp_thread if which == WARP else weft_thread

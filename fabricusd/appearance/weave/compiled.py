@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 import fabricusd.kernels  # noqa: F401 - chooses where kernels are cached
-from fabricusd.appearance.weave.coverage import GAP, Coverage, coverage, sets
+from fabricusd.appearance.weave.coverage import Coverage, coverage, sets
 from fabricusd.appearance.weave.curve import is_pile, pieces
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -28,15 +28,15 @@ class CompiledFabric(NamedTuple):
     """Arrays and scalars of one fabric; `real` below is the precision asked for.
 
     grid : (m, n) uint8 - 1 where end i lies over pick j
-    runs : (m, n, slots, 2) uint16, or uint32 beyond 65535 threads - place of the cell in the
-        visible run (cells from the start of the run along the thread), and length of that run
-        (cells); slot 0 is for the thread on top, slot 1, present only if `under` is a set, for the
-        one underneath
+    runs : (m, n, slots, 2) uint16, or uint32 beyond 65535 threads - place of the cell in the run of
+        equal cells along the thread (cells from its start), and length of that run (cells; 0 for a
+        run without end, whose places count from the border of the repeat); slot 0 is for the thread
+        on top, slot 1 for the one underneath, present unless both sets fill their pitch
     sequence : (2, k) int32 - thread types of each set; k is the length of the longer sequence
     sequence_length : (2,) int64 - number of threads after which the types repeat
-    width : (2,) real - share of its cells' width that a set takes where it is on top
-    under : int - the set that is seen underneath the other, or GAP
-    under_width : real - share of its own width that this set shows there
+    width : (2,) real - share of its pitch that a thread of the set takes
+    rim : (2,) real - what a thread of the set shows beyond the cells that it is on top in, at each
+        end [cells]: half of what the crossing threads leave of their pitch
     area : (2, k) real - share of the cloth that type k of set j covers
     gap : real - share of the cloth that no thread covers
     pitch : (2,) real - distance from one thread of the set to the next [m]
@@ -55,8 +55,7 @@ class CompiledFabric(NamedTuple):
     sequence: NDArray[np.int32]
     sequence_length: NDArray[np.int64]
     width: Reals
-    under: int
-    under_width: Any
+    rim: Reals
     area: Reals
     gap: Any
     pitch: Reals
@@ -91,12 +90,11 @@ def compile_fabric(
     pitch = np.array([s.pitch for s in sets(fabric)])
     return CompiledFabric(
         grid=np.ascontiguousarray(fabric.weave.cells, dtype=np.uint8),
-        runs=_run_table(fabric.weave.cells, share.under),
+        runs=_run_table(fabric.weave.cells, 2 if share.width.min() < 1.0 else 1),
         sequence=sequence,
         sequence_length=lengths,
         width=reals(share.width),
-        under=share.under,
-        under_width=real(share.under_width),
+        rim=reals(0.5 * (1.0 - share.width[::-1])),
         area=reals(share.type_area),
         gap=real(share.gap),
         pitch=reals(pitch),
@@ -116,14 +114,14 @@ def true_repeat(fabric: Fabric) -> tuple[int, int]:
     )
 
 
-def _run_table(cells: NDArray[np.bool_], under: int) -> NDArray[Any]:
+def _run_table(cells: NDArray[np.bool_], slots: int) -> NDArray[Any]:
     """`CompiledFabric.runs`: runs of the warp cross the picks, runs of the weft cross the ends.
 
     A run is a sequence of equal cells along a thread, whether the thread is on top or underneath,
     so one table per direction serves both slots.
     """
     kind: Any = np.uint16 if max(cells.shape) <= np.iinfo(np.uint16).max else np.uint32
-    found = np.empty((*cells.shape, 1 if under == GAP else 2, 2), kind)
+    found = np.empty((*cells.shape, slots, 2), kind)
     cells = np.ascontiguousarray(cells)
     by_end = np.empty((*cells.shape, 2), kind)
     _fill_runs(cells, by_end)
@@ -156,8 +154,8 @@ def _share_out(cells, by_end, by_pick, out):
 def _fill_runs(lines, out):
     """Compute place and length of the runs, out (r, n, 2), from `lines`: (r, n) cells of r threads.
 
-    Runs wrap around the repeat. A run without end is one repeat long, counted from the border of
-    the repeat.
+    Runs wrap around the repeat. A run without end has length 0, and its places count from the
+    border of the repeat.
     """
     n = lines.shape[1]
     for r in range(lines.shape[0]):
@@ -174,7 +172,7 @@ def _fill_runs(lines, out):
                 k = k + 1 if k + 1 < n else 0
             for place in range(count):
                 out[r, start, 0] = place
-                out[r, start, 1] = count
+                out[r, start, 1] = 0 if first == n else count
                 start = start + 1 if start + 1 < n else 0
             left -= count
 
@@ -182,7 +180,7 @@ def _fill_runs(lines, out):
 def _half_thickness(fabric: Fabric, share: Coverage, pitch: NDArray[np.float64]) -> Reals:
     """(2, k) half the thickness [m] of each type in each set."""
     stated = np.array([t.thickness for t in fabric.thread_list])
-    visible = np.maximum(share.width, np.where(np.arange(2) == share.under, 1.0, 0.0)) * pitch
+    visible = share.width * pitch
     return 0.5 * np.where(stated > 0, stated, visible[:, None])
 
 

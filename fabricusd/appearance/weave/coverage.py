@@ -1,9 +1,9 @@
 """Compute the share of the cloth that each thread set covers, from the coverage and the grid.
 
-The grid says which set is on top in a cell; the coverage says how much of the cloth a set shows.
-Where they disagree, the coverage takes precedence (`docs/model.md` section 3). A set that covers
-less than its cells takes the middle of their width. The space that it leaves goes first to the set
-that covers more than its cells, which is seen beside it, running underneath. The rest is gap.
+The grid says which set is on top where two threads cross; the coverage says how much of the cloth a
+set shows. Threads are continuous bands (`bands`), and their widths are those that show exactly the
+stated areas: a thread is seen where it is on top, and beside the threads that cross over it. Where
+neither set has a band there is gap.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.weave.bands import band_widths
 from fabricusd.fabric import Fabric, ThreadSet
 
 __all__ = ["GAP", "WARP", "WEFT", "Coverage", "coverage", "sets"]
@@ -26,15 +27,13 @@ GAP = 2
 
 
 class Coverage(NamedTuple):
-    """The division of the cloth's area. Sets are indexed by WEFT and WARP.
+    """How the area of the cloth is shared. Indices of sets are WEFT and WARP.
 
     cells : (2,) float - share `c_j` of the cells with set j on top
     area : (2,) float - share `a_j` of the cloth that set j covers
-    type_area : (2, k) float - the same for each thread type; row j sums to `area[j]`
-    gap : float - 1 - sum of `area`
-    width : (2,) float - share of its cells' width that set j takes where it is on top
-    under : int - the set that is seen beside the other, running underneath, or GAP if there is none
-    under_width : float - share of its own width that this set shows there
+    type_area : (2, k) float - the same for each thread type; a row sums to `area[j]`
+    gap : float - share that no thread covers, `(1 - x_0)(1 - x_1)`
+    width : (2,) float - share `x_j` of its pitch that a thread of set j takes, see `bands`
     """
 
     cells: Floats
@@ -42,8 +41,6 @@ class Coverage(NamedTuple):
     type_area: Floats
     gap: float
     width: Floats
-    under: int
-    under_width: float
 
 
 def sets(fabric: Fabric) -> tuple[ThreadSet, ThreadSet]:
@@ -69,19 +66,11 @@ def coverage(fabric: Fabric) -> Coverage:
         fill = np.where(thickness > 0, np.minimum(thickness / thread_set.pitch, 1.0), 1.0)
         other = sets(fabric)[1 - j].coverage or 0.0
         a[j] = min(float(shown[j] @ fill), 1.0 - other)
-    width = np.array([min(1.0, a[j] / c[j]) if c[j] > 0 else 0.0 for j in (WEFT, WARP)])
-    excess = a - c
-    under, under_width = GAP, 0.0
-    j = int(np.argmax(excess))
-    # An excess below 1e-12 is a rounding error of c, not a visible strip.
-    if excess[j] > 1e-12:
-        under = j
-        under_width = min(1.0, float(excess[j] / (c[1 - j] * (1.0 - width[1 - j]))))
-        under_width = 1.0 if under_width > 1.0 - 1e-9 else under_width
-    type_area = shown * width[:, None]
-    if under != GAP:
-        type_area[under] += hidden[under] * (1.0 - width[1 - under]) * under_width
-    return Coverage(c, a, type_area, max(0.0, 1.0 - float(a.sum())), width, under, under_width)
+    x = band_widths(c, a)
+    # Beside a thread on top, what the crossing threads leave of their pitch shows the one beneath.
+    type_area = x[:, None] * (shown + hidden * (1.0 - x[::-1])[:, None])
+    gap = float((1.0 - x[WEFT]) * (1.0 - x[WARP]))
+    return Coverage(c, type_area.sum(axis=1), type_area, gap, x)
 
 
 def _type_cells(fabric: Fabric) -> tuple[Floats, Floats]:

@@ -16,8 +16,10 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.weave.bands import band_areas
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, coverage
+from fabricusd.appearance.weave.place import Places
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave
 from fabricusd.kernels.real import INLINE, KERNEL, PART, index
@@ -26,8 +28,8 @@ FARTHEST = 2.0**52
 """Weave coordinates beyond this have no fractional part in float64."""
 
 
-BLOCK = 512
-"""Number of places that a worker looks up at a time: their intermediate results stay in its
+_CHUNK = 512
+"""Number of places that a worker takes at a time: their intermediate results stay in its
 first-level cache."""
 
 
@@ -53,6 +55,11 @@ class WeaveHit(NamedTuple):
     height: NDArray[Any]
     crown: NDArray[Any]
     gap: NDArray[np.bool_]
+
+    @property
+    def places(self) -> Places:
+        """The hits as the kernels of the surface laws take them, in the precision of the lookup."""
+        return Places(self.set, self.thread, self.angle, self.across)
 
 
 @njit(**INLINE)
@@ -168,32 +175,83 @@ def crown_on(R, cloth, thread_set, thread, w):
 
 
 @njit(**INLINE)
-def place_on(R, cloth, top, width, upper_place, upper_cells, lower_place, lower_cells, x, y):
+def upper_run(R, cloth, i, j, top):
+    """(start, cells) of the thread on top in a cell: at `along` it is at s = (start + along)/cells.
+
+    cells : length of the visible run, its ends beyond its cells included
+    """
+    place, count = R(cloth.runs[i, j, 0, 0]), R(cloth.runs[i, j, 0, 1])
+    rim = cloth.rim[top]
+    if count == R(0):
+        return place, R(cloth.grid.shape[1 if top == WARP else 0])
+    return place + rim, count + R(2) * rim
+
+
+@njit(**INLINE)
+def lower_run(R, cloth, i, j, top, over):
+    """(start, cells, rises): the run of the thread underneath at `over` along it.
+
+    Beside the thread on top it shows the end of its own visible run in the cell before or behind;
+    start and cells are those of `upper_run`.
+    Between two threads that both lie over it there is a strip that belongs to no such run: the
+    strips of a hidden run, put together, carry the whole curve once. They rise nowhere.
+
+    rises : 1 on a visible run, 0 on a strip
+    """
+    which = 1 - top
+    rim, slot = cloth.rim[which], cloth.runs.shape[2] - 1
+    ahead = over > R(0.5)
+    ends, picks = cloth.grid.shape
+    step = 1 if ahead else -1
+    # A neighbour of the cell, wrapped around the repeat.
+    i_next = wrapped(i + (step if which == WEFT else 0), ends)
+    j_next = wrapped(j + (step if which == WARP else 0), picks)
+    place, count = int(cloth.runs[i, j, slot, 0]), int(cloth.runs[i, j, slot, 1])
+    beyond = R(cloth.runs[i_next, j_next, 0, 1])
+    if count > 0 and place == (count - 1 if ahead else 0):
+        return (rim - R(1) if ahead else beyond + rim), beyond + R(2) * rim, R(1)
+    # Strips 2 rim wide: of a run with an end, the first is that behind the first cell.
+    strip = R(place)
+    if count > 0:
+        start = R(2) * rim * strip - (R(1) - rim) if ahead else R(2) * rim * strip - rim
+        strips = count - 1
+    else:
+        start = R(2) * rim * strip + (R(2) * rim - R(1) if ahead else R(0))
+        strips = picks if which == WARP else ends
+    return start, max(R(2) * rim * R(strips), cloth.tiny), R(0)
+
+
+@njit(**INLINE)
+def wrapped(k, count):
+    """`k` from -1 to `count` as an index of a ring of `count`."""
+    if k < 0:
+        return count - 1
+    return 0 if k >= count else k
+
+
+@njit(**INLINE)
+def place_on(R, cloth, top, width, other, upper_start, upper_cells, lower_start, lower_cells, x, y):
     """(set or GAP, s, w, length in cells) of the thread seen at (x, y) in a cell with `top` above.
 
-    width : visible width of the set on top
-    upper_place, upper_cells : place of the cell in the run on top, and the length of that run
-    lower_place, lower_cells : the same for the run underneath
+    width, other : `CompiledFabric.width` of the set on top and of the other one
+    upper_start, upper_cells, lower_start, lower_cells : what `upper_run` and `lower_run` give
 
     The code selects instead of branching, because it cannot be predicted which thread a point
     meets.
     """
     warp = top == WARP
     over, along = (x, y) if warp else (y, x)
-    offset = over - R(0.5)
+    offset, aside = over - R(0.5), along - R(0.5)
     on_top = abs(offset) <= R(0.5) * width and width > R(0)
-    beside = cloth.under == 1 - top and abs(along - R(0.5)) <= R(0.5) * cloth.under_width
+    beside = abs(aside) <= R(0.5) * other and other > R(0)
     hit = top if on_top else 1 - top
-    # The curve of the thread underneath runs over its visible parts beside the threads on top,
-    # joined together.
-    share = R(1) if on_top else R(1) - width
-    seen = along if on_top else (over if offset < R(0) else over - width) / max(share, cloth.tiny)
-    w = R(2) * (offset if on_top else along - R(0.5)) / (width if on_top else cloth.under_width)
-    place, cells = (upper_place, upper_cells) if on_top else (lower_place, lower_cells)
-    s = max(R(0), min((place + seen) / cells, cloth.last))
-    # On the warp, b and therefore w point along -U.
+    seen = upper_start + along if on_top else lower_start + over
+    cells = upper_cells if on_top else lower_cells
+    w = R(2) * (offset if on_top else aside) / max(width if on_top else other, cloth.tiny)
+    s = max(R(0), min(seen / cells, cloth.last))
+    # The direction b of increasing w is along -U on the warp.
     w = max(R(-1), min(-w if hit == WARP else w, R(1)))
-    return hit if on_top or beside else GAP, s, w, cells * share
+    return hit if on_top or beside else GAP, s, w, cells
 
 
 @njit(**INLINE)
@@ -204,16 +262,23 @@ def thread_at(R, cloth, i, j, end, pick, x, y):
         nan = R(np.nan)
         return WEFT, 0, nan, nan, nan, nan
     top = int(cloth.grid[i, j])
-    lower = cloth.runs.shape[2] - 1
+    upper_start, upper_cells = upper_run(R, cloth, i, j, top)
+    lower_start, lower_cells, rises = lower_run(R, cloth, i, j, top, x if top == WARP else y)
     which, s, w, cells = place_on(
-        R, cloth, top, cloth.width[top],
-        R(cloth.runs[i, j, 0, 0]), R(cloth.runs[i, j, 0, 1]),
-        R(cloth.runs[i, j, lower, 0]), R(cloth.runs[i, j, lower, 1]), x, y,
+        R, cloth, top, cloth.width[top], cloth.width[1 - top],
+        upper_start, upper_cells, lower_start, lower_cells, x, y,
     )  # fmt: skip
     if which == GAP:
         return GAP, 0, none, none, none, none
     thread = int(cloth.sequence[which, end if which == WARP else pick])
-    return which, thread, s, w, angle_on(R, cloth, thread, s), cells * cloth.pitch[1 - which]
+    return (
+        which,
+        thread,
+        s,
+        w,
+        angle_on(R, cloth, thread, s),
+        cells * cloth.pitch[1 - which] * (R(1) if which == top else rises),
+    )
 
 
 @njit(**INLINE)
@@ -246,8 +311,8 @@ def split_block(R, cloth, uv, begin, cells, x, y):
 def find_all(R, cloth, uv, sets, threads, s, w, angle, length):
     """`find` at each of uv (n, 2) float64, into the (n,) arrays that follow."""
     n = uv.shape[0]
-    for b in prange((n + BLOCK - 1) // BLOCK):
-        begin, size = b * BLOCK, min(BLOCK, n - b * BLOCK)
+    for chunk in prange((n + _CHUNK - 1) // _CHUNK):
+        begin, size = chunk * _CHUNK, min(_CHUNK, n - chunk * _CHUNK)
         cells = np.empty((4, size), np.int32)
         x, y = np.empty(size, s.dtype), np.empty(size, s.dtype)
         split_block(R, cloth, uv, begin, cells, x, y)
@@ -321,12 +386,13 @@ def back_of(fabric: Fabric) -> Fabric:
     """The other side of the cloth, as a fabric that is looked up at (u, -v).
 
     This is the fabric's own `back` if it names one. Otherwise it has the same threads on a grid
-    that is mirrored in V and complemented, with the picks in reverse order. The coverages of the
-    two sets are exchanged together with their cells, so that the gap is the same from both sides.
+    that is mirrored in V and complemented, with the picks in reverse order. Its threads are as wide
+    as those of the front, so the gap is the same from both sides.
     """
     if fabric.back is not None:
         return fabric.back
     share = coverage(fabric)
+    area = band_areas(share.cells[::-1], share.width)
     cells = ~fabric.weave.cells[:, ::-1]
     name = fabric.weave.name
     front_name = name.removesuffix(" (back)")
@@ -337,12 +403,12 @@ def back_of(fabric: Fabric) -> Fabric:
         warp=ThreadSet(
             sequence=fabric.warp.sequence,
             density=fabric.warp.density,
-            coverage=float(share.area[WEFT]),
+            coverage=float(area[WARP]),
         ),
         weft=ThreadSet(
             sequence=fabric.weft.sequence[::-1],
             density=fabric.weft.density,
-            coverage=float(share.area[WARP]),
+            coverage=float(area[WEFT]),
         ),
         model=fabric.model,
         opaque=fabric.opaque,

@@ -21,6 +21,7 @@ from fabricusd.appearance.surface import points_all
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.lookup import lookup
+from fabricusd.appearance.weave.place import Places
 from fabricusd.bake.texels.reflectance import refuse_conserving
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -157,7 +158,8 @@ def _nodes(fabric: Fabric, keys: NDArray[np.int64], directions: Floats) -> NDArr
     for k, (which, thread, number) in enumerate(keys):
         angle = min(max((number - middle) * step, -0.5 * math.pi), 0.5 * math.pi)
         sets, threads = np.full(d * d, which, np.uint8), np.full(d * d, thread, np.int32)
-        points_all(real, tables, False, sets, threads, np.full(d * d, angle), zero, wi, wo, values)
+        places = Places(sets, threads, np.full(d * d, angle), zero)
+        points_all(real, tables, False, places, wi, wo, values)
         out[:, :, k] = (values / wi[2]).T
     return out
 

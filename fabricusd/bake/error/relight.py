@@ -164,25 +164,6 @@ def _set_of(maps: Mapping[str, NDArray[Any]], noun: str) -> Floats:
     return found
 
 
-class _Directions(NamedTuple):
-    """Light and view relative to the axis of a thread set, see `along_set`.
-
-    a, b, z : components along the axis, across it, and along the surface normal
-    scale : 1/sqrt(a^2 + z^2)
-    overlap : `u` of the two azimuths
-    """
-
-    a_i: Any
-    b_i: Any
-    z_i: Any
-    scale_i: Any
-    a_o: Any
-    b_o: Any
-    z_o: Any
-    scale_o: Any
-    overlap: Any
-
-
 class _Angles(NamedTuple):
     """The distribution of tangent angles in one part of a thread set.
 
@@ -213,10 +194,7 @@ def _relight(  # type: ignore[no-untyped-def]
         for j in range(2):
             if sets[k, j, 3] <= 0.0:
                 continue
-            a_i, b_i, s_i, a_o, b_o, s_o, u = along_set(
-                R, j, precision, wi[0], wi[1], wi[2], wo[0], wo[1], wo[2]
-            )
-            directions = _Directions(a_i, b_i, wi[2], s_i, a_o, b_o, wo[2], s_o, u)
+            pair = along_set(R, j, precision, wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
             for kind in range(types):
                 # If a thread lies under the texel's centre, it stands for its whole set.
                 weight = share[j, kind]
@@ -228,17 +206,17 @@ def _relight(  # type: ignore[no-untyped-def]
                     if covered <= 0.0:
                         continue
                     angles = _Angles(sets[k, j, 8 + part], sets[k, j, 12 + part], shapes[j, part])
-                    surface, volume = _part_terms(R, precision, row, angles, directions)
+                    surface, volume = _part_terms(R, precision, row, angles, pair)
                     for channel in range(3):
                         value = surface + volume * sets[k, j, channel]
                         out[k, channel] += covered / q * value
 
 
 @njit(**KERNEL)
-def _part_terms(R, precision, row, angles, w):  # type: ignore[no-untyped-def]
+def _part_terms(R, precision, row, angles, pair):  # type: ignore[no-untyped-def]
     """Return the surface and volume terms of a thread, averaged over its tangent angles.
 
-    angles : `_Angles`; w : `_Directions`
+    angles : `_Angles`; pair : what `along_set` returns
     precision : see `overlap`
     """
     fewest = 3.0 * math.sqrt(3.0) * angles.deviation / row[GAMMA_SURFACE]
@@ -251,13 +229,8 @@ def _part_terms(R, precision, row, angles, w):  # type: ignore[no-untyped-def]
         angle = angles.mean + angles.deviation * angles.shape[kind, node]
         angle = min(max(angle, -0.5 * math.pi), 0.5 * math.pi)
         c, s = math.cos(angle), math.sin(angle)
-        surface, volume = segment(
-            R, int(row[MODEL]), row, precision,
-            c, s, w.a_i, w.b_i, w.z_i, w.a_o, w.b_o, w.z_o,
-        )  # fmt: skip
-        p = seen_along(
-            R, c, s, w.a_i, w.z_i, w.scale_i, w.a_o, w.z_o, w.scale_o, w.overlap
-        ) / nodes  # fmt: skip
+        surface, volume = segment(R, int(row[MODEL]), row, precision, c, s, pair)
+        p = seen_along(R, c, s, pair) / nodes
         first += p * surface
         second += p * volume
     return first, second

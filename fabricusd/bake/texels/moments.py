@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.shadow.methods import lit
 from fabricusd.appearance.weave.coverage import GAP, WARP
 from fabricusd.appearance.weave.lookup import crown_on, find, wrap
+from fabricusd.appearance.weave.place import Hit
 from fabricusd.bake.texels.angle_rows import HEIGHTS, STEPS
 from fabricusd.bake.texels.moment_indices import (
     AZIMUTHS,
@@ -141,7 +142,7 @@ def _add(made, u, v, out):  # type: ignore[no-untyped-def]
     out[HEIGHT] += length * rise + lift
     if made.light[2] > R(0):
         out[LIT] += lit(
-            R, made.cloth, made.shadow, u, v, which, thread, s, w, length,
+            R, made.cloth, made.shadow, u, v, Hit(which, thread, s, w, length),
             made.light[0], made.light[1], made.light[2],
         )  # fmt: skip
     _add_horizon(made, u, v, which, out)
@@ -185,7 +186,7 @@ def _add_horizon(made, u, v, which, out):  # type: ignore[no-untyped-def]
     else:
         slot = 1
         seen = q if q < R(0.5) else q - width
-        along, across = seen / (R(1) - width), (p - R(0.5)) / cloth.under_width + R(0.5)
+        along, across = seen / (R(1) - width), (p - R(0.5)) / cloth.width[1 - top] + R(0.5)
     row = min(max(int(along * table.shape[3]), 0), table.shape[3] - 1)
     column = min(max(int(across * table.shape[4]), 0), table.shape[4] - 1)
     for k in range(AZIMUTHS):

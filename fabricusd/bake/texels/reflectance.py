@@ -18,6 +18,7 @@ from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.scattering.model import CONSERVING, PUBLISHED
 from fabricusd.appearance.scattering.models import model_of, names
 from fabricusd.appearance.surface import points_all
+from fabricusd.appearance.weave.place import Places
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 
@@ -103,9 +104,7 @@ def _reflected(tables: Any, thread_set: int, thread: int, view: float) -> NDArra
         threads = np.full(n * ANGLES, thread, np.int32)
         viewers = np.ascontiguousarray(np.repeat(wo[:, None], n * ANGLES, axis=1))
         real: Any = np.float64
-        points_all(
-            real, tables, False, sets, threads, np.repeat(psi0, n), np.zeros(n * ANGLES), lights,
-            viewers, out,
-        )  # fmt: skip
+        places = Places(sets, threads, np.repeat(psi0, n), np.zeros(n * ANGLES))
+        points_all(real, tables, False, places, lights, viewers, out)
         total += (out[0].reshape(ANGLES, n) * solid).sum(axis=1)
     return total / turns

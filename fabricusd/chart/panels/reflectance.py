@@ -15,6 +15,7 @@ from fabricusd.appearance.accuracy import spread_pairs
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.surface import evaluate, far_all, points_all
 from fabricusd.appearance.weave.lookup import WeaveHit, lookup
+from fabricusd.appearance.weave.place import Places
 from fabricusd.appearance.weave.quadrature import CELLS, POINTS, Rule
 from fabricusd.chart.panel import Panel, Row
 from fabricusd.chart.timing import in_turns, typical
@@ -195,11 +196,11 @@ def weave_methods(fabric: Fabric, hit: WeaveHit, quick: bool) -> dict[str, Metho
 def _weave(fabric: Fabric, hit: WeaveHit, rule: Rule, real: Any) -> Callable[[], Floats]:
     tables = surface_tables(fabric, precision=real, rule=rule)
     wi, wo = (_first_checked(w, len(hit.set)).astype(real) for w in _checked())
-    angle, across = hit.angle.astype(real), hit.across.astype(real)
+    places = Places(hit.set, hit.thread, hit.angle.astype(real), hit.across.astype(real))
     out = np.empty_like(wi)
 
     def call() -> Floats:
-        points_all(real, tables, False, hit.set, hit.thread, angle, across, wi, wo, out)
+        points_all(real, tables, False, places, wi, wo, out)
         return np.asarray(out.T[:CHECKED], np.float64)
 
     return call

@@ -15,10 +15,11 @@ import numpy as np
 from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.published.shares import published_mixture
 from fabricusd.appearance.published.tables import SurfaceTables, surface_tables
-from fabricusd.appearance.sampling.blocks import sample_points
+from fabricusd.appearance.sampling.blocks import Drawn, sample_points
 from fabricusd.appearance.sampling.fit import no_mixture
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
+from fabricusd.appearance.weave.place import Places
 from fabricusd.fabric import Fabric
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import Film
@@ -32,7 +33,13 @@ from fabricusd.reference.stages.arrivals import Settings, arrive, sort_lanes
 from fabricusd.reference.stages.departures import depart
 from fabricusd.reference.stages.hits import prepare
 from fabricusd.reference.stages.shadow_rays import settle, thin_out
-from fabricusd.reference.surfaces.fabric import Points, Scattering, finish_point, look_up
+from fabricusd.reference.surfaces.fabric import (
+    Points,
+    Scattering,
+    finish_point,
+    look_up,
+    places_of,
+)
 from fabricusd.reference.surfaces.fabric_far import shade_far
 from fabricusd.reference.surfaces.preview import build_surfaces, shade_preview
 from fabricusd.scene.scene import Camera, Mesh, PreviewSurface, Scene
@@ -139,6 +146,10 @@ def _points() -> Points:
     return Points(np.zeros(0, np.uint8), np.zeros(0, np.int32), real, real, real, real)
 
 
+def _places() -> Places:
+    return places_of(_points())
+
+
 @cache
 def _woven() -> tuple[CompiledFabric, Shadow]:
     fabric = Fabric()
@@ -154,20 +165,16 @@ def _look_up() -> None:
 
 
 def _sample_points() -> None:
-    sets, threads, _, across, psi0, _ = _points()
     hits, vectors = _sample().wave.hits.rows, np.zeros((3, 0), np.float32)
     sample_points(
-        R, _cloth()[1].threads, no_mixture(R), False, sets, threads, psi0, across, vectors, vectors,
-        *hits[CHANCE : CHANCE + 3], vectors, hits[F_PDF], hits[GO_PDF], 0, 0,
+        R, _cloth()[1].threads, no_mixture(R), False, _places(), vectors, vectors,
+        tuple(hits[CHANCE : CHANCE + 3]), Drawn(vectors, hits[F_PDF], hits[GO_PDF]), 0, 0,
     )  # fmt: skip
 
 
 def _point_values() -> None:
-    sets, threads, _, across, psi0, _ = _points()
     vectors = np.zeros((3, 0), np.float32)
-    point_values(
-        R, _cloth()[1], False, sets, threads, psi0, across, vectors, vectors, vectors, 0, 0
-    )  # fmt: skip
+    point_values(R, _cloth()[1], False, _places(), vectors, vectors, vectors, 0, 0)
 
 
 def _finish_point() -> None:

@@ -24,11 +24,12 @@ from fabricusd.appearance.law import (
     surface_law,
 )
 from fabricusd.appearance.published.levels import point_values
-from fabricusd.appearance.sampling.blocks import sample_points
+from fabricusd.appearance.sampling.blocks import Drawn, sample_points
 from fabricusd.appearance.shadow.methods import NONE, Shadow, compile_shadow, shade
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, WARP
 from fabricusd.appearance.weave.lookup import back_of, find
+from fabricusd.appearance.weave.place import Hit, Places, place_at
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE, LEAN
 from fabricusd.reference.rays.embree import aligned_empty
@@ -64,6 +65,11 @@ class Points(NamedTuple):
     across: NDArray[np.float32]
     psi0: NDArray[np.float32]
     length: NDArray[np.float32]
+
+
+def places_of(points: Points) -> Places:
+    """What the surface laws read of `points`."""
+    return Places(points.sets, points.threads, points.psi0, points.across)
 
 
 class Scattering(NamedTuple):
@@ -174,7 +180,7 @@ class FabricShader:
         count = go.shape[1]
         none, real = np.zeros(count, np.uint8), np.zeros(count, np.float32)
         points = Points(none, none.astype(np.int32), real, real, real, real)
-        _by_law(R, side.law, FAR_LEVEL, hits, first, scattering, points)
+        _by_law(R, side.law, FAR_LEVEL, hits, first, scattering, places_of(points))
         finish_far(R, hits, first, count, R(self.gap), go, towards, onwards)
 
     def _shade_near(
@@ -190,20 +196,20 @@ class FabricShader:
         wo, wi, go, towards, onwards = scattering
         law, (cloth, shadow) = side.law, side.near(level)
         count = wo.shape[1]
-        sets, threads, _, across, psi0, _ = points
+        places = places_of(points)
         v_sign = R(-1) if back else R(1)
         look_up(R, cloth, v_sign, hits, first, points)
         if law.kind == PUBLISHED_ONLY:
             sample_points(
-                R, law.published.threads, law.lobes, level == THREAD_LEVEL, sets, threads, psi0,
-                across, wo, wi, *hits[CHANCE : CHANCE + 3], go, hits[F_PDF], hits[GO_PDF], first,
+                R, law.published.threads, law.lobes, level == THREAD_LEVEL, places, wo, wi,
+                tuple(hits[CHANCE : CHANCE + 3]), Drawn(go, hits[F_PDF], hits[GO_PDF]), first,
                 count,
             )  # fmt: skip
-            near = (R, law.published, level == THREAD_LEVEL, sets, threads, psi0, across)
+            near = (R, law.published, level == THREAD_LEVEL, places)
             point_values(*near, wi, wo, towards, 0, count)
             point_values(*near, go, wo, onwards, 0, count)
         else:
-            _by_law(R, law, level, hits, first, scattering, points)
+            _by_law(R, law, level, hits, first, scattering, places)
         finish_point(
             R, cloth, shadow, v_sign, R(0 if self.gap == 0 else 1), side.types, hits, first,
             scattering, points,
@@ -211,25 +217,22 @@ class FabricShader:
 
 
 @njit(**LEAN)
-def _by_law(R, law, level, hits, first, scattering, points):
+def _by_law(R, law, level, hits, first, scattering, places):
     """Sample and evaluate cloth with `conserving` threads, one hit at a time."""
     wo, wi, go, towards, onwards = scattering
-    sets, threads, psi0, across = points.sets, points.threads, points.psi0, points.across
     for k in range(wo.shape[1]):
         h = first + k
-        which, thread, angle, w = int(sets[k]), int(threads[k]), psi0[k], across[k]
+        place = place_at(places, k)
         ox, oy, oz = wo[0, k], wo[1, k], wo[2, k]
         x, y, z = law_direction(
-            R, law, level, which, thread, angle, w, ox, oy, oz,
+            R, law, level, place, ox, oy, oz,
             hits[CHANCE, h], hits[CHANCE + 1, h], hits[CHANCE + 2, h],
         )  # fmt: skip
         go[0, k], go[1, k], go[2, k] = x, y, z
         # Loop over both directions: the functions are large and inlined at each call.
         for turn in range(2):
-            pdf = law_density(R, law, level, which, thread, angle, w, x, y, z, ox, oy, oz)
-            red, green, blue = law_value(
-                R, law, level, which, thread, angle, w, x, y, z, ox, oy, oz
-            )
+            pdf = law_density(R, law, level, place, x, y, z, ox, oy, oz)
+            red, green, blue = law_value(R, law, level, place, x, y, z, ox, oy, oz)
             if turn == 0:
                 hits[GO_PDF, h] = pdf
                 onwards[0, k], onwards[1, k], onwards[2, k] = red, green, blue
@@ -283,15 +286,14 @@ def finish_point(R, cloth, shadow, v_sign, open_gap, types, hits, first, scatter
             continue
         u, v = float(hits[PLACE, h]), float(v_sign * hits[PLACE + 1, h])
         light, bounce = R(1), R(1)
+        hit = Hit(sets[k], threads[k], along[k], across[k], length[k])
         if shadow.method != NONE:
             # Light from behind the cloth is shadowed by the threads on that side.
             light = R(1) if wi[2, k] <= R(0) else shade(
-                R, cloth, shadow, u, v, sets[k], threads[k], along[k], across[k], length[k],
-                wi[0, k], wi[1, k], wi[2, k],
+                R, cloth, shadow, u, v, hit, wi[0, k], wi[1, k], wi[2, k],
             )  # fmt: skip
             bounce = R(1) if go[2, k] <= R(0) else shade(
-                R, cloth, shadow, u, v, sets[k], threads[k], along[k], across[k], length[k],
-                go[0, k], go[1, k], go[2, k],
+                R, cloth, shadow, u, v, hit, go[0, k], go[1, k], go[2, k],
             )  # fmt: skip
         for row in range(3):
             hits[F + row, h] = light * towards[row, k]

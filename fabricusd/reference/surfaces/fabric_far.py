@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.published.far import far_values
-from fabricusd.appearance.sampling.blocks import sample_far
+from fabricusd.appearance.sampling.blocks import Drawn, sample_far
 from fabricusd.kernels.real import BLOCK, KERNEL, LEAN, as_part
 from fabricusd.reference.rays.wave import CHANCE, F_PDF, GO, GO_PDF, KEEP, THREAD, WEIGHT, WI, WO, F
 
@@ -71,10 +71,9 @@ def shade_far(R, tables, sampling, gap, hits, first, last):
     for start in range(first, last, BLOCK):
         size = min(BLOCK, last - start)
         _gather(hits, start, size, wo, wi)
-        _sample_far(
-            R, sampling, wo, wi, hits[CHANCE], hits[CHANCE + 1], hits[CHANCE + 2], go,
-            hits[F_PDF], hits[GO_PDF], start, size,
-        )  # fmt: skip
+        numbers = hits[CHANCE], hits[CHANCE + 1], hits[CHANCE + 2]
+        drawn = Drawn(go, hits[F_PDF], hits[GO_PDF])
+        _sample_far(R, sampling, wo, wi, numbers, drawn, start, size)
         _far_values(R, tables, wi, wo, towards, 0, size)
         _far_values(R, tables, go, wo, onwards, 0, size)
         _finish_far(R, hits, start, size, gap, go, towards, onwards)

@@ -12,6 +12,7 @@ from fabricusd.appearance.conserving import multiple
 from fabricusd.appearance.conserving import single as conserving
 from fabricusd.appearance.conserving.shares import conserving_mixture
 from fabricusd.appearance.sampling.mixture import density, direction
+from fabricusd.appearance.weave.place import Place
 from fabricusd.appearance.weave.quadrature import POINTS, Rule
 from fabricusd.errors import FabricError
 from fabricusd.fabric import TangentCurve
@@ -209,10 +210,9 @@ def test_the_mean_over_the_bits_of_thread_is_the_repeat(name):
     total = np.zeros(3)
     for k, (c, s, weight) in enumerate(tables.nodes):
         area = weight * max(c, math.cos(math.radians(85)))
-        total += area * np.array(multiple.conserving_point_value(
-            np.float64, tables, int(k >= tables.warp_start), tables.node_thread[k],
-            math.atan2(s, c), *wi, *wo,
-        ))  # fmt: skip
+        place = Place(int(k >= tables.warp_start), tables.node_thread[k], math.atan2(s, c), 0.0)
+        value = multiple.conserving_point_value(np.float64, tables, place, *wi, *wo)
+        total += area * np.array(value)
     np.testing.assert_allclose(total, _value(tables, wi[None], wo[None])[0], rtol=1e-10)
 
 

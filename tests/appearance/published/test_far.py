@@ -73,8 +73,9 @@ def test_conserving_far_is_the_written_model_to_rounding_on_level_pieces(name):
     assert law.conserving.lost.size == 0
     found = surface.evaluate(replace(fabric, opaque=False), wi, wo, multiple=False)
     written = plain.conserving_far(fabric, wi, wo, per_segment=1)
-    # The two tables of E are quadratures of their own.
-    assert found == pytest.approx(written, rel=1e-4, abs=1e-9)
+    # The tables of E and of the light that is completed have other nodes: at 0.1 degrees from the
+    # normal plane x of a narrow lobe differs by 4e-4 of itself, 2e-5 of the albedo.
+    assert found == pytest.approx(written, rel=1e-3, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", PRESETS)

@@ -21,6 +21,7 @@ from fabricusd.appearance.shadow.methods import METHODS, compile_shadow, mean_li
 from fabricusd.appearance.weave.compiled import compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
 from fabricusd.appearance.weave.lookup import lookup
+from fabricusd.appearance.weave.place import NOWHERE, Place, Places
 from fabricusd.appearance.weave.quadrature import POINTS, Rule, curve_nodes
 from fabricusd.fabric import MODELS
 from tests.appearance.directions import VIEWS, direction, random_directions
@@ -49,8 +50,8 @@ def test_the_mean_of_weave_over_shared_nodes_is_far(name, model):
     for wi, wo in zip(WI, WO, strict=True):
         mean = np.zeros(3)
         for k, weight in enumerate(nodes.weight):
-            which, thread = set_of(nodes, k), nodes.thread[k]
-            value = point_value(R, tables, False, which, thread, nodes.psi0[k], 0.0, *wi, *wo)
+            place = Place(set_of(nodes, k), nodes.thread[k], nodes.psi0[k], 0.0)
+            value = point_value(R, tables, False, place, *wi, *wo)
             mean += weight * np.array(value)
         assert mean == pytest.approx(far_value(R, tables, *wi, *wo), rel=1e-10, abs=1e-13)
 
@@ -66,10 +67,9 @@ def test_the_mean_of_conserving_weave_over_shared_nodes_is_far(name):
     for wi, wo in zip(random_directions(12, 3, upper=False), WO, strict=True):
         mean = np.zeros(3)
         for k in range(len(area)):
-            which, thread = set_of(tables, k), tables.node_thread[k]
-            value = law_value(R, law, WEAVE, which, thread, psi0[k], 0.0, *wi, *wo)
-            mean += area[k] * np.array(value)
-        whole = law_value(R, law, FAR, 0, 0, 0.0, 0.0, *wi, *wo)
+            place = Place(set_of(tables, k), tables.node_thread[k], psi0[k], 0.0)
+            mean += area[k] * np.array(law_value(R, law, WEAVE, place, *wi, *wo))
+        whole = law_value(R, law, FAR, NOWHERE, *wi, *wo)
         assert mean == pytest.approx(whole, rel=1e-10, abs=1e-13)
 
 
@@ -94,7 +94,7 @@ def test_the_mean_of_weave_over_places_is_far(name, model):
     for wi, wo in zip(WI[:4], WO[:4], strict=True):
         i, o = (np.repeat(w[:, None], len(places), axis=1) for w in (wi, wo))
         over_places += surface._evaluate(law, "weave", hit, i, o).mean(axis=1)
-        far += law_value(R, law, FAR, 0, 0, 0.0, 0.0, *wi, *wo)
+        far += law_value(R, law, FAR, NOWHERE, *wi, *wo)
     assert over_places == pytest.approx(far, rel=1e-3)
 
 
@@ -106,11 +106,12 @@ def test_the_mean_of_thread_over_the_width_is_weave(name, model):
     for thread_set, psi0 in ((WARP, 0.3), (WEFT, -0.4), (WARP, 0.0)):
         thread = int(thread_set == WEFT)
         for wi, wo in zip(WI[:6], WO[:6], strict=True):
+            place = Place(thread_set, thread, psi0, 0.0)
             mean = sum(
-                0.5 * q * np.array(law_value(R, law, THREAD, thread_set, thread, psi0, w, *wi, *wo))
+                0.5 * q * np.array(law_value(R, law, THREAD, place._replace(w=w), *wi, *wo))
                 for w, q in zip(x, weight, strict=True)
             )
-            whole = law_value(R, law, WEAVE, thread_set, thread, psi0, 0.0, *wi, *wo)
+            whole = law_value(R, law, WEAVE, place, *wi, *wo)
             assert mean == pytest.approx(whole, rel=1e-10, abs=1e-13)
 
 
@@ -124,10 +125,8 @@ def test_weave_and_thread_are_the_written_model_at_a_point(name, model):
         for psi0, w in ((0.35, -0.7), (-0.1, 0.95), (0.0, 0.0)):
             width = np.full(len(WI), w)
             written = plain.segment(fabric, share, psi0, WI, WO, width)
-            found = [
-                point_value(R, tables, True, int(share.is_warp), thread, psi0, w, *WI[k], *WO[k])
-                for k in range(len(WI))
-            ]
+            place = Place(int(share.is_warp), thread, psi0, w)
+            found = [point_value(R, tables, True, place, *WI[k], *WO[k]) for k in range(len(WI))]
             found = np.array(found) * q[:, None]
             assert found == pytest.approx(written * (q > 1e-12)[:, None], rel=1e-9, abs=1e-12)
 
@@ -135,21 +134,20 @@ def test_weave_and_thread_are_the_written_model_at_a_point(name, model):
 @pytest.mark.parametrize("across_too", [False, True])
 @pytest.mark.parametrize("precision", [np.float64, np.float32])
 def test_the_scalar_and_the_vectorised_kernel_agree(across_too, precision):
-    places = spread_places(700)
+    uv = spread_places(700)
     wi, wo = random_directions(700, 8), random_directions(700, 9)
     for name, fabric in PRESETS.items():
-        tables, hit = surface_tables(fabric, precision=precision), lookup(fabric, places)
+        tables, hit = surface_tables(fabric, precision=precision), lookup(fabric, uv)
         i, o = (np.ascontiguousarray(w.T, precision) for w in (wi, wo))
         psi0, w = hit.angle.astype(precision), hit.across.astype(precision)
         out = np.empty_like(i)
-        point_values(precision, tables, across_too, hit.set, hit.thread, psi0, w, i, o, out, 0, 700)
+        places = Places(hit.set, hit.thread, psi0, w)
+        point_values(precision, tables, across_too, places, i, o, out, 0, 700)
         for k in range(0, 700, 9):
             expected = (0.0, 0.0, 0.0)
             if hit.set[k] != GAP:
-                expected = point_value(
-                    precision, tables, across_too, int(hit.set[k]), int(hit.thread[k]),
-                    psi0[k], w[k], *i[:, k], *o[:, k],
-                )  # fmt: skip
+                place = Place(int(hit.set[k]), int(hit.thread[k]), psi0[k], w[k])
+                expected = point_value(precision, tables, across_too, place, *i[:, k], *o[:, k])
             tolerance = 1e-12 if precision is np.float64 else 1e-4
             assert out[:, k] == pytest.approx(expected, rel=tolerance, abs=1e-7), name
 
@@ -205,7 +203,7 @@ def test_in_mixed_cloth_each_thread_scatters_by_its_own_model(level):
             assert (found == 0).all()
         else:
             assert found == pytest.approx(alone, rel=1e-9)
-    assert law_value(R, law, FAR, 0, 0, 0.0, 0.0, *WI[0], *-WO[0]) == (0.0, 0.0, 0.0)
+    assert law_value(R, law, FAR, NOWHERE, *WI[0], *-WO[0]) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("name", ["silk_crepe_de_chine", "polyester_satin_charmeuse", "velvet"])

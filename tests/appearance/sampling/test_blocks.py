@@ -7,11 +7,12 @@ import pytest
 
 from fabricusd.appearance.published.shares import published_mixture
 from fabricusd.appearance.published.tables import surface_tables
-from fabricusd.appearance.sampling.blocks import sample_far, sample_points
+from fabricusd.appearance.sampling.blocks import Drawn, sample_far, sample_points
 from fabricusd.appearance.sampling.mixture import density as far_density
 from fabricusd.appearance.sampling.mixture import direction as far_direction
 from fabricusd.appearance.sampling.mixture import point_density, point_direction
 from fabricusd.appearance.weave.lookup import lookup
+from fabricusd.appearance.weave.place import Place, Places
 from fabricusd.schema import load
 
 PRESETS = ("linen_plain", "polyester_satin_charmeuse", "silk_shot", "velvet")
@@ -37,7 +38,7 @@ def test_the_far_sampler_draws_the_same_directions_with_the_same_densities(prese
     wo, wi, u = views(700)
     go, p_light, p_go = np.empty_like(wo), np.empty(705, R), np.empty(705, R)
     rows = [np.concatenate([np.zeros(5, R), row]) for row in u]
-    sample_far(R, sampling, wo, wi, *rows, go, p_light, p_go, 5, 700)
+    sample_far(R, sampling, wo, wi, tuple(rows), Drawn(go, p_light, p_go), 5, 700)
     for k in range(700):
         one = far_direction(R, sampling, *wo[:, k], *u[:, k])
         assert go[:, k] == pytest.approx(one, abs=2e-5)
@@ -59,11 +60,11 @@ def test_the_sampler_at_a_point_does_too_and_gaps_are_uniform(preset, across_too
     go, p_light, p_go = np.empty_like(wo), np.empty(700, R), np.empty(700, R)
     w = hit.across.astype(R)
     sample_points(
-        R, tables.threads, sampling, across_too, hit.set, hit.thread, psi0, w, wo, wi, *u, go,
-        p_light, p_go, 0, 700,
+        R, tables.threads, sampling, across_too, Places(hit.set, hit.thread, psi0, w), wo, wi,
+        tuple(u), Drawn(go, p_light, p_go), 0, 700,
     )  # fmt: skip
     for k in range(700):
-        at = (across_too, int(hit.set[k]), int(hit.thread[k]), psi0[k], w[k])
+        at = (across_too, Place(int(hit.set[k]), int(hit.thread[k]), psi0[k], w[k]))
         one = point_direction(R, tables.threads, sampling, *at, *wo[:, k], *u[:, k])
         assert go[:, k] == pytest.approx(one, abs=2e-5)
         for direction, density in ((go, p_go), (wi, p_light)):

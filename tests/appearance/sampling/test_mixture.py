@@ -14,6 +14,8 @@ from fabricusd.appearance.sampling.lobes import (
     sample_lobe,
     theta_range,
 )
+from fabricusd.appearance.sampling.stretches import Stretch
+from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.fabric import MODELS
 from tests.appearance.chi_squared import threshold
 from tests.appearance.directions import VIEWS, cell_of, direction, random_directions, sphere_cells
@@ -87,6 +89,12 @@ def test_the_density_integrates_to_one(name, model, level):
         assert p @ weights.ravel() == pytest.approx(1.0, abs=2e-3)
 
 
+def stretch(psi0: float, surface_width: float, volume_width: float) -> Stretch:
+    """A warp thread at one tangent angle [rad], with the deviations of its lobes [rad]."""
+    c, s = math.cos(psi0), math.sin(psi0)
+    return Stretch(WARP, psi0, c, s, math.tan(psi0), surface_width, volume_width)
+
+
 @pytest.mark.parametrize("psi0", [0.0, 0.3, -0.9, 1.5, -1.5])
 @pytest.mark.parametrize("theta_o", [0.0, 0.7, -1.4])
 def test_each_lobe_integrates_to_one_in_its_own_frame(psi0, theta_o):
@@ -104,9 +112,8 @@ def test_each_lobe_integrates_to_one_in_its_own_frame(psi0, theta_o):
         for f, wf in zip(0.5 * limit * (y + 1), wy * limit, strict=True):
             c = math.cos(t)
             d = lobe_densities(
-                R, psi0, math.tan(psi0), 0.17, 0.4, theta_o,
-                math.sin(t), c * math.sin(f), c * math.cos(f),
-            )  # fmt: skip
+                R, stretch(psi0, 0.17, 0.4), theta_o, math.sin(t), c * math.sin(f), c * math.cos(f)
+            )
             total += np.array(d) * c * wt * wf
     assert total == pytest.approx(np.ones(THREAD_LOBES), abs=1e-6)
 
@@ -117,7 +124,7 @@ def test_each_lobe_integrates_to_one_in_its_own_frame(psi0, theta_o):
 def test_a_lobe_never_draws_below_the_cloth_or_behind_its_thread(lobe, psi0, theta_o):
     for u1 in (0.0, 1e-9, 0.3, 0.999999, 1.0):
         for u2 in (0.0, 0.5, 1.0):
-            t, b, n = sample_lobe(R, lobe, psi0, math.tan(psi0), 0.2, 0.2, theta_o, u1, u2)
+            t, b, n = sample_lobe(R, lobe, stretch(psi0, 0.2, 0.2), theta_o, u1, u2)
             assert t * t + b * b + n * n == pytest.approx(1.0, abs=1e-12)
             assert n >= 0.0
             assert math.cos(psi0) * n - math.sin(psi0) * t >= -1e-9

@@ -88,5 +88,5 @@ def test_lobes_without_a_mean_are_integrated_by_points_alone(monkeypatch):
     made = tables.surface_tables(narrow)
     assert 0 < len(made.nodes) <= MOST_NODES
     assert not made.nodes[:, tables.NODE_HALF].any()
-    with pytest.raises(FabricError, match="its form must be points"):
+    with pytest.raises(FabricError, match="the form of the rule must be points"):
         tables.surface_tables(narrow, rule=Rule(CELLS, 0.1))

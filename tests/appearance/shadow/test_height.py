@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.shadow.height import height_field, highest_point
+from fabricusd.appearance.weave.bands import seen_length
 from fabricusd.appearance.weave.compiled import compile_fabric
+from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEGREE, Fabric, TangentCurve, Thread, ThreadSet, Weave
@@ -37,10 +40,12 @@ def test_a_hump_is_as_high_as_its_float_is_long() -> None:
         cells[:, k] = False
         fabric = cloth(Weave(cells), HUMP)
         hit = lookup(fabric, [[0.5, k / 2]])
-        assert hit.height[0] == pytest.approx(RISE * k * 2e-3)
+        # It is seen on to the edges of the picks that cross over it.
+        seen = seen_length(k, float(coverage(fabric).width[WEFT]))
+        assert hit.height[0] == pytest.approx(RISE * seen * 2e-3)
         found = highest_point(fabric, compile_fabric(fabric, precision=np.float64))
         weft = RISE * 2 * 1e-3  # two ends, 1 mm each, over which the weft floats without end
-        assert found == pytest.approx(max(RISE * k * 2e-3, weft) + 0.1e-3)
+        assert found == pytest.approx(max(RISE * seen * 2e-3, weft) + 0.1e-3)
 
 
 def test_straight_threads_stand_half_their_thickness_above_the_cloth() -> None:
@@ -54,14 +59,15 @@ def test_round_threads_fall_to_the_axis_at_their_edges() -> None:
     on = flat > 0
     assert (round_[on] <= flat[on]).all()
     # The mean of sqrt(1 - w^2) over the width is pi/4.
-    column = flat[:, 0] > 0
-    warp = column & (np.arange(400) < 200)
+    u = (np.arange(400) + 0.5) / 400 * 2
+    warp = lookup(fabric, np.stack((u, np.full(400, 0.25)), axis=1)).set == WARP
     assert round_[warp, 0].mean() / flat[warp, 0].mean() == pytest.approx(math.pi / 4, rel=1e-2)
 
 
 def test_a_thread_of_unknown_thickness_is_as_thick_as_it_looks() -> None:
     compiled = compile_fabric(cloth(PLAIN, HUMP, thickness=0.0), precision=np.float64)
-    np.testing.assert_allclose(compiled.half_thickness[:, 0], [0.4 * 2e-3, 0.4 * 1e-3])
+    half = 0.5 * coverage(cloth(PLAIN, HUMP)).width
+    np.testing.assert_allclose(compiled.half_thickness[:, 0], half * [2e-3, 1e-3])
 
 
 @given(fabrics(back=False))

@@ -19,58 +19,74 @@ class Found(NamedTuple):
     position: float
     across: float
     angle: float
+    length: float
+    """Length of the visible run in cells; 0 on the strips of a hidden run, which rise nowhere."""
     edge: float
     """How near the point is to where another thread, or another piece of curve, begins."""
 
 
 def slow_lookup(fabric: Fabric, u: float, v: float) -> Found:
-    share = coverage(fabric)
+    width = coverage(fabric).width
     cells = fabric.weave.cells
     end, pick = math.floor(u), math.floor(v)
     x, y = u - end, v - pick
+    in_warp, in_weft = abs(x - 0.5) < width[WARP] / 2, abs(y - 0.5) < width[WEFT] / 2
+    edges = [abs(abs(x - 0.5) - width[WARP] / 2), abs(abs(y - 0.5) - width[WEFT] / 2)]
+    edges += [x, 1 - x, y, 1 - y]
+    if not (in_warp or in_weft):
+        return Found(GAP, 0, 0.0, 0.0, 0.0, 0.0, min(edges))
 
     def warp_on_top(i: int, j: int) -> bool:
         return bool(cells[i % cells.shape[0], j % cells.shape[1]])
 
-    def run(along_warp: bool) -> tuple[int, int]:
-        """Cells before this one in its run, and the run's length; a whole repeat if endless."""
-        i, j = (0, 1) if along_warp else (1, 0)
-        repeat = cells.shape[1] if along_warp else cells.shape[0]
-        value = warp_on_top(end, pick)
-
-        def same(steps: int) -> bool:
-            return warp_on_top(end + i * steps, pick + j * steps) == value
-
-        before = after = 0
-        while before < repeat and same(-before - 1):
-            before += 1
-        while after < repeat and same(after + 1):
-            after += 1
-        if before >= repeat:
-            return (pick if along_warp else end) % repeat, repeat
-        return before, before + 1 + after
-
-    top = WARP if warp_on_top(end, pick) else WEFT
-    over, along = (x, y) if top == WARP else (y, x)
-    half = share.width[top] / 2
-    edges = [abs(abs(over - 0.5) - half), x, 1 - x, y, 1 - y]
-    if half > 0 and abs(over - 0.5) < half:
-        hit, w, seen, visible = top, (over - 0.5) / half, along, 1.0
-    elif share.under == 1 - top and abs(along - 0.5) < share.under_width / 2:
-        hit, w = 1 - top, (along - 0.5) / (share.under_width / 2)
-        visible = 1 - 2 * half
-        seen = (over if over < 0.5 else over - 2 * half) / visible
-        edges.append(abs(abs(along - 0.5) - share.under_width / 2))
-    else:
-        edges.append(abs(abs(along - 0.5) - share.under_width / 2))
-        return Found(GAP, 0, 0.0, 0.0, 0.0, min(edges))
-    before, length = run(hit == WARP)
-    s = (before + seen) / length
-    sequence = (fabric.warp if hit == WARP else fabric.weft).sequence
-    kind = sequence[(end if hit == WARP else pick) % len(sequence)]
+    warp = warp_on_top(end, pick) if in_warp and in_weft else in_warp
+    hit = WARP if warp else WEFT
+    along, offset = (v, x) if warp else (u, y)
+    w = (offset - 0.5) / (width[hit] / 2)
+    s, length = _place_on_thread(
+        [warp_on_top(end, k) if warp else not warp_on_top(k, pick) for k in _repeat(fabric, warp)],
+        float(width[1 - hit]), along,
+    )  # fmt: skip
+    sequence = (fabric.warp if warp else fabric.weft).sequence
+    kind = sequence[(end if warp else pick) % len(sequence)]
     curve = fabric.thread_list[kind].curve
     jumps = (np.array(curve.positions) - curve.positions[0]) / (
         curve.positions[-1] - curve.positions[0]
     )
     edges.append(float(np.abs(jumps - s).min()))
-    return Found(hit, kind, s, -w if hit == WARP else w, float(angle_at(curve, s)), min(edges))
+    return Found(hit, kind, s, -w if warp else w, float(angle_at(curve, s)), length, min(edges))
+
+
+def _repeat(fabric: Fabric, warp: bool) -> range:
+    return range(fabric.weave.cells.shape[1 if warp else 0])
+
+
+def _place_on_thread(on_top: list[bool], crossing: float, along: float) -> tuple[float, float]:
+    """(s, length in cells) of the run at `along`; crossing thread k covers k + 1/2 +- crossing/2.
+
+    What is seen of a thread is cut up by the threads that lie over it; the pieces that hold a cell
+    where it is on top are runs. All other pieces of a hidden run are put together to one.
+    """
+    n = len(on_top)
+    if all(on_top):
+        return along % n / n, float(n)
+    hiding = [k for k in range(-2 * n, 4 * n) if not on_top[k % n]]
+    along = along % n + n
+    before = max(k for k in hiding if k + 0.5 + crossing / 2 <= along + 1e-12)
+    after = min(k for k in hiding if k + 0.5 - crossing / 2 >= along - 1e-12)
+    if after > before + 1:
+        low, high = before + 0.5 + crossing / 2, after + 0.5 - crossing / 2
+        return (along - low) / (high - low), high - low
+    strip = 1 - crossing
+    inside = along - (before + 0.5 + crossing / 2)
+    if not any(on_top):
+        # The repeat starts in the middle of a strip: its first half lies before thread 0.
+        covered = sum(min(max(along % n - (k + 0.5 - crossing / 2), 0), crossing) for k in range(n))
+        return (along % n - covered) / (n * strip), 0.0
+    first = before
+    while not on_top[(first - 1) % n]:
+        first -= 1
+    last = before
+    while not on_top[(last + 1) % n]:
+        last += 1
+    return ((before - first) * strip + inside) / ((last - first) * strip), 0.0

@@ -290,22 +290,34 @@ def plain_albedo(thread: Thread, count: int = 721) -> tuple[Floats, Floats]:
     """(|theta|, E) in plain NumPy: the directional albedo of the surface term, at most 1."""
     # Denser towards 90 degrees, where narrow lobes make E steep.
     theta = math.pi / 2 * np.sin(np.linspace(0, math.pi / 2, count))
-    x, x_weight = np.polynomial.legendre.leggauss(200)
     y, y_weight = np.polynomial.legendre.leggauss(64)
-    shape = (len(x), len(y))
-    still: Any = np.zeros(shape)
-    o_phi = np.broadcast_to((y + 1) * math.pi / 2, shape)
     narrow = 2 * thread.gamma_surface
     albedo = np.empty(count)
     for k, t in enumerate(theta):
-        # The nodes follow the lobe, because a narrow lobe falls between the points of a fixed grid.
-        lo, hi = max(-math.pi / 2, -t - 9 * narrow), min(math.pi / 2, -t + 9 * narrow)
-        out = np.broadcast_to((lo + (hi - lo) * (x + 1) / 2)[:, None], shape)
+        nodes, weight = _around_the_mirror(float(t), narrow)
+        shape = (len(nodes), len(y))
+        still: Any = np.zeros(shape)
+        o_phi = np.broadcast_to((y + 1) * math.pi / 2, shape)
+        out = np.broadcast_to(nodes[:, None], shape)
         i = plain.Angles(theta=np.full(shape, t), phi=still, psi=still)
         o = plain.Angles(theta=out, phi=o_phi, psi=still)
         value = plain_surface(thread, i, o) * np.cos(out) ** 2
-        albedo[k] = x_weight @ value @ y_weight * math.pi * (hi - lo) / 2
+        albedo[k] = weight @ value @ y_weight * math.pi
     return theta, np.minimum(albedo, 1.0)
+
+
+def _around_the_mirror(t: float, narrow: float) -> tuple[Floats, Floats]:
+    """Inclinations and weights of a quadrature over a lobe of deviation `narrow` around -t [rad].
+
+    The nodes follow the lobe, because a narrow lobe falls between the points of a fixed grid. They
+    are split where the larger of the two cosines has a kink.
+    """
+    lo, hi = max(-math.pi / 2, -t - 9 * narrow), min(math.pi / 2, -t + 9 * narrow)
+    cuts = sorted({lo, hi, *(c for c in (-t, t) if lo < c < hi)})
+    x, weight = np.polynomial.legendre.leggauss(100)
+    half = np.diff(cuts)[:, None] / 2
+    nodes = np.array(cuts[:-1])[:, None] + half * (x + 1)
+    return nodes.ravel(), (half * weight).ravel()
 
 
 def plain_terms(thread: Thread, i: plain.Angles, o: plain.Angles) -> tuple[Floats, Floats]:
@@ -330,18 +342,16 @@ def plain_lost(thread: Thread) -> Floats:
     """x at the inclinations of `plain_albedo`, in plain NumPy."""
     table, albedo = plain_albedo(thread)
     kept = 1 - albedo
-    x, weight = np.polynomial.legendre.leggauss(400)
     narrow = 2 * thread.gamma_volume
-    wide = x * math.pi / 2
-    around = weight * math.pi / 2 @ (np.interp(abs(wide), table, kept) * np.cos(wide) ** 2)
+    wide, weight = _around_the_mirror(0.0, math.pi)
+    around = weight @ (np.interp(abs(wide), table, kept) * np.cos(wide) ** 2)
     lost = np.empty(len(table))
     for n, t in enumerate(table):
-        lo, hi = max(-math.pi / 2, -t - 9 * narrow), min(math.pi / 2, -t + 9 * narrow)
-        out = lo + (hi - lo) * (x + 1) / 2
+        out, weight = _around_the_mirror(float(t), narrow)
         k = plain.longitudinal(np.full_like(out, t), out, narrow)
         widest = np.maximum(np.maximum(np.cos(out), math.cos(t)), 1e-6)
         through = np.interp(abs(out), table, kept) * np.cos(out) ** 2
-        lobe = weight * (hi - lo) / 2 @ (through * k / widest)
+        lobe = weight @ (through * k / widest)
         diffuse = 2 / math.pi * around
         volume = (1 - thread.isotropic) * lobe + thread.isotropic * diffuse
         lost[n] = max(0, kept[n] * (1 - volume / kept.max()))
