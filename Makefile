@@ -18,14 +18,14 @@ $(STAMP): pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
 	@touch $@
 
-demo: $(STAMP)  ## Install into .venv, author and check every preset, drape, render and bake a garment, into demo/.
+demo: $(STAMP)  ## Install into .venv, author and check every preset, drape, render and bake a garment, into demo/; GARMENT=FILE renders yours too.
 	$(BIN)/fabricusd demo -o demo
 	$(BIN)/python samples/make_samples.py demo
 	$(BIN)/fabricusd render demo/skirt.usda -o demo/skirt.exr --width 480 --height 480 --spp 32
 	$(BIN)/fabricusd bake demo/skirt.usda --fit --resolution 1024 -o demo/baked --quiet
 	$(BIN)/fabricusd material demo/baked --scene demo/skirt.usda -o demo/skirt_look.usda
-	@if [ -f ../shared/data/towel.obj ]; then $(BIN)/fabricusd render ../shared/data/towel.obj \
-		--fabric silk_shot -o demo/towel.exr --width 480 --height 360 --spp 32; fi
+	@if [ -n "$(GARMENT)" ]; then $(BIN)/fabricusd render "$(GARMENT)" \
+		--fabric silk_shot -o demo/garment.exr --width 480 --height 360 --spp 32; fi
 
 test: $(STAMP)  ## Run every test, the linters and the type checker.
 	$(BIN)/ruff format --check .

@@ -45,6 +45,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="fabric file, draft or preset for meshes without a fabric",
     )
     add_units(parser)
+    _add_picture(parser)
+    _add_quality(parser)
+    parser.add_argument("--seed", type=number("seed"), default=0, help="random seed (default: 0)")
+    parser.add_argument(
+        "--workers", type=number("workers"), metavar="N", help="CPU threads (default: all)"
+    )
+    parser.add_argument(
+        "-n",
+        "--dry-run",
+        action="store_true",
+        help="read and describe the scene, but render nothing",
+    )
+    parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
+
+
+def _add_picture(parser: argparse.ArgumentParser) -> None:
+    """What the picture shows and holds."""
     parser.add_argument(
         "--camera", metavar="PATH", help="prim path of the camera (default: the first one)"
     )
@@ -57,6 +74,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--height", type=number("height"), default=540, help="pixels down (default: 540)"
     )
+    parser.add_argument(
+        "--aov",
+        action="append",
+        default=[],
+        metavar="LAYER",
+        help="also write this layer, or 'all' (repeatable)",
+    )
+    parser.add_argument(
+        "--frames", metavar="A-B", help="time codes to render: 7, 1-10, 1-10x2, or a list of these"
+    )
+    parser.add_argument(
+        "--exposure",
+        type=number("exposure"),
+        default=0.0,
+        metavar="STOPS",
+        help="exposure of the .png (default: 0)",
+    )
+
+
+def _add_quality(parser: argparse.ArgumentParser) -> None:
+    """How much work to spend, and at which level of detail."""
     parser.add_argument(
         "--spp", type=number("spp"), metavar="N", help="samples per pixel (default: 64)"
     )
@@ -94,34 +132,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--complexity", choices=("auto", "low", "medium", "high", "veryhigh"), default="auto",
         help="refinement of subdivision surfaces; low: none; auto: as fine as the picture shows",
     )  # fmt: skip
-    parser.add_argument(
-        "--aov",
-        action="append",
-        default=[],
-        metavar="LAYER",
-        help="also write this layer, or 'all' (repeatable)",
-    )
-    parser.add_argument(
-        "--frames", metavar="A-B", help="time codes to render: 7, 1-10, 1-10x2, or a list of these"
-    )
-    parser.add_argument(
-        "--exposure",
-        type=number("exposure"),
-        default=0.0,
-        metavar="STOPS",
-        help="exposure of the .png (default: 0)",
-    )
-    parser.add_argument("--seed", type=number("seed"), default=0, help="random seed (default: 0)")
-    parser.add_argument(
-        "--workers", type=number("workers"), metavar="N", help="CPU threads (default: all)"
-    )
-    parser.add_argument(
-        "-n",
-        "--dry-run",
-        action="store_true",
-        help="read and describe the scene, but render nothing",
-    )
-    parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -26,7 +26,7 @@ from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import AOVS, Film, require_aovs
 from fabricusd.reference.integrator import Tracer
 from fabricusd.reference.nothing_seen import reason_for_nothing
-from fabricusd.reference.rays.camera import build_lens, default_camera
+from fabricusd.reference.rays.camera import Lens, build_lens, default_camera
 from fabricusd.reference.rays.wave import ALPHA, Wave
 from fabricusd.reference.start.compile_ahead import EVERY_PICTURE, compile_ahead
 from fabricusd.reference.view_transform import view
@@ -305,11 +305,8 @@ def render_scene(
     complete = _sample(tracer, lens, film, count, counters, most, noise, progress, built, stop)
     seconds, busy = time.perf_counter() - built, time.process_time() - busy
     rays, shadow_rays, not_finite = (int(x) for x in counters.sum(axis=0))
-    if not_finite:
-        scene.note("the picture", f"lost {not_finite} values that were not finite")
     met = bool(film.sums[ALPHA].any()) or not complete
-    if not met and len(tracer.tables.triangles):
-        scene.note("the picture", reason_for_nothing(tracer, lens, width, height))
+    _note_losses(scene, tracer, lens, not_finite, met, (width, height))
     embree, triangles = tracer.accelerator.version, len(tracer.tables.triangles)
     # Free the triangles and their acceleration structure before the layers are made.
     del tracer
@@ -340,6 +337,16 @@ def render_scene(
         met=met,
         metadata=metadata,
     )
+
+
+def _note_losses(
+    scene: Scene, tracer: Tracer, lens: Lens, not_finite: int, met: bool, size: tuple[int, int]
+) -> None:
+    """Note values that were not finite, and why a picture shows nothing."""
+    if not_finite:
+        scene.note("the picture", f"lost {not_finite} values that were not finite")
+    if not met and len(tracer.tables.triangles):
+        scene.note("the picture", reason_for_nothing(tracer, lens, *size))
 
 
 def _furnished(scene: Scene, width: int, height: int) -> Camera:

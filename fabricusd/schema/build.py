@@ -8,11 +8,12 @@ from typing import Any
 from pxr import Usd
 
 from fabricusd.fabric import Fabric, TangentCurve, Thread, ThreadSet, Weave
-from fabricusd.schema import attributes, weave_rows
+from fabricusd.schema import attributes
 from fabricusd.schema.access import thread_prims, value
 from fabricusd.schema.attributes import DEGREE, Attribute, to_si
 from fabricusd.schema.colors import color
 from fabricusd.schema.names import free_name
+from fabricusd.weaves import rows as weave_rows
 
 
 def build_side(prim: Usd.Prim) -> Fabric:

@@ -134,7 +134,7 @@ def curve_words(curve: TangentCurve) -> str:
 
 def as_dict(fabric: Fabric) -> dict[str, Any]:
     """Everything for JSON: metres, threads per metre, angles in degrees, rows as in the file."""
-    from fabricusd.schema.weave_rows import from_cells
+    from fabricusd.weaves.rows import from_cells
 
     share = coverage(fabric)
     sets = {

@@ -10,12 +10,13 @@ from pxr import Sdf, Usd, Vt
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric, Thread
 from fabricusd.files import whole_file
-from fabricusd.schema import attributes, weave_rows
+from fabricusd.schema import attributes
 from fabricusd.schema.access import BINDING_API
 from fabricusd.schema.attributes import DEGREE, Attribute, from_si, unscale
 from fabricusd.schema.colors import LINEAR
 from fabricusd.schema.names import free_name, prim_name
 from fabricusd.schema.source import usd_errors
+from fabricusd.weaves import rows as weave_rows
 
 EXTENSIONS = (".usda", ".usdc", ".usd")
 

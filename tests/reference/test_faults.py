@@ -282,7 +282,7 @@ def test_usd_itself_writes_nothing_to_standard_error(tmp_path, capfd):
 def test_a_camera_that_is_not_there_is_an_error_that_names_those_that_are(tmp_path):
     stage = new_stage(tmp_path)
     UsdGeom.Camera.Define(stage, "/front")
-    with pytest.raises(FabricError, match=r"/side is no camera; the scene's are: /front"):
+    with pytest.raises(FabricError, match=r"/side is not a camera; cameras are: /front"):
         read(stage, camera="/side")
 
 

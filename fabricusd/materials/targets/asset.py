@@ -39,14 +39,15 @@ GEOMETRY = "geo"
 
 
 def check(where: Path, clobber: bool) -> None:
-    """A folder that is no asset of ours, or has no folder to lie in."""
+    """Refuse a folder that is not an asset of ours, or that has no parent folder."""
     if not where.parent.is_dir():
-        raise FabricError(f"--asset '{where}'", f"is in '{where.parent}', which is no directory")
+        raise FabricError(f"--asset '{where}'", f"is in '{where.parent}', which is not a directory")
     if where.exists() and not where.is_dir():
         raise FabricError(f"--asset '{where}'", "is a file; it must be a folder")
     if where.is_dir() and any(where.iterdir()) and not _is_ours(_root_path(where)):
         raise FabricError(
-            f"--asset '{where}'", "holds files that are no asset of fabricusd; it must be new"
+            f"--asset '{where}'",
+            "holds files that are not an asset of fabricusd; it must be new",
         )
 
 

@@ -144,7 +144,7 @@ def _lens(
     orthographic: bool,
     scene: Scene,
 ) -> tuple[float, float]:
-    """(f-stop, focus distance [m]); (0, 0), which is sharp, with a note where they are no lens."""
+    """(f-stop, focus distance [m]); (0, 0), which is sharp, and a note if they describe no lens."""
     f_stop = float(value_of(camera.GetFStopAttr(), time, scene))
     focus = float(value_of(camera.GetFocusDistanceAttr(), time, scene)) * metres
     if orthographic or f_stop == 0:

@@ -286,7 +286,7 @@ class _Reader:
             prim = self.stage.GetPrimAtPath(name) if Sdf.Path.IsValidPathString(name) else None
             if not prim or not prim.IsA(UsdGeom.Camera):
                 known = ", ".join(str(p.GetPath()) for p in self.cameras) or "none"
-                raise FabricError(f"{path}:{name}", f"is no camera; the scene's are: {known}")
+                raise FabricError(f"{path}:{name}", f"is not a camera; cameras are: {known}")
             found = self._read_camera(prim)
             if found is None:
                 own = [n for n in self.scene.notes if n.startswith(f"{prim.GetPath()} ")]

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Sdf, Usd
 
-from fabricusd.schema import weave_rows
 from fabricusd.schema.access import (
     kind_of,
     lost_targets,
@@ -20,6 +19,7 @@ from fabricusd.schema.access import (
 )
 from fabricusd.schema.build import build_side
 from fabricusd.schema.rules.table import FABRIC, Fault, rule
+from fabricusd.weaves import rows as weave_rows
 
 
 def _forwarding_cycle(relationship: Usd.Relationship) -> list[str]:

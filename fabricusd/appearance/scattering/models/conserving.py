@@ -290,7 +290,7 @@ def plain_albedo(thread: Thread, count: int = 721) -> tuple[Floats, Floats]:
     """(|theta|, E) in plain NumPy: the directional albedo of the surface term, at most 1."""
     # Denser towards 90 degrees, where narrow lobes make E steep.
     theta = math.pi / 2 * np.sin(np.linspace(0, math.pi / 2, count))
-    y, y_weight = np.polynomial.legendre.leggauss(64)
+    y, y_weight = np.polynomial.legendre.leggauss(24)
     narrow = 2 * thread.gamma_surface
     albedo = np.empty(count)
     for k, t in enumerate(theta):
@@ -302,8 +302,11 @@ def plain_albedo(thread: Thread, count: int = 721) -> tuple[Floats, Floats]:
         i = plain.Angles(theta=np.full(shape, t), phi=still, psi=still)
         o = plain.Angles(theta=out, phi=o_phi, psi=still)
         value = plain_surface(thread, i, o) * np.cos(out) ** 2
-        albedo[k] = weight @ value @ y_weight * math.pi
+        albedo[k] = (weight[:, None] * value * y_weight).sum() * math.pi
     return theta, np.minimum(albedo, 1.0)
+
+
+_PLAIN_NODES = np.polynomial.legendre.leggauss(40)
 
 
 def _around_the_mirror(t: float, narrow: float) -> tuple[Floats, Floats]:
@@ -314,7 +317,7 @@ def _around_the_mirror(t: float, narrow: float) -> tuple[Floats, Floats]:
     """
     lo, hi = max(-math.pi / 2, -t - 9 * narrow), min(math.pi / 2, -t + 9 * narrow)
     cuts = sorted({lo, hi, *(c for c in (-t, t) if lo < c < hi)})
-    x, weight = np.polynomial.legendre.leggauss(100)
+    x, weight = _PLAIN_NODES
     half = np.diff(cuts)[:, None] / 2
     nodes = np.array(cuts[:-1])[:, None] + half * (x + 1)
     return nodes.ravel(), (half * weight).ravel()
@@ -351,7 +354,7 @@ def plain_lost(thread: Thread) -> Floats:
         k = plain.longitudinal(np.full_like(out, t), out, narrow)
         widest = np.maximum(np.maximum(np.cos(out), math.cos(t)), 1e-6)
         through = np.interp(abs(out), table, kept) * np.cos(out) ** 2
-        lobe = weight @ (through * k / widest)
+        lobe = (weight * through * k / widest).sum()
         diffuse = 2 / math.pi * around
         volume = (1 - thread.isotropic) * lobe + thread.isotropic * diffuse
         lost[n] = max(0, kept[n] * (1 - volume / kept.max()))

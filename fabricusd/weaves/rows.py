@@ -1,4 +1,4 @@
-"""The weave grid as USD holds it: one string of 0 and 1 for each pick."""
+"""Convert the weave grid to and from rows: one string of 0 and 1 for each pick, as USD holds it."""
 
 from __future__ import annotations
 
