@@ -61,7 +61,7 @@ def test_textures_are_mip_mapped_and_the_scratch_is_gone(whole):
     name = whole.files[whole.garments[0].name]["normal"][1001]
     levels = [read_mip_level(whole.folder / name, k) for k in range(10)]
     assert [a.shape[0] for a in levels] == [512 >> k for k in range(10)]
-    with pytest.raises(FabricError, match="no level 10"):
+    with pytest.raises(FabricError, match="no mip level 10"):
         read_mip_level(whole.folder / name, 10)
     assert not (whole.folder / ".bake").exists()
 
@@ -297,7 +297,7 @@ def test_16_bit_files_hold_the_values_of_the_exr(square, linen, tmp_path, file_f
         limit = 0.0 if name == "thread_id" else 0.5001 * steepest * said["scale"] / 65535 + 1e-7
         assert np.abs(a - c).max() <= limit, name
     assert other.manifest["maps"]["albedo"]["color_space"] == "srgb_texture"
-    with pytest.raises(FabricError, match="no level 1"):
+    with pytest.raises(FabricError, match="no mip level 1"):
         other.read("square_obj", "normal", 1)
     with pytest.raises(FabricError, match="must be one of exr"):
         bake(square, tmp_path / "jpg", Settings(file_format="jpg"), fabric=linen)

@@ -118,6 +118,6 @@ def test_a_folder_of_somebody_else_is_left_alone(baked, tmp_path, capsys):
     (tmp_path / "shirt" / "shirt.usda").write_text("#usda 1.0\n")
     assert write(baked, tmp_path / "shirt") == 2
     line = capsys.readouterr().err
-    assert "no asset of fabricusd" in line
+    assert "not an asset of fabricusd" in line
     assert line.count("\n") == 1
     assert [path.name for path in (tmp_path / "shirt").iterdir()] == ["shirt.usda"]

@@ -122,7 +122,7 @@ def far_texel(fabric):
     """The texel that spans many repeats of a fabric."""
     made = recipe(fabric)
     lay = garments(quad_scene(fabric, 6400.0))[0].lays[0]
-    mean = Texels.of_planes(made.mean[:, None], made, lay)
+    mean = Texels.of_moments(made.mean[:, None], made, lay)
     value = {name: REGISTRY[name].function(mean).astype(np.float64) for name in NEEDED}
     x, y, _ = value["tangent"].T
     return TexelSample(

@@ -47,7 +47,7 @@ def write_usdz(
         raise FabricError(str(path), "is not the name of a USDZ package; it must end in .usdz")
     missing = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(look)))[2]
     if missing:
-        raise FabricError(str(look), f"refers to {missing[0]}, which is not there")
+        raise FabricError(str(look), f"refers to {missing[0]}, which does not exist")
     with tempfile.TemporaryDirectory() as folder, whole_file(path, clobber=clobber) as temporary:
         layer = flat_garment(Usd.Stage.Open(str(look)))
         layer.documentation = f"A baked fabric, packaged by fabricusd {__version__}"
