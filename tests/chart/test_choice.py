@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -66,6 +67,7 @@ def test_a_dry_run_says_what_would_be_chosen_and_why(capsys, tmp_path):
     arguments = ["render", str(mesh), "--fabric", "velvet", "-o", out, "-n", "--max-error", "0.05"]
     assert main(arguments) == 0
     said = capsys.readouterr().err
-    assert "shadow none: error 0" in said
+    # On pile no method errs, and what `none` and `horizon` cost differs by the noise of a clock.
+    assert re.search("shadow (none|horizon): error 0, 1 times the cheapest", said)
     assert "noise 0.05" in said
     assert not (tmp_path / "o.png").exists()
