@@ -22,6 +22,7 @@ def quick_chart(folder: Path) -> float:
     return time.process_time() - start
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_the_quick_chart_is_whole_and_takes_less_than_a_minute(capsys, tmp_path):
     if quick_chart(tmp_path / "charts") > SECONDS:

@@ -95,6 +95,7 @@ def test_with_a_bound_no_frame_differs_from_the_next_by_more_than_twice_the_boun
     assert seen > 0
 
 
+@pytest.mark.exhaustive
 def test_the_shipped_limits_are_those_that_are_measured():
     name = "silk_shot"
     found = coarsest(load(name), (0.1, 0.02))

@@ -1,4 +1,4 @@
-"""Tubes seen from above show the threads that the bands put there; lit shares are shares."""
+"""Tubes seen from above show the threads that the lookup finds there; lit shares are shares."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import pytest
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.coverage import GAP, coverage
+from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.fabric import Fabric
 from fabricusd.geometry import lit_share, seen, tubes
 from fabricusd.schema import load
@@ -23,25 +24,20 @@ def places(fabric: Fabric, count: int = 20000) -> np.ndarray:
     return rng.random((count, 2)) * true_repeat(fabric)
 
 
-def by_bands(fabric: Fabric, uv: np.ndarray) -> np.ndarray:
-    """(n, 2) set and number in the set at each place, as the bands and the grid say."""
-    x = coverage(fabric).width
+def by_lookup(fabric: Fabric, uv: np.ndarray) -> np.ndarray:
+    """(n, 2) set and number in the set at each place, as levels `weave` and `thread` see it."""
+    which = lookup(fabric, uv).set.astype(int)
     cell = np.floor(uv).astype(int)
-    off = np.abs(uv - cell - 0.5)
-    warp, weft = off[:, 0] < 0.5 * x[WARP], off[:, 1] < 0.5 * x[WEFT]
-    ends, picks = fabric.weave.cells.shape
-    top = fabric.weave.cells[cell[:, 0] % ends, cell[:, 1] % picks]
-    which = np.where(warp & (top | ~weft), WARP, np.where(weft, WEFT, GAP))
     number = np.where(which == WARP, cell[:, 0], np.where(which == WEFT, cell[:, 1], -1))
     return np.stack((which, number), axis=1)
 
 
 @pytest.mark.parametrize("name", WOVEN)
-def test_the_thread_seen_from_above_is_the_one_that_the_bands_show(name: str) -> None:
+def test_the_thread_seen_from_above_is_the_one_that_the_lookup_finds(name: str) -> None:
     fabric = load(name)
     uv = places(fabric)
     found = seen(tubes(fabric), uv)
-    same = (np.stack((found.set, found.number), axis=1) == by_bands(fabric, uv)).all(axis=1)
+    same = (np.stack((found.set, found.number), axis=1) == by_lookup(fabric, uv)).all(axis=1)
     assert same.mean() >= 0.98
 
 
@@ -50,7 +46,7 @@ def test_a_grid_turned_round_shows_other_threads() -> None:
     fabric = load("polyester_satin_charmeuse")
     uv = places(fabric)
     found = seen(tubes(fabric), uv + np.array((1.0, 0.0)))
-    assert (found.number == by_bands(fabric, uv)[:, 1]).mean() < 0.5
+    assert (found.number == by_lookup(fabric, uv)[:, 1]).mean() < 0.5
 
 
 def test_angle_and_place_across_are_those_of_the_curve() -> None:

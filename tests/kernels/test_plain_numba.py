@@ -42,6 +42,7 @@ def values(**variables):
     return plain, [np.array(v) for v in found]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.skipif(not internals.use_internals(), reason="this run uses numba as it is")
 def test_values_without_internals_are_those_with_them():

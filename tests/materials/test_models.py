@@ -204,6 +204,7 @@ def test_the_mean_of_the_threads_rows_is_level_far():
     assert target.members.sum(axis=1) == pytest.approx(1.0)
 
 
+@pytest.mark.exhaustive
 def test_threads_of_two_colours_are_fitted_better_one_by_one(monkeypatch):
     monkeypatch.setattr("fabricusd.materials.fit.judge.VIEWS", 6)
     monkeypatch.setattr("fabricusd.materials.fit.judge.LIGHTS", 48)

@@ -75,6 +75,7 @@ def test_each_instance_gets_its_look(name, shot, tmp_path):
     assert kinds == {"baked": {"/World/FabricLooks/Body"}, "procedural": {"linen_plain"}}
 
 
+@pytest.mark.exhaustive
 def test_the_look_looks_like_the_fabric(shot, tmp_path):
     look = tmp_path / "look.usda"
     write_materials(shot[1], look, Settings(), scene=shot[0])
