@@ -40,15 +40,15 @@ def rows_of_texels(R, on_top, along, over, width, count, tiny):
     width : of the thread on top. The thread underneath shows a strip on either side of it, and each
         strip has half the rows: nothing is interpolated across the thread between them.
     """
-    if on_top:
-        return cell_of_texels(R, along, count)
     behind = over > R(0.5)
     strip = max(R(0.5) * (R(1) - width), tiny)
+    place = along if on_top else (over - (R(1) - strip) if behind else over) / strip
+    # Selections, not branches: this is part of a loop that LLVM vectorises.
     half = count // 2
-    place = (over - (R(1) - strip) if behind else over) / strip
-    x = max(R(0), min(place * R(half) - R(0.5), R(half - 1)))
-    k = min(int(x), max(half - 2, 0))
-    return k + (half if behind else 0), x - R(k)
+    rows = count if on_top else half
+    x = max(R(0), min(place * R(rows) - R(0.5), R(rows - 1)))
+    k = min(int(x), max(rows - 2, 0))
+    return k + (half if behind and not on_top else 0), x - R(k)
 
 
 @njit(**INLINE)
