@@ -23,6 +23,12 @@ MODELS = ("thesis", "microcylinder", "conserving")
 """Thread scattering models; each is a module of that name in `appearance/scattering/models` and a
 token of the schema. A model's number is its index here, so new models are appended."""
 
+FACETS = "facets"
+SURFACE_LAWS = ("masked", "unmasked", "projected", FACETS)
+"""Laws by which light on threads becomes light on cloth. The first is the default. Those of
+published threads are modules of that name in `appearance/laws`; FACETS is the law of
+`conserving` threads."""
+
 DEFAULT_MODEL = "microcylinder"
 PILE_ANGLE = math.radians(85.0)
 """A curve steeper than this is pile: it stands up from the cloth and has no height field."""
@@ -292,6 +298,8 @@ class Fabric:
     weave : Weave
     warp, weft : ThreadSet - warp runs along V, weft along U
     model : str - one of MODELS, for every thread that does not name one
+    surface_law : str - one of SURFACE_LAWS: how light on threads becomes light on cloth. `conserving`
+        threads follow "facets" whatever it is, and threads of other models cannot
     opaque : bool - whether it lets no light through: cloth with a backing, or pile
     masking_width : float - standard deviation of `u`, the correlation of shadowing and masking in
         azimuth [rad]; 20 degrees in [Sadeghi2013]
@@ -305,6 +313,7 @@ class Fabric:
     warp: ThreadSet = ThreadSet()
     weft: ThreadSet = ThreadSet()
     model: str = DEFAULT_MODEL
+    surface_law: str = SURFACE_LAWS[0]
     opaque: bool = False
     masking_width: float = field(
         default=20 * DEGREE, metadata=_limits(above=0.0, maximum=2 * math.pi)
@@ -318,6 +327,20 @@ class Fabric:
             raise FabricError("threads", "is empty; a fabric must have at least one thread")
         if self.model not in MODELS:
             raise FabricError("model", f"is '{self.model}'; it must be one of {', '.join(MODELS)}")
+        if self.surface_law not in SURFACE_LAWS:
+            raise FabricError(
+                "surface_law",
+                f"is '{self.surface_law}'; it must be one of {', '.join(SURFACE_LAWS)}",
+            )
+        if self.surface_law == FACETS:
+            for name, thread in self.threads.items():
+                if self.model_of(thread) != MODELS[-1]:
+                    raise FabricError(
+                        "surface_law",
+                        f"is '{FACETS}', the law of {MODELS[-1]} threads, but the model of thread "
+                        f"'{name}' is {self.model_of(thread)}; it must be one of "
+                        f"{', '.join(SURFACE_LAWS[:-1])}",
+                    )
         _require_limits(self)
         for label, thread_set in (("warp", self.warp), ("weft", self.weft)):
             for k, index in enumerate(thread_set.sequence):

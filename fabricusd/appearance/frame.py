@@ -121,3 +121,10 @@ def half_difference(R, sin_i, cos_i, sin_o, cos_o):
     s, c = sin_i + sin_o, cos_i + cos_o
     ds, dc = sin_i - sin_o, cos_i - cos_o
     return atan2(R, math.sqrt(ds * ds + dc * dc), math.sqrt(s * s + c * c))
+
+
+@njit(**INLINE)
+def diamond(R, x, y):
+    """Diamond angle of (x, y), from 0 to 4: 1 per quadrant, linear in y/(|x| + |y|) inside it."""
+    part = x / max(abs(x) + abs(y), R(1e-30))
+    return R(1) - part if y >= R(0) else R(3) + part

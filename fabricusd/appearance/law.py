@@ -37,6 +37,7 @@ from fabricusd.appearance.sampling.mixture import (
     point_direction,
 )
 from fabricusd.appearance.scattering.models import any_conserving, any_published
+from fabricusd.appearance.shadow.methods import Shadow
 from fabricusd.appearance.weave.quadrature import Rule
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import PART
@@ -67,17 +68,19 @@ def surface_law(
     precision: type[np.floating[Any]] = np.float32,
     rule: Rule | None = None,
     multiple: bool = True,
+    shadow: Shadow | None = None,
 ) -> SurfaceLaw:
     """The law of `fabric` in `precision`, np.float32 or np.float64.
 
     rule : quadrature over the curves; None takes the default of each model
     multiple : whether `conserving` cloth scatters light more than once; its table takes a second to
         compute
+    shadow : the shadowing whose mean level `far` holds under a law that does not mask; None for none
     """
     kind = PUBLISHED_ONLY
     if any_conserving(fabric):
         kind = MIXED if any_published(fabric) else CONSERVING_ONLY
-    published = surface_tables(fabric, precision=precision, rule=rule)
+    published = surface_tables(fabric, precision=precision, rule=rule, shadow=shadow)
     lobes = no_mixture(precision)
     if kind != CONSERVING_ONLY:
         lobes = published_mixture(fabric, published)

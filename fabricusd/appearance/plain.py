@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import erf
 
+from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.scattering.models import named
 from fabricusd.appearance.scattering.plain_lobes import Angles, Array, angles, wrap
 from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage
 from fabricusd.fabric import PILE_ANGLE, Fabric, TangentCurve, Thread
 
 NOTHING = 1e-12
-"""The published surface law is 0 where `Q` is at or below this."""
+"""A published surface law is 0 where its total is at or below this."""
 
 
 def to_thread(w: Array, is_warp: bool, psi0: float | Array) -> Array:
@@ -50,13 +51,6 @@ def thread_value(thread: Thread, model: str, wi: Array, wo: Array) -> Array:
 def albedo_of(thread: Thread, model: str) -> Array:
     """(3,) `A`, clamped to 1 for models in which it is an albedo."""
     return np.minimum(thread.albedo, named(model).most_albedo)
-
-
-def masked(x: Array, y: Array, width: float) -> Array:
-    """The fraction seen and lit: `M` of azimuths phi, `P` of longitudes psi [rad]. Section 4."""
-    mx, my = np.maximum(np.cos(x), 0), np.maximum(np.cos(y), 0)
-    u = np.exp(-(wrap(x - y) ** 2) / (2 * width**2))
-    return (1 - u) * mx * my + u * np.minimum(mx, my)
 
 
 def curve_points(curve: TangentCurve, per_segment: int = 64) -> tuple[Array, Array]:
@@ -107,13 +101,13 @@ def gap(fabric: Fabric) -> float:
 
 
 def normalization(fabric: Fabric, wi: Array, wo: Array, per_segment: int = 64) -> Array:
-    """`Q` : (n,) = sum of a <P> + gap (N.wo)."""
-    q = gap(fabric) * np.asarray(wo)[..., 2]
+    """(n,) The surface law's total of the sum of a <weight>."""
+    law, seen = law_of(fabric), np.zeros(np.shape(wo)[:-1])
     for share, psi0, area in _nodes(fabric, per_segment):
         i = angles(to_thread(wi, share.is_warp, psi0))
         o = angles(to_thread(wo, share.is_warp, psi0))
-        q = q + area * masked(i.psi, o.psi, fabric.masking_width)
-    return q
+        seen = seen + area * law.plain_weight(fabric, psi0, i, o)
+    return np.asarray(law.plain_total(fabric, seen, gap(fabric), np.asarray(wo)))
 
 
 def segment(
@@ -124,7 +118,8 @@ def segment(
     wo: Array,
     width: Array | None = None,
 ) -> Array:
-    """(n, 3) `f_s M P cos theta_i` of a segment of thread at `psi0`, before the division by `Q`.
+    """(n, 3) `weight f_s mask cos theta_i` of a segment of thread at `psi0`, before the division by
+    the law's total.
 
     width : (n,) or None - `w` in [-1, 1] across the thread (level `thread`); None for the mean
     """
@@ -135,9 +130,8 @@ def segment(
         across_surface, across_volume = across(share.thread, i, o, width)
         surface, volume = surface * across_surface, volume * across_volume
     value = surface[..., None] + volume[..., None] * albedo_of(share.thread, share.model)
-    visible = masked(i.phi, o.phi, fabric.masking_width) * masked(
-        i.psi, o.psi, fabric.masking_width
-    )
+    law = law_of(fabric)
+    visible = law.plain_weight(fabric, psi0, i, o) * law.plain_mask(fabric, i, o)
     return np.asarray(value * (visible * np.cos(i.theta))[..., None])
 
 

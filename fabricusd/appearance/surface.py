@@ -34,6 +34,7 @@ from fabricusd.appearance.law import (
     law_direction,
     surface_law,
 )
+from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.levels import FAR, LEVELS, THREAD
 from fabricusd.appearance.published.far import far_values
 from fabricusd.appearance.published.levels import POINT_ROWS, point_block, point_values
@@ -98,7 +99,8 @@ def evaluate(
     uv : (n, 2) weave coordinates in threads (ends along U, picks along V), or (2,) for all;
         required at levels `weave` and `thread`
     level : one of LEVELS
-    shadow : one of `shadow.METHODS`; ignored at level `far`, which has no place to be shadowed
+    shadow : one of `shadow.METHODS`; at level `far` its mean under a surface law that does not mask,
+        and ignored under the others
     max_error : bound on the mean relative error of the quadrature over the curves, see
         `accuracy.choose_rule`; None takes `quadrature.default_rule`
     multiple : whether `conserving` cloth scatters light more than once
@@ -110,9 +112,9 @@ def evaluate(
     i, o = _pairs(wi, wo, uv if level != "far" else None)
     hit, places = _places(fabric, uv, level, i.shape[1])
     _check_shadow(shadow)
-    out = _evaluate(_law(fabric, max_error, multiple), level, hit, i, o)
+    out = _evaluate(_law(fabric, level, shadow, max_error, multiple), level, hit, i, o)
     if level != "far" and shadow != "none":
-        out *= _lit(fabric, shadow, level, places, i)
+        out *= _lit(fabric, shadow, places, i)
     return np.ascontiguousarray(out.T)
 
 
@@ -131,7 +133,7 @@ def pdf(
     i, o = _pairs(wi, wo, uv if level != "far" else None)
     hit, _ = _places(fabric, uv, level, i.shape[1])
     _check_shadow(shadow)
-    return _density(_law(fabric), level, hit, i, o)
+    return _density(_law(fabric, level, shadow), level, hit, i, o)
 
 
 def sample(
@@ -158,14 +160,14 @@ def sample(
     o = _repeated(_directions("wo", wo), len(numbers), "wo")
     hit, places = _places(fabric, uv, level, len(numbers))
     _check_shadow(shadow)
-    law = _law(fabric)
+    law = _law(fabric, level, shadow)
     i = np.empty_like(o)
     real: Any = np.float64
     turned = np.ascontiguousarray(numbers.T)
     _draw(real, *law, LEVELS.index(level), hit.places, o, turned, i)
     f = _evaluate(law, level, hit, i, o)
     if level != "far" and shadow != "none":
-        f *= _lit(fabric, shadow, level, places, i)
+        f *= _lit(fabric, shadow, places, i)
     p = _density(law, level, hit, i, o)
     return Sample(np.ascontiguousarray(i.T), np.ascontiguousarray(f.T), p)
 
@@ -177,27 +179,39 @@ def _density(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats)
     return out
 
 
-def _law(fabric: Fabric, max_error: float | None = None, multiple: bool = True) -> SurfaceLaw:
-    return _kept_law(fabric, max_error, multiple)
+def _law(
+    fabric: Fabric,
+    level: str,
+    shadow: str,
+    max_error: float | None = None,
+    multiple: bool = True,
+) -> SurfaceLaw:
+    held = shadow if level == "far" and law_of(fabric).absolute else "none"
+    return _kept_law(fabric, held, max_error, multiple)
 
 
 @lru_cache(maxsize=32)
-def _kept_law(fabric: Fabric, max_error: float | None, multiple: bool) -> SurfaceLaw:
+def _kept_law(
+    fabric: Fabric, shadow: str, max_error: float | None, multiple: bool
+) -> SurfaceLaw:
     rule = None if max_error is None else choose_rule(fabric, max_error)
-    return surface_law(fabric, precision=np.float64, rule=rule, multiple=multiple)
-
-
-@lru_cache(maxsize=32)
-def _shadowed(fabric: Fabric, method: str, level: str) -> tuple[CompiledFabric, Shadow]:
-    return (
-        compile_fabric(fabric, precision=np.float64),
-        compile_shadow(fabric, method, level=level, precision=np.float64),
+    kept = _shadowed(fabric, shadow)[1] if shadow != "none" else None
+    return surface_law(
+        fabric, precision=np.float64, rule=rule, multiple=multiple, shadow=kept
     )
 
 
-def _lit(fabric: Fabric, method: str, level: str, uv: Floats, wi: Floats) -> Floats:
+@lru_cache(maxsize=32)
+def _shadowed(fabric: Fabric, method: str) -> tuple[CompiledFabric, Shadow]:
+    return (
+        compile_fabric(fabric, precision=np.float64),
+        compile_shadow(fabric, method, precision=np.float64),
+    )
+
+
+def _lit(fabric: Fabric, method: str, uv: Floats, wi: Floats) -> Floats:
     """(n,) factor of `shadow.shade` at each place, for light from wi (3, n)."""
-    cloth, shadow = _shadowed(fabric, method, level)
+    cloth, shadow = _shadowed(fabric, method)
     out = np.empty(len(uv))
     real: Any = np.float64
     lit_all(real, cloth, shadow, True, uv, wi, out)
@@ -324,7 +338,7 @@ def _weave_chunk(R, cloth, shadow, tables, uv, wi, wo, out, first, last):
         size = min(BLOCK, last - begin)
         look_up_block(R, cloth, shadow.table, uv, begin, size, ints, reals)
         horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
-        mean_block(R, shadow, wi, begin, size, ints, reals)
+        mean_block(R, cloth, shadow, wi, begin, size, ints, reals)
         # Level `weave` does not read the position across: any row will do.
         places = Places(ints[OF_SET:], ints[OF_THREAD:], reals[ANGLE:], reals[S:])
         point_block(R, tables, False, places, 0, wi, wo, out, begin, size, block)

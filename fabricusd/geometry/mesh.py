@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.errors import FabricError
-from fabricusd.geometry.centre import RINGS
+from fabricusd.appearance.weave.centre import RINGS
 from fabricusd.geometry.lines import Line, Repeat
 
 Floats = NDArray[np.float64]

@@ -23,7 +23,8 @@ from fabricusd.appearance.weave.coverage import coverage, sets
 from fabricusd.appearance.weave.curve import Pieces, pieces
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
-from fabricusd.geometry.lines import APART, Line, Repeat
+from fabricusd.appearance.weave.sections import APART
+from fabricusd.geometry.lines import Line, Repeat
 from fabricusd.geometry.mesh import Mesh, Rings, faces, outline
 
 Floats = NDArray[np.float64]

@@ -12,8 +12,11 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from numba import njit
+from numba.extending import overload
 
 from fabricusd.kernels.real import INLINE
+
+_CHOSEN = {k: v for k, v in INLINE.items() if k != "cache"}
 
 
 def by_number(functions: Mapping[int, Any]) -> Any:
@@ -90,3 +93,25 @@ def _then(first: Any, following: Any) -> Any:
         following(R, *rest)
 
     return then
+
+
+def by_type(select: Any) -> Any:
+    """A kernel `chosen(R, table, *rest)` that calls `select(type(table))(R, table, *rest)`.
+
+    table : an instance of a NamedTuple class, which `select` maps to a kernel. The choice is made
+    when the caller is compiled: kernels for one class contain no code for the others.
+    """
+
+    def chosen(R, table, *rest):  # type: ignore[no-untyped-def]
+        raise NotImplementedError("called by kernels only")
+
+    @overload(chosen, jit_options=_CHOSEN)
+    def _choose(R, table, *rest):  # type: ignore[no-untyped-def]
+        function = select(table.instance_class)
+
+        def call(R, table, *rest):  # type: ignore[no-untyped-def]
+            return function(R, table, *rest)
+
+        return call
+
+    return chosen

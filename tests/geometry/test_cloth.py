@@ -12,7 +12,7 @@ from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEGREE, TangentCurve, Weave
 from fabricusd.geometry import tubes
-from fabricusd.geometry.centre import RINGS, centre_line
+from fabricusd.appearance.weave.centre import RINGS, centre_line
 from fabricusd.geometry.rays import NOTHING, blocked, nearest
 from fabricusd.schema import load, preset_names
 

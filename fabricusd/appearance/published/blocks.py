@@ -9,7 +9,8 @@ from __future__ import annotations
 from numba import njit
 
 from fabricusd.appearance.frame import WARP
-from fabricusd.appearance.published.segment import SetPair, along_set, seen_along
+from fabricusd.appearance import laws
+from fabricusd.appearance.published.segment import SetPair, along_set
 from fabricusd.appearance.published.tables import NODE_COS, NODE_SIN, NODE_WEIGHT
 from fabricusd.kernels.real import BLOCK, INLINE, index
 
@@ -19,7 +20,10 @@ OVERLAP = 8 * BLOCK
 NORMALIZATION, RED, GREEN, BLUE = 9 * BLOCK, 10 * BLOCK, 11 * BLOCK, 12 * BLOCK
 """Offsets of the rows: the fields of `segment.SetPair`, then the sums."""
 
-ROWS = 13
+NODE_LIT = 13 * BLOCK
+"""Offset of a row that level `far` alone has: the mean of g at a node."""
+
+ROWS = 14
 
 NOTHING = 1e-12
 """The value is 0 where `Q` is at or below this. On velvet this loses a tenth of random pairs."""
@@ -34,12 +38,12 @@ def node_range(tables, thread_set):
 
 
 @njit(**INLINE)
-def prepare(R, thread_set, precision, wi, wo, start, size, block, at=0):
+def prepare(R, tables, thread_set, wi, wo, start, size, block, at=0):
     """Compute `along_set` for a block of pairs, into the rows that start at offset `at`."""
     for y in range(size):
         x, k = at + y, index(start, y)
         iz, oz = wi[2, k], wo[2, k]
-        pair = along_set(R, thread_set, precision, wi[0, k], wi[1, k], iz, wo[0, k], wo[1, k], oz)
+        pair = along_set(R, tables, thread_set, wi[0, k], wi[1, k], iz, wo[0, k], wo[1, k], oz)
         block[ALONG_I + x], block[ACROSS_I + x] = pair.along_i, pair.across_i
         block[UP_I + x], block[SCALE_I + x] = pair.up_i, pair.scale_i
         block[ALONG_O + x], block[ACROSS_O + x] = pair.along_o, pair.across_o
@@ -58,25 +62,29 @@ def pair_at(block, x):
 
 
 @njit(**INLINE)
-def add_masking(R, tables, k, size, block, at=0):
-    """Add node k's share of `Q` to a block; the rows of the node's set start at offset `at`."""
+def add_weight(R, tables, k, size, block, at=0):
+    """Add node k's weight to a block; the rows of the node's set start at offset `at`."""
     c, s, weight = (
         tables.nodes[k, NODE_COS],
         tables.nodes[k, NODE_SIN],
         tables.nodes[k, NODE_WEIGHT],
     )
     for x in range(size):
-        block[NORMALIZATION + x] += weight * seen_along(R, c, s, pair_at(block, at + x))
+        block[NORMALIZATION + x] += weight * laws.weight(
+            R, tables, c, s, pair_at(block, at + x)
+        )
 
 
 @njit(**INLINE)
-def divide(R, out, start, size, block):
-    """Write the sums of a block, divided by `Q`, to out (3, n).
+def divide(R, tables, wo, out, start, size, block):
+    """Write the sums of a block, divided by the law's total, to out (3, n).
 
     The value is 0 where either direction is not above the cloth.
     """
     for x in range(size):
-        q = block[NORMALIZATION + x]
+        k = index(start, x)
+        seen = block[NORMALIZATION + x]
+        q = laws.total(R, tables, seen, wo[0, k], wo[1, k], wo[2, k])
         dark = min(block[UP_I + x], block[UP_O + x]) <= R(0) or q <= R(NOTHING)
         inverse = R(0) if dark else R(1) / q
         # The sums of dark entries may be NaN, so they are not multiplied by 0.

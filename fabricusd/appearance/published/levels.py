@@ -1,7 +1,7 @@
 """Evaluate the published law at levels `weave` and `thread`: at a point of one thread.
 
-`L_o(x) = f_s M P(x)/Q cos theta_i` with the same `Q` as level `far`, so the mean over the repeat is
-the value at level `far`. At level `thread` the two terms are modulated across the width by factors
+`L_o(x) = weight f_s mask(x)/Q cos theta_i` with the same `Q` as level `far`, so the mean over the
+repeat is the value at level `far`. At level `thread` the two terms are modulated across the width by factors
 with a mean of 1, so the mean over the width is the value at level `weave`. The value is 0 unless
 both directions are above the cloth; a gap reflects nothing. Shadowing multiplies the value and is
 applied by the caller. Source: `docs/model.md` section 4, [Bisker2011] eq. 5.1.
@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance import laws
 from fabricusd.appearance.published.blocks import (
     ACROSS_I,
     ACROSS_O,
@@ -28,12 +29,12 @@ from fabricusd.appearance.published.blocks import (
     SCALE_O,
     UP_I,
     UP_O,
-    add_masking,
+    add_weight,
     divide,
     prepare,
 )
 from fabricusd.appearance.published.far import normalization
-from fabricusd.appearance.published.segment import SetPair, along_set, seen_along, segment
+from fabricusd.appearance.published.segment import SetPair, along_set, segment
 from fabricusd.appearance.scattering.across import across_at
 from fabricusd.appearance.scattering.columns import (
     ALBEDO_B,
@@ -71,11 +72,11 @@ def point_value(R, tables, across_too, place, ix, iy, iz, ox, oy, oz):
     q = normalization(R, tables, ix, iy, iz, ox, oy, oz)
     if q <= R(NOTHING):
         return none, none, none
-    pair = along_set(R, place.thread_set, tables.overlap_precision, ix, iy, iz, ox, oy, oz)
+    pair = along_set(R, tables, place.thread_set, ix, iy, iz, ox, oy, oz)
     c, s = cos(R, place.psi0), sin(R, place.psi0)
-    p = seen_along(R, c, s, pair)
+    p = laws.weight(R, tables, c, s, pair)
     surface, volume = _segment_at(
-        R, int(row[MODEL]), across_too, row, tables.overlap_precision, c, s, place.w, pair
+        R, tables, int(row[MODEL]), across_too, row, c, s, place.w, pair
     )
     p /= q
     surface *= p
@@ -88,9 +89,9 @@ def point_value(R, tables, across_too, place, ix, iy, iz, ox, oy, oz):
 
 
 @njit(**INLINE)
-def _segment_at(R, model, across_too, row, precision, c, s, w, pair):
+def _segment_at(R, tables, model, across_too, row, c, s, w, pair):
     """`segment`, times the factors across the width if `across_too`."""
-    surface, volume = segment(R, model, row, precision, c, s, pair)
+    surface, volume = segment(R, tables, model, row, c, s, pair)
     if across_too:
         n_i, n_o = s * pair.along_i + c * pair.up_i, s * pair.along_o + c * pair.up_o
         on_surface, on_volume = across_at(R, row, w, pair.across_i, n_i, pair.across_o, n_o)
@@ -118,17 +119,17 @@ def point_block(R, tables, across_too, places, first, wi, wo, out, start, size, 
     LLVM vectorises the loop that computes. A set that is neither weft nor warp is a gap.
     """
     for x in range(size):
-        block[NORMALIZATION + x] = tables.gap * wo[2, index(start, x)]
+        block[NORMALIZATION + x] = R(0)
         block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
-    prepare(R, WEFT, tables.overlap_precision, wi, wo, start, size, block)
-    prepare(R, WARP, tables.overlap_precision, wi, wo, start, size, block, _WARP)
+    prepare(R, tables, WEFT, wi, wo, start, size, block)
+    prepare(R, tables, WARP, wi, wo, start, size, block, _WARP)
     for k in range(tables.warp_start):
-        add_masking(R, tables, k, size, block)
+        add_weight(R, tables, k, size, block)
     for k in range(tables.warp_start, tables.nodes.shape[0]):
-        add_masking(R, tables, k, size, block, _WARP)
+        add_weight(R, tables, k, size, block, _WARP)
     _copy_threads(R, tables, places, first, size, block)
     _of_models(R, tables, across_too, size, block)
-    divide(R, out, start, size, block)
+    divide(R, tables, wo, out, start, size, block)
 
 
 @njit(**INLINE)
@@ -172,7 +173,6 @@ def _of_model(R, model, tables, across_too, size, block):
     """Add the value without `1/Q` to the sums, for the points whose thread has this model."""
     if not _has_model(R, tables, model):
         return
-    precision = tables.overlap_precision
     for x in range(size):
         row = _row_at(block, _THREAD + x)
         c, s, warp = block[_COS + x], block[_SIN + x], block[_IS_WARP + x] > R(0)
@@ -182,9 +182,9 @@ def _of_model(R, model, tables, across_too, size, block):
             _own(block, ACROSS_O + x, warp), block[UP_O + x], _own(block, SCALE_O + x, warp),
             _own(block, OVERLAP + x, warp),
         )  # fmt: skip
-        p = seen_along(R, c, s, pair)
+        p = laws.weight(R, tables, c, s, pair)
         surface, volume = _segment_at(
-            R, model, across_too, row, precision, c, s, block[_ACROSS + x], pair
+            R, tables, model, across_too, row, c, s, block[_ACROSS + x], pair
         )
         share = p if row[MODEL] == R(model) else R(0)
         block[RED + x] += share * (surface + volume * row[ALBEDO_R])

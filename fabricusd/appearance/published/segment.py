@@ -1,4 +1,4 @@
-"""Evaluate a segment of thread in the cloth, masked and shadowed, before the division by `Q`.
+"""Evaluate a segment of thread in the cloth by a surface law, before the division by its total.
 
 These scalar kernels, with the precision `R` first, serve both the vectorised loops and the path
 tracer. Both directions are above the cloth. Source: `docs/model.md` section 4, [Sadeghi2013].
@@ -22,7 +22,8 @@ from fabricusd.appearance.scattering.terms import (
     published_factors,
     published_lobes,
 )
-from fabricusd.kernels.real import INLINE, acos, exp
+from fabricusd.appearance import laws
+from fabricusd.kernels.real import INLINE
 
 
 class SetPair(NamedTuple):
@@ -31,7 +32,7 @@ class SetPair(NamedTuple):
     along, across : real - components along the axis of the set and across it
     up : real - N.w
     scale : real - 1/|w without across|, so that cos psi = n_t.w scale at any tangent angle
-    overlap : real - `overlap` of the longitudes psi, which a tangent angle shifts equally
+    overlap : real - the law's `overlap` of the longitudes psi, which a tangent angle shifts equally
     """
 
     along_i: Any
@@ -46,23 +47,7 @@ class SetPair(NamedTuple):
 
 
 @njit(**INLINE)
-def masked(R, x, y, u):
-    """`(1-u) x y + u min(x, y)` of two clamped cosines: `M` or `P`."""
-    return x * y + u * (min(x, y) - x * y)
-
-
-@njit(**INLINE)
-def overlap(R, cos_half, precision):
-    """`u` = exp(-d^2/(2 width^2)), in [0, 1], for azimuths that differ by d; from cos(d/2).
-
-    precision : 2/width^2 [1/rad^2]
-    """
-    half = acos(R, cos_half)
-    return exp(R, -precision * half * half)
-
-
-@njit(**INLINE)
-def along_set(R, thread_set, precision, ix, iy, iz, ox, oy, oz):
+def along_set(R, tables, thread_set, ix, iy, iz, ox, oy, oz):
     """The `SetPair` of two directions in the surface frame."""
     warp = thread_set == WARP
     a_i, b_i = (iy, -ix) if warp else (ix, iy)
@@ -70,39 +55,27 @@ def along_set(R, thread_set, precision, ix, iy, iz, ox, oy, oz):
     scale_i = R(1) / math.sqrt(a_i * a_i + iz * iz)
     scale_o = R(1) / math.sqrt(a_o * a_o + oz * oz)
     cos_half = cos_half_difference(R, a_i * scale_i, iz * scale_i, a_o * scale_o, oz * scale_o)
-    u = overlap(R, cos_half, precision)
+    u = laws.overlap(R, tables, cos_half)
     return SetPair(a_i, b_i, iz, scale_i, a_o, b_o, oz, scale_o, u)
 
 
 @njit(**INLINE)
-def seen_along(R, c, s, pair):
-    """`P` at the tangent angle with cosine c and sine s."""
-    x = max(s * pair.along_i + c * pair.up_i, R(0)) * pair.scale_i
-    y = max(s * pair.along_o + c * pair.up_o, R(0)) * pair.scale_o
-    return masked(R, x, y, pair.overlap)
-
-
-@njit(**INLINE)
-def segment(R, model, row, precision, c, s, pair):
-    """`f_s M cos theta_i` as (surface, volume without `A`); 0 where `M` is 0.
+def segment(R, tables, model, row, c, s, pair):
+    """`f_s mask cos theta_i` as (surface, volume without `A`).
 
     model : the number of the row's model, which must be a published one
 
-    Multiplied by `seen_along`, this is the integrand of level `far`.
+    Multiplied by the law's weight, this is the integrand of level `far`.
     """
-    t_i, cos_i, _, t_o, cos_o, _, surface, volume = _masked_factors(
-        R, model, row, precision, c, s, pair
-    )
+    t_i, cos_i, _, t_o, cos_o, _, surface, volume = _factors(R, tables, model, row, c, s, pair)
     on_surface, on_volume = published_lobes(R, model, row, t_i, cos_i, t_o, cos_o)
     return surface * on_surface, volume * on_volume
 
 
 @njit(**INLINE)
-def mean_segment(R, model, row, half, precision, c, s, pair):
+def mean_segment(R, tables, model, row, half, c, s, pair):
     """`segment` with its lobes averaged over tangent angles `half` [rad] to each side."""
-    t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o, surface, volume = _masked_factors(
-        R, model, row, precision, c, s, pair
-    )
+    t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o, surface, volume = _factors(R, tables, model, row, c, s, pair)
     on_surface, on_volume = cell_lobes(
         R, model, row, half, t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o
     )
@@ -110,11 +83,11 @@ def mean_segment(R, model, row, half, precision, c, s, pair):
 
 
 @njit(**INLINE)
-def _masked_factors(R, model, row, precision, c, s, pair):
+def _factors(R, tables, model, row, c, s, pair):
     """(t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o, surface, volume).
 
     The first six are the sine and cosine of the inclination and the cosine of the azimuth of wi and
-    of wo; the last two are the factors of the model times `M cos theta_i`.
+    of wo; the last two are the factors of the model times `mask cos theta_i`.
     """
     a_i, b_i, iz = pair.along_i, pair.across_i, pair.up_i
     a_o, b_o, oz = pair.along_o, pair.across_o, pair.up_o
@@ -124,7 +97,6 @@ def _masked_factors(R, model, row, precision, c, s, pair):
     sin_phi_i, cos_phi_i = unit_azimuth(R, b_i, n_i, cos_i)
     sin_phi_o, cos_phi_o = unit_azimuth(R, b_o, n_o, cos_o)
     cos_half = cos_half_difference(R, sin_phi_i, cos_phi_i, sin_phi_o, cos_phi_o)
-    u = overlap(R, cos_half, precision)
-    m = masked(R, max(cos_phi_i, R(0)), max(cos_phi_o, R(0)), u) * cos_i
+    m = laws.mask(R, tables, cos_phi_i, cos_phi_o, cos_half) * cos_i
     surface, volume = published_factors(R, model, row, t_i, cos_i, t_o, cos_o, cos_half)
     return t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o, surface * m, volume * m

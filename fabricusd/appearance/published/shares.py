@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.published.far import far_values
+from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.published.levels import point_value
 from fabricusd.appearance.published.tables import SurfaceTables
 from fabricusd.appearance.sampling.fit import Singles, fitted_mixture
@@ -28,7 +29,7 @@ directions per lobe miss; without this share, the variance on satin doubles."""
 def published_mixture(fabric: Fabric, tables: SurfaceTables) -> Mixture:
     """Lobes above the cloth only, with shares measured on `tables`."""
     single: Any = np.float32
-    kept = _in_single_precision(tables)
+    kept = _in_single_precision(fabric, tables)
 
     def far(wi: Singles, wo: Singles, out: Singles) -> None:
         far_values(single, kept, wi, wo, out, 0, wi.shape[1])
@@ -43,14 +44,14 @@ def published_mixture(fabric: Fabric, tables: SurfaceTables) -> Mixture:
     )  # fmt: skip
 
 
-def _in_single_precision(tables: SurfaceTables) -> SurfaceTables:
+def _in_single_precision(fabric: Fabric, tables: SurfaceTables) -> SurfaceTables:
     """The tables in float32, which suffices for the shares; one kernel then serves all
     precisions."""
     return tables._replace(
         threads=tables.threads.astype(np.float32),
         nodes=tables.nodes.astype(np.float32),
         gap=np.float32(tables.gap),
-        overlap_precision=np.float32(tables.overlap_precision),
+        **law_of(fabric).make(fabric, None, np.float32),
     )
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.scattering.columns import LAW
 from fabricusd.appearance.scattering.model import PUBLISHED
 from fabricusd.appearance.scattering.models import model_of
 from fabricusd.appearance.scattering.table import pack_threads
+from fabricusd.appearance.shadow.mean import node_groups
+from fabricusd.appearance.shadow.methods import Shadow
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.quadrature import Rule, curve_nodes, default_rule
 from fabricusd.errors import FabricError
@@ -23,12 +26,10 @@ NODE_COS, NODE_SIN, NODE_WEIGHT, NODE_HALF = 0, 1, 2, 3
 """Columns of `SurfaceTables.nodes`: cosine and sine of the tangent angle, share of the cloth's
 area, and half the range of angles [rad] over which the node's lobes are averaged."""
 
-NARROWEST_MASKING = 1e-6
-"""Least masking width [rad]: narrower ones are replaced by it, so that 1/width^2 stays finite."""
-
-
-class SurfaceTables(NamedTuple):
+class SurfaceTables(Protocol):
     """Arrays of one fabric for the surface law; `real` is the precision asked for.
+
+    An instance of the law's `Law.tables`, which has these fields and the law's own.
 
     threads : (k, COLUMNS) real - see `scattering.columns`
     nodes : (q, 4) real - NODE_ columns, weft nodes first, including those of conserving threads
@@ -36,7 +37,6 @@ class SurfaceTables(NamedTuple):
     published : (q,) uint8 - 1 where the node's thread has a published model
     warp_start : int - nodes from here on are warp
     gap : real - share of the cloth that no thread covers
-    overlap_precision : real - 2/masking_width^2 [1/rad^2]
     """
 
     threads: Reals
@@ -45,7 +45,8 @@ class SurfaceTables(NamedTuple):
     published: NDArray[np.uint8]
     warp_start: int
     gap: Any
-    overlap_precision: Any
+
+    def _replace(self, **fields: Any) -> SurfaceTables: ...
 
 
 def surface_tables(
@@ -53,8 +54,13 @@ def surface_tables(
     *,
     precision: type[np.floating[Any]] = np.float64,
     rule: Rule | None = None,
+    shadow: Shadow | None = None,
 ) -> SurfaceTables:
-    """Tables of `fabric` in `precision`; `rule` None takes `quadrature.default_rule`."""
+    """Tables of `fabric` in `precision`; `rule` None takes `quadrature.default_rule`.
+
+    shadow : the shadowing whose mean level `far` holds, under laws that are `absolute`; None for
+        light that nothing holds back
+    """
     if precision not in (np.float32, np.float64):
         raise FabricError("precision", f"is {precision!r}; it must be float32 or float64")
     cells = has_cell_lobes(fabric)
@@ -66,17 +72,22 @@ def surface_tables(
             "mean; the form of the rule must be points",
         )
     threads = pack_threads(fabric, np.float64)
-    width = max(fabric.masking_width, NARROWEST_MASKING)
+    law = law_of(fabric)
+    held = None
+    if law.absolute and shadow is not None:
+        groups = node_groups(shadow, q, fabric)
+        held = None if groups is None else (groups, float(shadow.softness))
     nodes = np.stack((np.cos(q.psi0), np.sin(q.psi0), q.weight, q.half), axis=1)
-    return SurfaceTables(
+    made: SurfaceTables = law.tables(
         threads=threads.astype(precision),
         nodes=np.ascontiguousarray(nodes, dtype=precision),
         node_thread=q.thread,
         published=(threads[q.thread, LAW] == PUBLISHED).astype(np.uint8),
         warp_start=q.warp_start,
         gap=precision(coverage(fabric).gap),
-        overlap_precision=precision(2.0 / width**2),
+        **law.make(fabric, held, precision),
     )
+    return made
 
 
 def has_cell_lobes(fabric: Fabric) -> bool:

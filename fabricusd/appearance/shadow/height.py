@@ -20,7 +20,6 @@ from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.curve import peak
 from fabricusd.appearance.weave.lookup import (
-    crown_on,
     lookup,
     lower_run,
     rise_on,
@@ -47,7 +46,7 @@ class Origin(NamedTuple):
     """The point that a march starts from.
 
     u, v : float - weave coordinates
-    thread_set : int; crown : float - thread set of the point, and `crown_of` there [m]
+    thread_set : int; crown : float - thread set of the point, and height above its axis there [m]
     height : float - height of the point [m]
     """
 
@@ -63,7 +62,7 @@ class Track(NamedTuple):
 
     thread : int - index into `Fabric.threads`
     half : float - height of its surface above its axis, at the middle of its width [m]
-    height : float - height of the march's origin [m]
+    height : float - height of the march's origin above the `lift` of the thread's set [m]
     length : float - length of its visible run [m]
     s, s_t : float - the position along the run is s + s_t t
     w, w_t : float - the position across the thread is w + w_t t
@@ -79,17 +78,8 @@ class Track(NamedTuple):
     w_t: float
 
 
-@njit(**INLINE)
-def crown_of(R, cloth, rounded, which, thread, w):
-    """Height [m] of a thread's visible side above its axis at `w`; round if `rounded`, else
-    flat."""
-    if rounded != 0:
-        return crown_on(R, cloth, which, thread, w)
-    return cloth.half_thickness[which, thread]
-
-
 @njit(**PART)
-def steepest(cloth, rounded, highest, origin, dx, dy, k, first):
+def steepest(cloth, highest, origin, dx, dy, k, first):
     """Slope of the steepest line from an `Origin` to the height field, at least `k`.
 
     Along the origin's own thread the march treats the thread as flat at its crown there: `f_s`
@@ -108,7 +98,7 @@ def steepest(cloth, rounded, highest, origin, dx, dy, k, first):
         to_end = ((end + 1.0 if du > 0.0 else end) - u) / du if du != 0.0 else np.inf
         to_pick = ((pick + 1.0 if dv > 0.0 else pick) - v) / dv if dv != 0.0 else np.inf
         leave = min(to_end, to_pick)
-        k = _cross_cell(cloth, rounded, end, pick, origin, du, dv, max(begin, nearest), leave, k)
+        k = _cross_cell(cloth, end, pick, origin, du, dv, max(begin, nearest), leave, k)
         if (first and k > asked) or leave * k > highest - origin.height:
             return k
         if to_end <= to_pick:
@@ -120,7 +110,7 @@ def steepest(cloth, rounded, highest, origin, dx, dy, k, first):
 
 
 @njit(**INLINE)
-def _cross_cell(cloth, rounded, end, pick, origin, du, dv, t0, t1, k):
+def _cross_cell(cloth, end, pick, origin, du, dv, t0, t1, k):
     """`steepest` over the visible threads of one cell, between the distances t0 and t1 [m]."""
     u, v, which, crown, h = origin
     i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
@@ -141,11 +131,12 @@ def _cross_cell(cloth, rounded, end, pick, origin, du, dv, t0, t1, k):
         start, cells = upper_run(np.float64, cloth, i, j, top)
         mine = own and which == top
         track = Track(
-            above, crown if mine else float(cloth.half_thickness[top, above]), h,
+            above, crown if mine else float(cloth.half_height[top, above]),
+            h - float(cloth.lift[top]),
             cells * float(crossing), (start + along) / cells, along_t / cells,
             2.0 * (over - 0.5) / width, 2.0 * over_t / width,
         )  # fmt: skip
-        k = _cross_thread(cloth, 0 if mine else rounded, track, a, b, k)
+        k = _cross_thread(cloth, 0 if mine else 1, track, a, b, k)
     seen = float(cloth.width[1 - top])
     if width < 1.0 and seen > 0.0 and cloth.pile[below] == 0:
         a0, b0 = _within(along, along_t, 0.5 - 0.5 * seen, 0.5 + 0.5 * seen, t0, t1)
@@ -157,11 +148,12 @@ def _cross_cell(cloth, rounded, end, pick, origin, du, dv, t0, t1, k):
             start, cells, rises = lower_run(np.float64, cloth, i, j, top, float(side))
             mine = own and which != top
             track = Track(
-                below, crown if mine else float(cloth.half_thickness[1 - top, below]), h,
+                below, crown if mine else float(cloth.half_height[1 - top, below]),
+                h - float(cloth.lift[1 - top]),
                 rises * cells * float(below_crossing), (start + over) / cells, over_t / cells,
                 2.0 * (along - 0.5) / seen, 2.0 * along_t / seen,
             )  # fmt: skip
-            k = _cross_thread(cloth, 0 if mine else rounded, track, a, b, k)
+            k = _cross_thread(cloth, 0 if mine else 1, track, a, b, k)
     return k
 
 
@@ -274,8 +266,9 @@ def highest_point(fabric: Fabric, cloth: CompiledFabric) -> float:
                 cells = longest[place % common :: common].max()
                 if cloth.pile[kind] or cells < 0:
                     continue
-                half = float(cloth.half_thickness[which, kind])
-                found = max(found, peaks[kind] * float(cells) * crossing + half)
+                half = float(cloth.half_height[which, kind])
+                rise = peaks[kind] * float(cells) * crossing
+                found = max(found, rise + half + float(cloth.lift[which]))
     return found
 
 
@@ -315,7 +308,7 @@ def height_field(
     v = (np.arange(resolution[1]) + 0.5) / resolution[1] * picks
     uv = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
     hit = lookup(cloth, uv)
-    half = cloth.half_thickness[np.minimum(hit.set, 1), hit.thread]
+    half = cloth.half_height[np.minimum(hit.set, 1), hit.thread]
     height = hit.height + (hit.crown if rounded else half)
     hidden = hit.gap | (cloth.pile[hit.thread] != 0)
     field: NDArray[np.float64] = np.where(hidden, 0.0, height).reshape(resolution)

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.shadow.horizon_lookup import cell_of_texels, diamond, rows_of_texels
+from fabricusd.appearance.frame import WARP, WEFT, diamond
+from fabricusd.appearance.shadow.horizon_lookup import rows_of_texels
 from fabricusd.appearance.shadow.place_blocks import (
     FIRST,
     LIT,
@@ -29,13 +29,13 @@ from fabricusd.kernels.real import BLOCK, PART, index
 
 @njit(**PART)
 def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
-    """Compute the indices into the flat table and the three weights for a block of places.
+    """Compute the indices into the flat table and the two weights for a block of places.
 
     wi : (3, n), of which the block uses the columns from `begin` on
 
     The indices for both azimuths go to the rows FIRST and SECOND, the weights to SHARES.
     """
-    rows, columns, azimuths = table.shape[3], table.shape[4], table.shape[5]
+    rows, azimuths = table.shape[3], table.shape[4]
     picks, slots = table.shape[1], table.shape[2]
     weft_width, warp_width = cloth.width[WEFT], cloth.width[WARP]
     for k in range(size):
@@ -44,15 +44,12 @@ def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
         sound = p >= R(0) and which != GAP
         warp = top == WARP
         along, over = (q, p) if warp else (p, q)
-        width, other = (warp_width, weft_width) if warp else (weft_width, warp_width)
+        width = warp_width if warp else weft_width
         on_top = which == top
-        across = (over if on_top else along) - R(0.5)
-        across = across / max(width if on_top else other, cloth.tiny) + R(0.5)
         row, a = rows_of_texels(
             R, on_top, along if sound else R(0.5), over if sound else R(0.25), width, rows,
             cloth.tiny,
         )  # fmt: skip
-        column, b = cell_of_texels(R, across if sound else R(0.5), columns)
         m = index(begin, k)
         x, y = wi[0, m], wi[1, m]
         turn = diamond(R, x, y) * R(0.25 * azimuths)
@@ -60,28 +57,19 @@ def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
         first = min(np.int32(turn), np.int32(azimuths - 1))
         second = first + 1 if first + 1 < azimuths else 0
         slot = 0 if on_top else slots - 1
-        texel = (
-            ((ints[TABLE_I + k] * picks + ints[TABLE_J + k]) * slots + slot) * rows + row
-        ) * columns + column
+        texel = ((ints[TABLE_I + k] * picks + ints[TABLE_J + k]) * slots + slot) * rows + row
         ints[FIRST + k], ints[SECOND + k] = texel * azimuths + first, texel * azimuths + second
-        reals[SHARES + k], reals[SHARES + BLOCK + k] = a, b
-        reals[SHARES + 2 * BLOCK + k] = turn - R(first)
+        reals[SHARES + k], reals[SHARES + BLOCK + k] = a, turn - R(first)
 
 
 @njit(**PART)
-def mix_texels(R, texels, columns, azimuths, size, ints, reals):
+def mix_texels(R, texels, azimuths, size, ints, reals):
     """Interpolate the horizon's sine at a block of places in the flat table, into the row LIT."""
-    step = np.uintp(columns * azimuths)
-    beside = np.uintp(azimuths)
+    step = np.uintp(azimuths)
     for k in range(size):
         m, n = np.uintp(ints[FIRST + k]), np.uintp(ints[SECOND + k])
-        a, b = reals[SHARES + k], reals[SHARES + BLOCK + k]
-        c = reals[SHARES + 2 * BLOCK + k]
-        g00, h00 = R(texels[m]), R(texels[n])
-        g01, h01 = R(texels[m + beside]), R(texels[n + beside])
-        g10, h10 = R(texels[m + step]), R(texels[n + step])
-        g11, h11 = R(texels[m + step + beside]), R(texels[n + step + beside])
-        g0, h0 = g00 + (g01 - g00) * b, h00 + (h01 - h00) * b
-        g1, h1 = g10 + (g11 - g10) * b, h10 + (h11 - h10) * b
+        a, c = reals[SHARES + k], reals[SHARES + BLOCK + k]
+        g0, h0 = R(texels[m]), R(texels[n])
+        g1, h1 = R(texels[m + step]), R(texels[n + step])
         g, h = g0 + (g1 - g0) * a, h0 + (h1 - h0) * a
         reals[LIT + k] = (g + (h - g) * c) * R(1.0 / 255.0)

@@ -12,24 +12,9 @@ import math
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.frame import WARP
+from fabricusd.appearance.frame import WARP, diamond
 from fabricusd.appearance.weave.lookup import FARTHEST, split, wrap
 from fabricusd.kernels.real import INLINE
-
-
-@njit(**INLINE)
-def diamond(R, x, y):
-    """Diamond angle of (x, y), from 0 to 4: 1 per quadrant, linear in y/(|x| + |y|) inside it."""
-    part = x / max(abs(x) + abs(y), R(1e-30))
-    return R(1) - part if y >= R(0) else R(3) + part
-
-
-@njit(**INLINE)
-def cell_of_texels(R, place, count):
-    """The lower of the two texels around `place` in [0, 1], and the weight of the upper one."""
-    x = max(R(0), min(place * R(count) - R(0.5), R(count - 1)))
-    k = min(int(x), count - 2)
-    return k, x - R(k)
 
 
 @njit(**INLINE)
@@ -52,10 +37,10 @@ def rows_of_texels(R, on_top, along, over, width, count, tiny):
 
 
 @njit(**INLINE)
-def _between(R, table, i, j, slot, row, column, first, second, c):
+def _between(R, table, i, j, slot, row, first, second, c):
     """A texel's horizon, interpolated from the azimuth `first` to `second` by c in [0, 1]."""
-    low = R(table[i, j, slot, row, column, first])
-    return low + (R(table[i, j, slot, row, column, second]) - low) * c
+    low = R(table[i, j, slot, row, first])
+    return low + (R(table[i, j, slot, row, second]) - low) * c
 
 
 @njit(**INLINE)
@@ -71,31 +56,23 @@ def split_table(table, u, v):
 
 @njit(**INLINE)
 def horizon_at(R, cloth, table, u, v, which, x, y):
-    """Sine of the horizon's elevation towards (x, y), seen from (u, v) on the thread of `which`."""
+    """Sine of the horizon's elevation towards (x, y), seen from (u, v) on the thread of `which`: the
+    mean across the thread."""
     i, j, _, _, p, q = split(R, cloth, u, v)
     in_u, in_v = split_table(table, u, v)
     top = int(cloth.grid[i, j])
     along, over = (q, p) if top == WARP else (p, q)
     width = cloth.width[top]
     on_top = which == top
-    # Select instead of branching: neither the thread nor the azimuth can be predicted.
-    across = ((over if on_top else along) - R(0.5)) / max(
-        width if on_top else cloth.width[1 - top], cloth.tiny
-    )
     slot = 0 if on_top else table.shape[2] - 1
     row, a = rows_of_texels(R, on_top, along, over, width, table.shape[3], cloth.tiny)
-    column, b = cell_of_texels(R, across + R(0.5), table.shape[4])
-    azimuths = table.shape[5]
+    azimuths = table.shape[4]
     turn = diamond(R, x, y) * R(0.25 * azimuths)
     first = min(int(turn), azimuths - 1)
     c = turn - R(first)
     second = first + 1 if first + 1 < azimuths else 0
-    here = _between(R, table, in_u, in_v, slot, row, column, first, second, c)
-    beside = _between(R, table, in_u, in_v, slot, row, column + 1, first, second, c)
-    ahead = _between(R, table, in_u, in_v, slot, row + 1, column, first, second, c)
-    both = _between(R, table, in_u, in_v, slot, row + 1, column + 1, first, second, c)
-    near = here + (beside - here) * b
-    far = ahead + (both - ahead) * b
+    near = _between(R, table, in_u, in_v, slot, row, first, second, c)
+    far = _between(R, table, in_u, in_v, slot, row + 1, first, second, c)
     return (near + (far - near) * a) * R(1.0 / 255.0)
 
 

@@ -9,9 +9,11 @@ horizon : a table of the horizon by place on the thread and azimuth, [Max1988]; 
           for a table are traced instead
 traced  : the height field is marched along the ray; the reference for the other methods
 
-The value of the cloth is multiplied by `shade`. For `peak`, `shade` is `g`, as in the thesis. For
-`horizon` and `traced` it is `g` over its mean over the threads of the same set: the masking term
-already contains the mean shadow, and `g` only says where it falls. See docs/decisions/004.
+The value of the cloth is multiplied by `shade`. Under a surface law that is `absolute` it is `g`,
+and level `far` holds its mean. Under the others it is `g` over its mean over the places that
+scatter alike: the law already contains the mean shadow, and `g` only says where it falls. Either
+way level `far` is the mean of the others. Threads are round across their width at every level. See
+docs/decisions/004 and 014.
 """
 
 from __future__ import annotations
@@ -24,44 +26,60 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.laws import law_of
+from fabricusd.appearance.laws.lit import GROUPS
+from fabricusd.appearance.scattering.model import PUBLISHED
+from fabricusd.appearance.scattering.models import model_of
 from fabricusd.appearance.shadow.height import (
     Origin,
-    crown_of,
     highest_point,
-    level_is_round,
     steepest,
 )
 from fabricusd.appearance.shadow.horizon import (
     AZIMUTHS,
-    ELEVATIONS,
+    LOWEST,
+    SOFTNESS,
     TEXELS,
-    horizon_error,
+    diamond_directions,
     horizon_table,
-    mean_light,
+    shape_repeat,
 )
 from fabricusd.appearance.shadow.horizon_blocks import choose_texels, mix_texels
 from fabricusd.appearance.shadow.horizon_lookup import (
     above_horizon,
-    diamond,
     horizon_at,
     soft_edge,
 )
+from fabricusd.appearance.shadow.mean import (
+    groups_of,
+    mean_of,
+    places_on,
+    relative,
+    stretch_of,
+    stretches,
+)
 from fabricusd.appearance.shadow.place_blocks import (
-    FIRST,
     FREE,
     INT_ROWS,
     LIT,
     OF_SET,
+    OF_THREAD,
     REAL_ROWS,
-    SECOND,
-    SHARES,
+    S,
     X,
     look_up_block,
 )
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.curve import crest, peak
-from fabricusd.appearance.weave.lookup import find, height_on, lower_run, upper_run, wrap
+from fabricusd.appearance.weave.lookup import (
+    crown_on,
+    find,
+    height_on,
+    lower_run,
+    upper_run,
+    wrap,
+)
 from fabricusd.appearance.weave.place import Hit
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
@@ -70,12 +88,19 @@ from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, index
 METHODS = ("none", "peak", "horizon", "traced")
 NONE, PEAK, HORIZON, TRACED = range(4)
 
-TRACED_SOFTNESS = 1e-3
+TRACED_SOFTNESS = math.radians(1.0)
 """Width [rad] of the soft edge used for the mean of `traced`; the marched `g` has a hard edge."""
+
+_COLUMNS = (1, 4, 64, 64)
+"""Azimuths for the mean of each method: for `horizon` four to each of the table's, so that places
+keep their order from one to the next."""
 
 PEAK_SOFTNESS = math.radians(5.0)
 """Width [rad] of the edge of a `peak` shadow. The horizon of `peak` is a guess, and a sharper edge
 would only alias."""
+
+MEAN_PLACES, FEWER_PLACES = 512, 64
+"""Places of each stretch over which the mean of `g` is taken; fewer where each takes a march."""
 
 SEARCH = 64
 """Radius [cells] in which `peak` searches for the highest point. Beyond it, the horizon of every
@@ -86,21 +111,24 @@ class Shadow(NamedTuple):
     """The tables that a shadowing method needs in addition to the compiled fabric.
 
     method : int - NONE, PEAK, HORIZON or TRACED
-    rounded : int - 1 if threads are round across their width (level `thread`)
     highest : real - greatest height of the field [m]
-    softness : real - width of the shadow's edge in the light's elevation [rad]; unused by `traced`
+    softness : real - width of the shadow's edge in the light's elevation [rad]; of its mean only for
+        `traced`
     crest_first, crest_last : (k, q) real - intervals of each type's run that are as high as its
         peak; an interval is empty if its last position is less than its first
     crest_height : (k,) real - height there, in run lengths
-    table : (I, J, slots, along, across, azimuths) uint8 - sine of the horizon's elevation times
+    table : (I, J, slots, along, azimuths) uint8 - sine of the horizon's elevation times
         255, see `horizon`; a single zero for the other methods
     texels : the same memory as a one-dimensional array
-    mean : (2, elevations, azimuths + 1) real - the divisor of `shade` on each set, see
-        `horizon.mean_light`; ones for `none` and `peak`
+    mean : (stretches, columns + 1, GROUPS) real, flat - see `mean.groups_of`, horizons in softnesses;
+        one entry for `none`
+    mean_columns, groups : int - its azimuths; GROUPS
+    mean_first, piece_first, piece_last, piece_scale : see `mean.Stretches`
+    absolute : (k,) uint8 - whether threads of the type follow a law with an absolute shadow
+    all_absolute : int - whether all do
     """
 
     method: int
-    rounded: int
     highest: Any
     softness: Any
     crest_first: NDArray[Any]
@@ -109,25 +137,30 @@ class Shadow(NamedTuple):
     table: NDArray[np.uint8]
     texels: NDArray[np.uint8]
     mean: NDArray[Any]
+    mean_columns: int
+    groups: int
+    mean_first: NDArray[np.int32]
+    piece_first: NDArray[np.int32]
+    piece_last: NDArray[np.int32]
+    piece_scale: NDArray[Any]
+    absolute: NDArray[np.uint8]
+    all_absolute: int
 
 
 def compile_shadow(
     fabric: Fabric,
     method: str = "horizon",
     *,
-    level: str = "weave",
     softness: float | None = None,
     azimuths: int = AZIMUTHS,
-    texels: tuple[int, int] = TEXELS,
+    texels: int = TEXELS,
     precision: type[np.floating[Any]] = np.float32,
 ) -> Shadow:
     """The tables of shadowing `method`, one of METHODS, for `fabric`.
 
-    level : "weave" for threads that are flat across their width, "thread" for round ones
     softness : angular width of the light [rad], over which a shadow's edge is spread; None takes
-        `horizon_error` for `horizon` and PEAK_SOFTNESS for `peak`
-    azimuths, texels : size of the horizon table: directions, and texels (along, across) a thread in
-        one cell
+        `horizon.SOFTNESS` for `horizon` and PEAK_SOFTNESS for `peak`
+    azimuths, texels : size of the horizon table: directions, and texels along a thread in one cell
 
     A repeat that is too large for a horizon table, such as a figured cloth of hundreds of ends and
     picks, is traced instead: `method` is then TRACED, which is slower and more exact.
@@ -136,69 +169,82 @@ def compile_shadow(
         raise FabricError("shadow", f"is '{method}'; it must be one of {', '.join(METHODS)}")
     if softness is not None and not softness > 0:
         raise FabricError("softness", f"is {softness}; it must be above 0")
-    rounded = level_is_round(level)
     cloth = compile_fabric(fabric, precision=np.float64)
     highest = highest_point(fabric, cloth)
-    table = np.zeros((1, 1, 1, 1, 1, 1), np.uint8)
+    table = np.zeros((1, 1, 1, 1, 1), np.uint8)
     if method == "horizon":
-        found_table = horizon_table(fabric, cloth, rounded, highest, azimuths, texels)
+        found_table = horizon_table(fabric, cloth, highest, azimuths, texels)
         if found_table is None:
             method = "traced"
         else:
             table = found_table
-            softness = softness or horizon_error(cloth, rounded, highest, table)
-    mean = np.ones((2, ELEVATIONS, AZIMUTHS + 1))
-    if method in ("horizon", "traced"):
-        kept = table if method == "horizon" else None
-        edge = softness if method == "horizon" and softness else TRACED_SOFTNESS
-        mean = mean_light(fabric, cloth, rounded, highest, edge, kept)
     found = [crest(t.curve) for t in fabric.thread_list]
     first = np.ones((len(found), max(len(c) for c in found)))
     last = np.zeros_like(first)
-    for row, stretches in enumerate(found):
-        first[row, : len(stretches)], last[row, : len(stretches)] = stretches.T
-    return Shadow(
+    for row, crests in enumerate(found):
+        first[row, : len(crests)], last[row, : len(crests)] = crests.T
+    cut = stretches(fabric, cloth.curve_start.shape[1])
+    double = Shadow(
         method=METHODS.index(method),
-        rounded=rounded,
-        highest=precision(highest),
-        softness=precision(PEAK_SOFTNESS if softness is None else softness),
-        crest_first=first.astype(precision),
-        crest_last=last.astype(precision),
-        crest_height=np.array([peak(t.curve) for t in fabric.thread_list], precision),
+        highest=np.float64(highest),
+        softness=np.float64(_softness(method, softness)),
+        crest_first=first,
+        crest_last=last,
+        crest_height=np.array([peak(t.curve) for t in fabric.thread_list]),
         table=table,
         texels=table.reshape(-1),
-        mean=mean.astype(precision),
+        mean=np.ones(1),
+        mean_columns=_COLUMNS[METHODS.index(method)],
+        groups=GROUPS,
+        mean_first=cut.first,
+        piece_first=cut.piece_first,
+        piece_last=cut.piece_last,
+        piece_scale=cut.piece_scale,
+        absolute=_absolute(fabric),
+        all_absolute=int(_absolute(fabric).all()),
     )
+    if double.method != NONE:
+        double = double._replace(mean=_mean(fabric, cloth, double, cut.count))
+    return Shadow(*(_in_precision(value, precision) for value in double))
+
+
+def _softness(method: str, asked: float | None) -> float:
+    if asked is not None:
+        return asked
+    return {"traced": TRACED_SOFTNESS, "horizon": SOFTNESS}.get(method, PEAK_SOFTNESS)
+
+
+def _absolute(fabric: Fabric) -> NDArray[np.uint8]:
+    """`Shadow.absolute`: of `conserving` threads never, since their law masks."""
+    law = law_of(fabric)
+    laws = [model_of(fabric, t).law for t in fabric.thread_list]
+    return np.array([law.absolute and one == PUBLISHED for one in laws], np.uint8)
+
+
+def _in_precision(value: Any, precision: type[np.floating[Any]]) -> Any:
+    """A field of `Shadow` whose reals are of `precision`."""
+    if isinstance(value, np.ndarray) and value.dtype == np.float64:
+        return np.ascontiguousarray(value, dtype=precision)
+    return precision(value) if isinstance(value, np.float64) else value
+
+
+def _mean(fabric: Fabric, cloth: CompiledFabric, shadow: Shadow, count: int) -> NDArray[Any]:
+    """`Shadow.mean`; shadow : the other fields, in float64."""
+    traced = shadow.method == TRACED
+    columns = shadow.mean_columns
+    each = FEWER_PLACES if traced else MEAN_PLACES
+    uv, number = places_on(cloth, shape_repeat(fabric), shadow, count, each)
+    sine = np.zeros((len(uv), columns))
+    real: Any = np.float64
+    _horizons(real, cloth, shadow, uv, diamond_directions(columns), sine)
+    return groups_of(number, count, np.arcsin(sine) / float(shadow.softness)).reshape(-1)
 
 
 @njit(**INLINE)
-def mean_lit(R, shadow, which, x, y, z):
-    """Mean of `g` over the threads of a set for light from (x, y, z) above the cloth."""
-    row, column, a, b = _cell_of_mean(R, shadow, x, y, z)
-    return _between_means(shadow, which, np.uintp(row), np.uintp(column), a, b)
-
-
-@njit(**INLINE)
-def _cell_of_mean(R, shadow, x, y, z):
-    """(row, column) in the table of means for light from (x, y, z), and weights of the next
-    ones."""
-    rows, columns = shadow.mean.shape[1], shadow.mean.shape[2]
-    e = math.sqrt(min(max(z, R(0)), R(1))) * R(rows - 1)
-    turn = diamond(R, x, y) * R(0.25 * (columns - 1))
-    row, column = min(np.int32(e), np.int32(rows - 2)), min(np.int32(turn), np.int32(columns - 2))
-    return row, column, e - R(row), turn - R(column)
-
-
-@njit(**INLINE)
-def _between_means(shadow, which, row, column, a, b):
-    """The mean interpolated between four entries of its set's table; arbitrary in a gap."""
-    k = np.uintp(1 if which == WARP else 0)
-    ahead, beside = row + np.uintp(1), column + np.uintp(1)
-    low = shadow.mean[k, row, column]
-    low += (shadow.mean[k, row, beside] - low) * b
-    high = shadow.mean[k, ahead, column]
-    high += (shadow.mean[k, ahead, beside] - high) * b
-    return low + (high - low) * a
+def mean_lit(R, cloth, shadow, hit, x, y, z):
+    """Mean of `g` over the stretch that a `Hit` is on, for light from (x, y, z) above the cloth."""
+    stretch = stretch_of(R, cloth, shadow, hit.thread_set, hit.thread, hit.s)
+    return mean_of(R, shadow, stretch, x, y, z)
 
 
 @njit(**INLINE)
@@ -208,9 +254,12 @@ def shade(R, cloth, shadow, u, v, hit, x, y, z):
     The arguments are those of `lit`.
     """
     g = lit(R, cloth, shadow, u, v, hit, x, y, z)
-    if shadow.method < HORIZON or not g > R(0):
+    free = hit.thread_set == GAP or cloth.pile[hit.thread] != 0
+    if shadow.method == NONE or free or shadow.absolute[hit.thread] != 0 or not g >= R(0):
         return g
-    return g / mean_lit(R, shadow, hit.thread_set, x, y, z)
+    if z <= R(0):
+        return g
+    return relative(R, g, mean_lit(R, cloth, shadow, hit, x, y, z))
 
 
 @njit(**INLINE)
@@ -234,10 +283,10 @@ def lit(R, cloth, shadow, u, v, hit, x, y, z):
     if shadow.method == HORIZON:
         sine = horizon_at(R, cloth, shadow.table, u, v, which, x, y)
         return soft_edge(R, above_horizon(R, sine, flat, z), shadow.softness)
-    axis = height_on(R, cloth, thread, hit.s, hit.length)
+    axis = height_on(R, cloth, which, thread, hit.s, hit.length)
     if shadow.method == PEAK:
         # [Bisker2011] gives a place on the thread one height at every level, so threads are flat.
-        drop = shadow.highest - axis - cloth.half_thickness[which, thread]
+        drop = shadow.highest - axis - cloth.half_height[which, thread]
         if drop <= R(1e-6) * shadow.highest:
             return R(1)
         # A horizon lower than this one cannot reach the soft edge of the shadow.
@@ -245,11 +294,11 @@ def lit(R, cloth, shadow, u, v, hit, x, y, z):
         distance = R(_to_crest(cloth, shadow, u, v, float(drop / lowest)))
         reach = math.sqrt(drop * drop + distance * distance)
         return soft_edge(R, (z * distance - flat * drop) / reach, shadow.softness)
-    crown = crown_of(R, cloth, shadow.rounded, which, thread, hit.w)
+    crown = crown_on(R, cloth, which, thread, hit.w)
     origin = Origin(u, v, which, float(crown), float(axis + crown))
     slope = float(z) / float(flat)
     found = steepest(
-        cloth, shadow.rounded, float(shadow.highest), origin,
+        cloth, float(shadow.highest), origin,
         float(x) / float(flat), float(y) / float(flat), slope, True,
     )  # fmt: skip
     return R(0) if found > slope else R(1)
@@ -294,8 +343,8 @@ def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
             low, high = (0.0, edge) if part == 1 else (1.0 - edge, 1.0)
         visible = float(cloth.width[which]) if high > low else 0.0
         run = rises * cells * float(cloth.pitch[1 - which])
-        half = float(cloth.half_thickness[which, thread])
-        height = run * float(shadow.crest_height[thread]) + half
+        half = float(cloth.half_height[which, thread])
+        height = run * float(shadow.crest_height[thread]) + half + float(cloth.lift[which])
         if visible <= 0.0 or cloth.pile[thread] != 0 or height < 0.999999 * shadow.highest:
             continue
         across = 0.5 * visible
@@ -326,7 +375,7 @@ def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
     """
     table = shadow.table
     choose_texels(R, cloth, table, wi, begin, size, ints, reals)
-    mix_texels(R, shadow.texels, table.shape[4], table.shape[5], size, ints, reals)
+    mix_texels(R, shadow.texels, table.shape[4], size, ints, reals)
     for k in range(size):
         m = index(begin, k)
         x, y, z = wi[0, m], wi[1, m], wi[2, m]
@@ -339,22 +388,50 @@ def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
 
 
 @njit(**PART)
-def mean_block(R, shadow, wi, begin, size, ints, reals):
-    """Divide the row LIT by the mean of `g`, in loops like those of `horizon_blocks`."""
+def mean_block(R, cloth, shadow, wi, begin, size, ints, reals):
+    """Turn the row LIT from `lit` to `shade`, in loops like those of `horizon_blocks`."""
+    if shadow.all_absolute != 0:
+        return
     for k in range(size):
         m = index(begin, k)
+        g, z = reals[LIT + k], wi[2, m]
+        thread = np.uintp(ints[OF_THREAD + k])
         # Where LIT is NaN it stays NaN, and the NaN must not index the table.
-        sound = reals[LIT + k] >= R(0)
-        x, y, z = wi[0, m] if sound else R(0), wi[1, m] if sound else R(0), wi[2, m]
-        ints[FIRST + k], ints[SECOND + k], a, b = _cell_of_mean(
-            R, shadow, x, y, z if sound else R(0)
-        )
-        reals[SHARES + k], reals[SHARES + BLOCK + k] = a, b
-    for k in range(size):
-        row, column = np.uintp(ints[FIRST + k]), np.uintp(ints[SECOND + k])
-        reals[LIT + k] /= _between_means(
-            shadow, ints[OF_SET + k], row, column, reals[SHARES + k], reals[SHARES + BLOCK + k]
-        )
+        if not g >= R(0) or z <= R(0) or ints[FREE + k] != 0 or shadow.absolute[thread] != 0:
+            continue
+        which = np.uintp(ints[OF_SET + k])
+        stretch = stretch_of(R, cloth, shadow, which, thread, reals[S + k])
+        reals[LIT + k] = relative(R, g, mean_of(R, shadow, stretch, wi[0, m], wi[1, m], z))
+
+
+@njit(**KERNEL, parallel=True)
+def _horizons(R, cloth, shadow, uv, directions, out):
+    """Sine of the horizon's elevation at uv (n, 2) in each of `directions` (c, 2): out (n, c)."""
+    for k in prange(uv.shape[0]):
+        _horizons_at(R, cloth, shadow, uv[k, 0], uv[k, 1], directions, out[k])
+
+
+@njit(**KERNEL)
+def _horizons_at(R, cloth, shadow, u, v, directions, out):
+    which, thread, s, w, _, length = find(R, cloth, u, v)
+    if which == GAP or cloth.pile[thread] != 0:
+        return
+    crown = crown_on(R, cloth, which, thread, w)
+    axis = height_on(R, cloth, which, thread, s, length)
+    if shadow.method == PEAK:
+        drop = shadow.highest - axis - cloth.half_height[which, thread]
+        if drop > R(1e-6) * shadow.highest:
+            distance = _to_crest(cloth, shadow, u, v, drop / R(1e-3))
+            out[:] = drop / math.sqrt(drop * drop + distance * distance)
+        return
+    origin = Origin(u, v, which, crown, axis + crown)
+    for c in range(directions.shape[0]):
+        x, y = directions[c, 0], directions[c, 1]
+        if shadow.method == HORIZON:
+            out[c] = horizon_at(R, cloth, shadow.table, u, v, which, x, y)
+        else:
+            slope = steepest(cloth, shadow.highest, origin, x, y, LOWEST, False)
+            out[c] = slope / math.sqrt(R(1) + slope * slope) if slope > LOWEST else R(0)
 
 
 @njit(**PART)
@@ -364,10 +441,11 @@ def _one_by_one(R, cloth, shadow, shaded, uv, begin, wi, out):
         u, v = uv[begin + k, 0], uv[begin + k, 1]
         x, y, z = wi[0, begin + k], wi[1, begin + k], wi[2, begin + k]
         which, thread, s, w, _, length = find(R, cloth, u, v)
-        g = lit(R, cloth, shadow, u, v, Hit(which, thread, s, w, length), x, y, z)
-        if shaded and shadow.method >= HORIZON and g > R(0):
-            g /= mean_lit(R, shadow, which, x, y, z)
-        out[k] = g
+        hit = Hit(which, thread, s, w, length)
+        if shaded:
+            out[k] = shade(R, cloth, shadow, u, v, hit, x, y, z)
+        else:
+            out[k] = lit(R, cloth, shadow, u, v, hit, x, y, z)
 
 
 @njit(parallel=True, **KERNEL)
@@ -385,7 +463,7 @@ def lit_all(R, cloth, shadow, shaded, uv, wi, out):
             look_up_block(R, cloth, shadow.table, uv, begin, size, ints, reals)
             horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
             if shaded:
-                mean_block(R, shadow, wi, begin, size, ints, reals)
+                mean_block(R, cloth, shadow, wi, begin, size, ints, reals)
             found[:] = reals[LIT : LIT + size]
 
 
@@ -395,17 +473,16 @@ def shadowing(
     uv_threads: ArrayLike,
     method: str = "horizon",
     *,
-    level: str = "weave",
     compiled: tuple[CompiledFabric, Shadow] | None = None,
 ) -> NDArray[Any]:
     """`g` (n,) for light from unit directions wi (n, 3) at weave coordinates uv_threads (n, 2).
 
-    compiled : the compiled fabric and its `compile_shadow`, if the caller has them; `method` and
-        `level` are then ignored. Otherwise both are compiled in float64.
+    compiled : the compiled fabric and its `compile_shadow`, if the caller has them; `method` is
+        then ignored. Otherwise both are compiled in float64.
     """
     if compiled is None:
         cloth = compile_fabric(fabric, precision=np.float64)
-        shadow = compile_shadow(fabric, method, level=level, precision=np.float64)
+        shadow = compile_shadow(fabric, method, precision=np.float64)
     else:
         cloth, shadow = compiled
     real = cloth.curve_start.dtype.type

@@ -40,11 +40,10 @@ INT_ROWS = 14
 X, Y, S, ANGLE = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
 """Rows of reals: the place in the cell, the position on the thread's run, and the tangent angle
 [rad] there."""
-SHARES, LIT = 4 * BLOCK, 7 * BLOCK
-"""Three rows filled by `horizon_blocks.choose_texels`; the share of light that reaches the
-place."""
-_UPPER_START, _UPPER_CELLS, _LOWER_START, _LOWER_CELLS = (row * BLOCK for row in range(8, 12))
-REAL_ROWS = 12
+SHARES, LIT = 4 * BLOCK, 6 * BLOCK
+"""Two rows filled by `horizon_blocks.choose_texels`; the share of light that reaches the place."""
+_UPPER_START, _UPPER_CELLS, _LOWER_START, _LOWER_CELLS = (row * BLOCK for row in range(7, 11))
+REAL_ROWS = 11
 
 
 @njit(**PART)

@@ -7,7 +7,6 @@ order in `Fabric.threads`, and the grid by `[end, pick]`.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,10 +14,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 import fabricusd.kernels  # noqa: F401 - chooses where kernels are cached
-from fabricusd.appearance.weave.coverage import Coverage, coverage, sets
+from fabricusd.appearance.weave.coverage import coverage, sets, true_repeat
 from fabricusd.appearance.weave.curve import is_pile, pieces
+from fabricusd.appearance.weave.sections import sections
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
+
+__all__ = ["CompiledFabric", "compile_fabric", "true_repeat"]
 
 Reals = NDArray[Any]
 """float32 or float64: the precision that the fabric was compiled for."""
@@ -40,7 +42,8 @@ class CompiledFabric(NamedTuple):
     area : (2, k) real - share of the cloth that type k of set j covers
     gap : real - share of the cloth that no thread covers
     pitch : (2,) real - distance from one thread of the set to the next [m]
-    half_thickness : (2, k) real - [m]; half the visible width if the thread states no thickness
+    half_height : (2, k) real - half the height of a thread's section [m], see `sections`
+    lift : (2,) real - height of the set's axes above that of their curves [m]; 0 for the warp
     curve_start : (k, p) real - start of each linear piece of a type's curve, in run lengths; padded
         with 2 to a power of two
     curve_angle, curve_slope : (k, p) real - angle at that start [rad], change of angle per run
@@ -59,7 +62,8 @@ class CompiledFabric(NamedTuple):
     area: Reals
     gap: Any
     pitch: Reals
-    half_thickness: Reals
+    half_height: Reals
+    lift: Reals
     curve_start: Reals
     curve_angle: Reals
     curve_slope: Reals
@@ -88,6 +92,7 @@ def compile_fabric(
     for row, thread_set in zip(sequence, sets(fabric), strict=True):
         row[: len(thread_set.sequence)] = thread_set.sequence
     pitch = np.array([s.pitch for s in sets(fabric)])
+    section = sections(fabric)
     return CompiledFabric(
         grid=np.ascontiguousarray(fabric.weave.cells, dtype=np.uint8),
         runs=_run_table(fabric.weave.cells, 2 if share.width.min() < 1.0 else 1),
@@ -98,19 +103,12 @@ def compile_fabric(
         area=reals(share.type_area),
         gap=real(share.gap),
         pitch=reals(pitch),
-        half_thickness=reals(_half_thickness(fabric, share, pitch)),
+        half_height=reals(section.half_height),
+        lift=reals((section.lift, 0.0)),
         **{name: reals(table) for name, table in _curve_tables(fabric).items()},
         pile=np.array([is_pile(t.curve) for t in fabric.thread_list], np.uint8),
         last=np.nextafter(real(1), real(0)),
         tiny=np.finfo(real).tiny,
-    )
-
-
-def true_repeat(fabric: Fabric) -> tuple[int, int]:
-    """Numbers of ends and picks after which weave and thread sequences repeat together."""
-    return (
-        math.lcm(fabric.weave.ends, len(fabric.warp.sequence)),
-        math.lcm(fabric.weave.picks, len(fabric.weft.sequence)),
     )
 
 
@@ -175,13 +173,6 @@ def _fill_runs(lines, out):
                 out[r, start, 1] = 0 if first == n else count
                 start = start + 1 if start + 1 < n else 0
             left -= count
-
-
-def _half_thickness(fabric: Fabric, share: Coverage, pitch: NDArray[np.float64]) -> Reals:
-    """(2, k) half the thickness [m] of each type in each set."""
-    stated = np.array([t.thickness for t in fabric.thread_list])
-    visible = share.width * pitch
-    return 0.5 * np.where(stated > 0, stated, visible[:, None])
 
 
 def _curve_tables(fabric: Fabric) -> dict[str, NDArray[np.float64]]:

@@ -18,7 +18,7 @@ from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.bands import band_widths
 from fabricusd.fabric import Fabric, ThreadSet
 
-__all__ = ["GAP", "WARP", "WEFT", "Coverage", "coverage", "sets"]
+__all__ = ["GAP", "WARP", "WEFT", "Coverage", "coverage", "sets", "true_repeat"]
 
 Floats = NDArray[np.float64]
 
@@ -46,6 +46,14 @@ class Coverage(NamedTuple):
 def sets(fabric: Fabric) -> tuple[ThreadSet, ThreadSet]:
     """The thread sets in index order: weft, warp."""
     return fabric.weft, fabric.warp
+
+
+def true_repeat(fabric: Fabric) -> tuple[int, int]:
+    """Numbers of ends and picks after which weave and thread sequences repeat together."""
+    return (
+        math.lcm(fabric.weave.ends, len(fabric.warp.sequence)),
+        math.lcm(fabric.weave.picks, len(fabric.weft.sequence)),
+    )
 
 
 def coverage(fabric: Fabric) -> Coverage:

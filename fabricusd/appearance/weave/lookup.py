@@ -160,18 +160,18 @@ def rise_on(R, cloth, thread, k, s):
 
 
 @njit(**INLINE)
-def height_on(R, cloth, thread, s, length):
+def height_on(R, cloth, thread_set, thread, s, length):
     """Height [m] of the thread's axis at `s` on a visible run of `length` [m]; 0 on pile."""
     if cloth.pile[thread] != 0:
         return R(0)
-    return length * rise_on(R, cloth, thread, piece_of(R, cloth, thread, s), s)
+    rise = length * rise_on(R, cloth, thread, piece_of(R, cloth, thread, s), s)
+    return rise + cloth.lift[thread_set]
 
 
 @njit(**INLINE)
 def crown_on(R, cloth, thread_set, thread, w):
-    """Height [m] of a round thread above its axis at `w`: half the thickness times sqrt(1 -
-    w^2)."""
-    return cloth.half_thickness[thread_set, thread] * math.sqrt(max(R(0), R(1) - w * w))
+    """Height [m] of a round thread above its axis at `w`: half its height times sqrt(1 - w^2)."""
+    return cloth.half_height[thread_set, thread] * math.sqrt(max(R(0), R(1) - w * w))
 
 
 @njit(**INLINE)
@@ -331,7 +331,7 @@ def heights_all(R, cloth, sets, threads, s, w, length, height, crown):
             height[k] = R(0)
             crown[k] = R(0)
         else:
-            height[k] = height_on(R, cloth, threads[k], s[k], length[k])
+            height[k] = height_on(R, cloth, sets[k], threads[k], s[k], length[k])
             crown[k] = crown_on(R, cloth, sets[k], threads[k], w[k])
 
 

@@ -18,9 +18,10 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
+from fabricusd.appearance import laws
 from fabricusd.appearance.published.blocks import NOTHING
 from fabricusd.appearance.published.far import normalization
-from fabricusd.appearance.published.segment import along_set, seen_along, segment
+from fabricusd.appearance.published.segment import along_set, segment
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.scattering.columns import GAMMA_SURFACE, MODEL
 from fabricusd.appearance.weave.coverage import coverage
@@ -186,7 +187,6 @@ def _relight(  # type: ignore[no-untyped-def]
     kinds : (n,) thread ids, -1 for none
     """
     R = np.float64
-    precision = tables.overlap_precision
     q = normalization(R, tables, wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
     if wi[2] <= 0.0 or wo[2] <= 0.0 or q <= NOTHING:
         return
@@ -194,7 +194,7 @@ def _relight(  # type: ignore[no-untyped-def]
         for j in range(2):
             if sets[k, j, 3] <= 0.0:
                 continue
-            pair = along_set(R, j, precision, wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
+            pair = along_set(R, tables, j, wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
             for kind in range(types):
                 # If a thread lies under the texel's centre, it stands for its whole set.
                 weight = share[j, kind]
@@ -206,18 +206,18 @@ def _relight(  # type: ignore[no-untyped-def]
                     if covered <= 0.0:
                         continue
                     angles = _Angles(sets[k, j, 8 + part], sets[k, j, 12 + part], shapes[j, part])
-                    surface, volume = _part_terms(R, precision, row, angles, pair)
+                    surface, volume = _part_terms(R, tables, row, angles, pair)
                     for channel in range(3):
                         value = surface + volume * sets[k, j, channel]
                         out[k, channel] += covered / q * value
 
 
 @njit(**KERNEL)
-def _part_terms(R, precision, row, angles, pair):  # type: ignore[no-untyped-def]
+def _part_terms(R, tables, row, angles, pair):  # type: ignore[no-untyped-def]
     """Return the surface and volume terms of a thread, averaged over its tangent angles.
 
     angles : `_Angles`; pair : what `along_set` returns
-    precision : see `overlap`
+    tables : of the surface law
     """
     fewest = 3.0 * math.sqrt(3.0) * angles.deviation / row[GAMMA_SURFACE]
     kind = 0
@@ -229,8 +229,8 @@ def _part_terms(R, precision, row, angles, pair):  # type: ignore[no-untyped-def
         angle = angles.mean + angles.deviation * angles.shape[kind, node]
         angle = min(max(angle, -0.5 * math.pi), 0.5 * math.pi)
         c, s = math.cos(angle), math.sin(angle)
-        surface, volume = segment(R, int(row[MODEL]), row, precision, c, s, pair)
-        p = seen_along(R, c, s, pair) / nodes
+        surface, volume = segment(R, tables, int(row[MODEL]), row, c, s, pair)
+        p = laws.weight(R, tables, c, s, pair) / nodes
         first += p * surface
         second += p * volume
     return first, second

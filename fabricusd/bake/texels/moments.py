@@ -135,11 +135,11 @@ def _add(made, u, v, out):  # type: ignore[no-untyped-def]
     low = min(int(place), HEIGHTS - 2)
     rise = made.heights[thread, low]
     rise += (made.heights[thread, low + 1] - rise) * (place - R(low))
-    lift = made.cloth.half_thickness[which, thread]
+    crown = made.cloth.half_height[which, thread]
     if made.rounded != 0:
-        lift = crown_on(R, made.cloth, which, thread, w)
+        crown = crown_on(R, made.cloth, which, thread, w)
         _add_round(made, which, thread, w, step, out)
-    out[HEIGHT] += length * rise + lift
+    out[HEIGHT] += length * rise + made.cloth.lift[which] + crown
     if made.light[2] > R(0):
         out[LIT] += lit(
             R, made.cloth, made.shadow, u, v, Hit(which, thread, s, w, length),
@@ -155,7 +155,7 @@ def _add_round(made, which, thread, w, step, out):  # type: ignore[no-untyped-de
     edge = min(max(w, R(-ROUNDEST)), R(ROUNDEST))
     share = made.cloth.width[which] if made.cloth.width[which] > R(0) else R(1)
     reach = R(0.5) * share * made.cloth.pitch[which]
-    steep = made.cloth.half_thickness[which, thread] / reach
+    steep = made.cloth.half_height[which, thread] / reach
     across = -edge / R(math.sqrt(R(1) - edge * edge)) * steep
     along = 1 if which == WARP else 0
     # w grows along -U on the warp, along +V on the weft.
@@ -170,7 +170,7 @@ def _add_horizon(made, u, v, which, out):  # type: ignore[no-untyped-def]
     """Add the nearest entry of the horizon table; averaging a texel's samples interpolates it."""
     R = np.float32
     table = made.table
-    if table.shape[5] != AZIMUTHS:
+    if table.shape[4] != AZIMUTHS:
         return
     end, pick = math.floor(u), math.floor(v)
     a, b = wrap(end, table.shape[0]), wrap(pick, table.shape[1])
@@ -182,15 +182,14 @@ def _add_horizon(made, u, v, which, out):  # type: ignore[no-untyped-def]
     width = cloth.width[top]
     slot = 0
     if which == top:
-        along, across = p, (q - R(0.5)) / width + R(0.5)
+        along = p
     else:
         slot = 1
         seen = q if q < R(0.5) else q - width
-        along, across = seen / (R(1) - width), (p - R(0.5)) / cloth.width[1 - top] + R(0.5)
+        along = seen / (R(1) - width)
     row = min(max(int(along * table.shape[3]), 0), table.shape[3] - 1)
-    column = min(max(int(across * table.shape[4]), 0), table.shape[4] - 1)
     for k in range(AZIMUTHS):
-        sine = R(table[a, b, slot, row, column, k]) * R(1.0 / 255.0)
+        sine = R(table[a, b, slot, row, k]) * R(1.0 / 255.0)
         out[HORIZON + k] += sine * sine
 
 

@@ -51,8 +51,8 @@ def recipe(
     method : method of the shadow mask
     """
     cloth = compile_fabric(fabric, precision=np.float32)
-    horizon = compile_shadow(fabric, "horizon", level=level)
-    shadow = compile_shadow(fabric, method, level=level) if light is not None else horizon
+    horizon = compile_shadow(fabric, "horizon")
+    shadow = compile_shadow(fabric, method) if light is not None else horizon
     towards = np.array((0.0, 0.0, 0.0) if light is None else unit_light(light))
     made = Recipe(
         cloth=cloth,

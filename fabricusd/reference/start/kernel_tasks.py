@@ -157,7 +157,7 @@ def _woven() -> tuple[CompiledFabric, Shadow]:
 
 
 def _shadow_table() -> None:
-    compile_shadow(Fabric(), "horizon", azimuths=16, texels=(2, 2))
+    compile_shadow(Fabric(), "horizon", azimuths=16, texels=2)
 
 
 def _look_up() -> None:

@@ -23,6 +23,7 @@ from fabricusd.appearance.law import (
     law_value,
     surface_law,
 )
+from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.sampling.blocks import Drawn, sample_points
 from fabricusd.appearance.shadow.methods import NONE, Shadow, compile_shadow, shade
@@ -117,29 +118,31 @@ class _Side:
         self.fabric, self.method, self.make_ready = fabric, shadow, make_ready
         self.types = len(fabric.threads)
         self._law: SurfaceLaw | None = None
-        self._near: dict[int, tuple[CompiledFabric, Shadow]] = {}
+        self._near: tuple[CompiledFabric, Shadow] | None = None
 
     @property
     def law(self) -> SurfaceLaw:
         """The surface law, made when it is first needed: often a cloth's back is never seen."""
         with _ONE_AT_A_TIME:
             if self._law is None:
-                self._law = surface_law(self.fabric, precision=np.float32)
+                held = self._made()[1] if law_of(self.fabric).absolute else None
+                self._law = surface_law(self.fabric, precision=np.float32, shadow=held)
             return self._law
 
-    def near(self, level: int) -> tuple[CompiledFabric, Shadow]:
-        """Weave and shadowing for level `weave` or `thread`, made when they are first needed."""
+    @property
+    def near(self) -> tuple[CompiledFabric, Shadow]:
+        """Weave and shadowing for levels `weave` and `thread`, made when they are first needed."""
         # One lock for all cloths: numba's own workers compute some of these tables, and they may
         # not be called from two threads at once.
         with _ONE_AT_A_TIME:
-            if level not in self._near:
-                self.make_ready()
-                name = "thread" if level == THREAD_LEVEL else "weave"
-                self._near[level] = (
-                    compile_fabric(self.fabric, precision=np.float32),
-                    compile_shadow(self.fabric, self.method, level=name),
-                )
-            return self._near[level]
+            return self._made()
+
+    def _made(self) -> tuple[CompiledFabric, Shadow]:
+        if self._near is None:
+            self.make_ready()
+            cloth = compile_fabric(self.fabric, precision=np.float32)
+            self._near = cloth, compile_shadow(self.fabric, self.method)
+        return self._near
 
 
 class FabricShader:
@@ -194,7 +197,7 @@ class FabricShader:
         points: Points,
     ) -> None:
         wo, wi, go, towards, onwards = scattering
-        law, (cloth, shadow) = side.law, side.near(level)
+        law, (cloth, shadow) = side.law, side.near
         count = wo.shape[1]
         places = places_of(points)
         v_sign = R(-1) if back else R(1)

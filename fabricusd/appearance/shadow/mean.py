@@ -1,0 +1,210 @@
+"""The mean of `g` over stretches of the threads' curves, by the light's direction.
+
+All places of a stretch scatter alike at level `weave`. So level `far` is exact under a shadow if it
+takes each stretch's mean of g, and cloth keeps its light if g is divided by it: the two ways in
+which a surface law may treat a shadow, `laws.Law.absolute`.
+
+Each linear piece of each thread type's curve is cut into stretches over which the tangent angle
+changes by no more than the surface lobe is wide. For each set that shows the type, the horizons of
+places of all its runs are sorted and put into groups of equal size, by azimuth: the mean of g is
+that over the groups. A table of the mean itself, by elevation and azimuth, would need a hundred
+times the entries, because the light that enters the channel between two threads does so at once.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabricusd.appearance.laws.lit import GROUPS, column_of, level_of, mean_over
+from fabricusd.appearance.weave.coverage import WARP, WEFT
+from fabricusd.appearance.weave.curve import Pieces, pieces
+from fabricusd.appearance.weave.lookup import find_all, piece_of
+from fabricusd.appearance.weave.quadrature import CurveNodes
+from fabricusd.fabric import Fabric
+from fabricusd.kernels.real import INLINE
+
+Floats = NDArray[np.float64]
+
+WIDEST, NARROWEST = math.radians(2.0), math.radians(1.0)
+"""Bounds on the change of tangent angle over a stretch [rad]."""
+
+MOST_STRETCHES = 64
+"""Largest number of stretches on one piece of a curve."""
+
+PLACES = 1 << 16
+"""Places of the repeat among which those of the stretches are found."""
+
+LEAST_LIGHT = 0.1
+"""Where a stretch's mean of g is below this, g is not divided by all of it: what a stretch in the
+shade of others lacks is spread over it evenly, not put on its few bright places."""
+
+
+class Stretches(NamedTuple):
+    """The stretches of a fabric, numbered set by set, type by type and along the curve.
+
+    first : (2, k) int32 - number of the first stretch of type k in set j
+    piece_first, piece_last : (k, p) int32 - first stretch of a piece, from that of the type on; the
+        number of stretches in it less 1
+    piece_scale : (k, p) float - stretches per run length
+    count : int - number of stretches
+    """
+
+    first: NDArray[np.int32]
+    piece_first: NDArray[np.int32]
+    piece_last: NDArray[np.int32]
+    piece_scale: Floats
+    count: int
+
+
+def stretches(fabric: Fabric, longest: int) -> Stretches:
+    """The stretches of `fabric`; longest : columns of the tables of pieces."""
+    kinds = fabric.thread_list
+    shape = (len(kinds), longest)
+    first, last = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
+    scale, totals = np.zeros(shape), np.zeros(len(kinds), np.int64)
+    for k, thread in enumerate(kinds):
+        p = pieces(thread.curve)
+        step = min(max(thread.gamma_surface, NARROWEST), WIDEST)
+        count = np.ceil(np.abs(p.last - p.first) / step - 1e-9).astype(np.int64)
+        count = np.clip(count, 1, MOST_STRETCHES)
+        used = slice(0, len(count))
+        first[k, used], last[k, used] = np.cumsum(count) - count, count - 1
+        scale[k, used] = count / p.length
+        totals[k] = count.sum()
+    starts = np.cumsum(np.concatenate((totals, totals))) - np.concatenate((totals, totals))
+    return Stretches(
+        starts.reshape(2, -1).astype(np.int32), first, last, scale, int(2 * totals.sum())
+    )
+
+
+@njit(**INLINE)
+def stretch_of(R, cloth, shadow, which, thread, s):
+    """Number of the stretch at position s on a run of `thread` in set `which`; s must be finite."""
+    p = piece_of(R, cloth, thread, s)
+    part = np.int32((s - cloth.curve_start[thread, p]) * shadow.piece_scale[thread, p])
+    part = max(min(part, shadow.piece_last[thread, p]), np.int32(0))
+    return shadow.mean_first[which, thread] + shadow.piece_first[thread, p] + part
+
+
+def places_on(
+    cloth: Any, repeat: tuple[int, int], shadow: Any, count: int, each: int
+) -> tuple[Floats, NDArray[np.int64]]:
+    """((n, 2) weave coordinates, (n,) stretches): up to `each` places of each of `count` stretches.
+
+    cloth : compiled for float64; repeat : of the threads' shapes; shadow : what `stretch_of` reads
+    """
+    step = np.array([0.7548776662466927, 0.5698402909980532])
+    uv = ((0.5 + np.arange(PLACES)[:, None] * step) % 1.0) * repeat
+    n = len(uv)
+    sets, threads = np.empty(n, np.uint8), np.empty(n, np.int32)
+    s, w, angle, length = (np.empty(n) for _ in range(4))
+    find_all(np.float64, cloth, uv, sets, threads, s, w, angle, length)
+    found = np.full(n, -1, np.int64)
+    _number(np.float64, cloth, shadow, sets, threads, s, found)
+    order = np.argsort(found, kind="stable")
+    order = order[found[order] >= 0]
+    number = found[order]
+    rank = np.arange(len(number)) - np.searchsorted(number, number)
+    keep = rank < each
+    return np.ascontiguousarray(uv[order[keep]]), number[keep]
+
+
+@njit(cache=True)
+def _number(R, cloth, shadow, sets, threads, s, out):
+    for k in range(out.size):
+        if sets[k] <= 1 and cloth.pile[threads[k]] == 0:
+            out[k] = stretch_of(R, cloth, shadow, sets[k], threads[k], s[k])
+
+
+def groups_of(number: NDArray[np.int64], count: int, horizon: Floats) -> Floats:
+    """(count, columns + 1, GROUPS) mean horizons of each group of places, lowest first.
+
+    number : (n,) ascending stretch of each place; horizon : (n, columns). Stretches that no place is
+    on have level horizons; the last column repeats the first.
+    """
+    found = np.zeros((count, horizon.shape[1] + 1, GROUPS))
+    for stretch in np.unique(number):
+        mine = np.sort(horizon[number == stretch], axis=0)
+        # As many copies as make every group whole.
+        whole = np.repeat(mine, GROUPS, axis=0).reshape(GROUPS, len(mine), -1).mean(axis=1)
+        found[stretch, :-1] = whole.T
+    found[:, -1] = found[:, 0]
+    return found
+
+
+@njit(**INLINE)
+def mean_of(R, shadow, stretch, x, y, z):
+    """Mean of g over a stretch, for light from (x, y, z) above the cloth."""
+    columns = shadow.mean_columns
+    column, c = column_of(R, columns, x, y)
+    begin = (np.int64(stretch) * (columns + 1) + column) * GROUPS
+    level = level_of(R, z, shadow.softness)
+    return mean_over(R, shadow.mean, shadow.groups, begin, begin + GROUPS, c, level)
+
+
+@njit(**INLINE)
+def relative(R, g, mean):
+    """`g` over its mean, see LEAST_LIGHT: a factor whose mean is 1."""
+    scale = R(1) / max(mean, R(LEAST_LIGHT))
+    return g * scale + (R(1) - mean * scale)
+
+
+def node_groups(shadow: Any, nodes: CurveNodes, fabric: Fabric) -> Floats | None:
+    """(columns + 1, q, GROUPS) horizons of what each of q nodes stands for, as `groups_of`; None
+    without a shadow.
+
+    shadow : the `Shadow` of `fabric`. A node stands for as much of its curve as its weight says.
+    """
+    if shadow.method == 0:
+        return None
+    columns = shadow.mean_columns + 1
+    table = np.asarray(shadow.mean, np.float64).reshape(-1, columns, GROUPS)
+    found = np.zeros((columns, len(nodes.psi0), GROUPS))
+    for which in (WEFT, WARP):
+        mine = np.arange(len(nodes.psi0)) >= nodes.warp_start
+        mine = mine if which == WARP else ~mine
+        for kind, thread in enumerate(fabric.thread_list):
+            here = np.flatnonzero(mine & (nodes.thread == kind))
+            if not len(here):
+                continue
+            weight = nodes.weight[here]
+            ends = np.concatenate(((0.0,), np.cumsum(weight) / weight.sum()))
+            cuts = _cuts(pieces(thread.curve), shadow.piece_last[kind] + 1)
+            first = int(shadow.mean_first[which, kind])
+            rows = table[first : first + len(cuts) - 1]
+            for node, low, high in zip(here, ends[:-1], ends[1:], strict=True):
+                shared = np.minimum(cuts[1:], high) - np.maximum(cuts[:-1], low)
+                on = np.flatnonzero(shared > 1e-12)
+                found[:, node] = _mixed(rows[on], shared[on])
+    return found
+
+
+def _cuts(p: Pieces, counts: NDArray[np.int32]) -> Floats:
+    """Ends of the stretches of a curve, in run lengths, from 0 to 1."""
+    parts = zip(p.start, p.length, counts, strict=False)
+    return np.concatenate([a + length * np.arange(n) / n for a, length, n in parts] + [np.ones(1)])
+
+
+def _mixed(rows: Floats, weight: Floats) -> Floats:
+    """(columns + 1, groups) of several stretches together: rows (n, columns + 1, groups)."""
+    n, columns, groups = rows.shape
+    if n == 1:
+        return rows[0]
+    sine = rows.transpose(1, 0, 2).reshape(columns, -1)
+    order = np.argsort(sine, axis=1)
+    sine = np.take_along_axis(sine, order, axis=1)
+    mass = np.repeat(weight / weight.sum() / groups, groups)[order]
+    upper = np.cumsum(mass, axis=1)
+    # Means between equal shares of the mass, from the integral of a step function.
+    whole = np.concatenate((np.zeros((columns, 1)), np.cumsum(sine * mass, axis=1)), axis=1)
+    cuts = np.arange(groups + 1) / groups
+    out = np.empty((columns, groups))
+    for k in range(columns):
+        edges = np.concatenate(((0.0,), upper[k] / upper[k, -1]))
+        out[k] = groups * np.diff(np.interp(cuts, edges, whole[k]))
+    return out
