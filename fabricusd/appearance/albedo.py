@@ -16,17 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from fabricusd.appearance.laws import law_of
+from fabricusd.appearance.laws.masked import plain_masked
 from fabricusd.appearance.plain import (
     Share,
     curve_points,
     gap,
-    masked,
     shares,
     thread_terms,
+    to_thread,
 )
 from fabricusd.appearance.scattering.model import CONSERVING
 from fabricusd.appearance.scattering.models import named
-from fabricusd.appearance.scattering.plain_lobes import Angles
+from fabricusd.appearance.scattering.plain_lobes import Angles, angles
 from fabricusd.fabric import PILE_ANGLE, Fabric
 
 Floats = NDArray[np.float64]
@@ -70,7 +72,8 @@ def directional_albedo(
     theta : (n,) polar angles of the viewer [rad]
 
     Returns two (n, azimuths, groups) arrays; the volume term is that of white threads, `A = 1`. The
-    groups are those of `groups`. The value of the fabric is the sum over groups of
+    groups are those of `groups`. Nothing shadows the light: laws with an absolute shadow reflect at
+    most this. The value of the fabric is the sum over groups of
     surface + A volume. Only the published models are evaluated: threads of the conserving law count
     as black.
     """
@@ -147,7 +150,7 @@ def _mean_p(part: Share, width: float, i: Floats, o: Floats, effort: Effort) -> 
     if part.thread.curve.steepest > PILE_ANGLE:
         mean = np.zeros(np.broadcast_shapes(i.shape, o.shape))
         for psi0, weight in zip(*_nodes(part, effort), strict=True):
-            mean += weight * masked(i - psi0, o - psi0, width)
+            mean += weight * plain_masked(i - psi0, o - psi0, width)
         return mean
     places = (np.stack(np.broadcast_arrays(i, o)) + math.pi / 2) / FINEST
     table = _p_table(part, width, effort)
@@ -161,7 +164,7 @@ def _p_table(part: Share, width: float, effort: Effort) -> Floats:
     i, o = np.meshgrid(psi, psi, indexing="ij")
     table = np.zeros_like(i)
     for psi0, weight in zip(*_nodes(part, effort), strict=True):
-        table += weight * masked(i - psi0, o - psi0, width)
+        table += weight * plain_masked(i - psi0, o - psi0, width)
     return table
 
 
@@ -195,17 +198,31 @@ def _node(
     i = Angles(theta=t, phi=p, psi=np.arctan2(ix, iz))
     o = Angles(theta=theta_o[:, None, None], phi=phi_o[:, None, None], psi=psi_o[:, None, None])
     surface, volume = thread_terms(part.thread, part.model, i, o)
-    seen = masked(i.phi, o.phi, fabric.masking_width) * masked(i.psi, o.psi, fabric.masking_width)
-    w = np.stack((-iy, flat, up) if part.is_warp else (flat, iy, up), axis=-1)
-    q = gap(fabric) * views[:, None, None, 2] + np.zeros(up.shape)
-    for other in parts:
-        to = _tilt(views, other.is_warp)[:, None, None]
-        q += other.area * _mean_p(other, fabric.masking_width, _tilt(w, other.is_warp), to, effort)
+    law = law_of(fabric)
+    seen = law.plain_weight(fabric, psi0, i, o) * law.plain_mask(fabric, i, o)
+    if law.absolute:
+        q = _total(fabric, parts, views, effort)[:, None, None] + np.zeros(up.shape)
+    else:
+        w = np.stack((-iy, flat, up) if part.is_warp else (flat, iy, up), axis=-1)
+        q = gap(fabric) * views[:, None, None, 2] + np.zeros(up.shape)
+        for other in parts:
+            to, width = _tilt(views, other.is_warp)[:, None, None], fabric.masking_width
+            q += other.area * _mean_p(other, width, _tilt(w, other.is_warp), to, effort)
     lit = (up > 0) & (views[:, None, None, 2] > 0) & (q > 1e-12)
     # f cos(theta) times the solid angle cos(theta) dtheta dphi.
     measure = np.cos(t) ** 2 * theta_weight[:, :, None] * phi_weight[:, None, :]
     share = np.where(lit, seen * measure / np.where(lit, q, 1.0), 0.0)
     return (surface * share).sum(axis=(1, 2)), (volume * share).sum(axis=(1, 2))
+
+
+def _total(fabric: Fabric, parts: list[Share], views: Floats, effort: Effort) -> Floats:
+    """(views,) total of a law whose weight asks for the viewer alone."""
+    law, seen = law_of(fabric), np.zeros(len(views))
+    for part in parts:
+        for psi0, weight in zip(*_nodes(part, effort), strict=True):
+            o = angles(to_thread(views, part.is_warp, psi0))
+            seen += part.area * weight * law.plain_weight(fabric, psi0, o, o)
+    return np.asarray(law.plain_total(fabric, seen, gap(fabric), views))
 
 
 def _inclinations(theta_o: Floats, part: Share, effort: Effort) -> tuple[Floats, Floats]:

@@ -30,6 +30,7 @@ def build_side(prim: Usd.Prim) -> Fabric:
         warp=_build_set(prim, "warp"),
         weft=_build_set(prim, "weft"),
         model=str(value(prim, "fabric:model")),
+        surface_law=str(value(prim, "fabric:surfaceLaw")),
         opaque=bool(value(prim, "fabric:opaque")),
         documentation=_documentation(prim),
         **build_numbers(prim, attributes.FABRIC),

@@ -35,7 +35,8 @@ def in_words(fabric: Fabric, width: int = 80) -> str:
         f"  floats: {_floats(weave.cells)}",
         f"  seen from behind: {fabric.back.name if fabric.back else 'this weave, mirrored'}"
         + ("; opaque" if fabric.opaque else ""),
-        f"  model: {fabric.model}, masking width {math.degrees(fabric.masking_width):.4g} degrees",
+        f"  model: {fabric.model}, surface law {fabric.surface_law}, masking width "
+        f"{math.degrees(fabric.masking_width):.4g} degrees",
         "",
     ]
     for index, (name, thread) in enumerate(fabric.threads.items()):
@@ -158,6 +159,7 @@ def as_dict(fabric: Fabric) -> dict[str, Any]:
         **sets,
         "gap": float(share.gap),
         "model": fabric.model,
+        "surface_law": fabric.surface_law,
         "opaque": fabric.opaque,
         "masking_width": math.degrees(fabric.masking_width),
         "threads": {name: _thread_dict(thread) for name, thread in fabric.threads.items()},

@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from fabricusd.fabric import MODELS
+from fabricusd.fabric import MODELS, SURFACE_LAWS
 from fabricusd.schema.attributes import Attribute, every_attribute, unscale
 
 HERE = Path(__file__).resolve().parent
@@ -22,7 +22,9 @@ PLUGIN = HERE / "plugin"
 
 
 def _name_models(layer: Any) -> None:
-    """Write the thread models' names, and what each is, into the properties that choose one."""
+    """Write the names of models and laws, and what each is, into the properties that choose
+    one."""
+    from fabricusd.appearance.laws import law_summary
     from fabricusd.appearance.scattering.models import named
 
     fabric = layer.GetAttributeAtPath("/WovenFabric.fabric:model")
@@ -30,6 +32,10 @@ def _name_models(layer: Any) -> None:
     fabric.allowedTokens, thread.allowedTokens = MODELS, ("inherit", *MODELS)
     meaning = " ".join(f"{name}: {named(name).summary}." for name in MODELS)
     fabric.documentation = fabric.documentation.replace("Unit:", f"{meaning} Unit:")
+    law = layer.GetAttributeAtPath("/WovenFabric.fabric:surfaceLaw")
+    law.allowedTokens = SURFACE_LAWS
+    meaning = " ".join(f"{name}: {law_summary(name)}." for name in SURFACE_LAWS)
+    law.documentation = law.documentation.replace("Unit:", f"{meaning} Unit:")
 
 
 def _whole_source(folder: Path) -> Path:

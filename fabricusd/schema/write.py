@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pxr import Sdf, Usd, Vt
 
 from fabricusd.errors import FabricError
-from fabricusd.fabric import Binding, Fabric, Thread
+from fabricusd.fabric import SURFACE_LAWS, Binding, Fabric, Thread
 from fabricusd.files import whole_file
 from fabricusd.schema import attributes
 from fabricusd.schema.access import BINDING_API
@@ -90,6 +90,8 @@ def write_fabric(stage: Usd.Stage, path: Sdf.Path | str, fabric: Fabric) -> Usd.
     if fabric.weave.name:
         _set(prim, "fabric:weave:name", "string", fabric.weave.name)
     _set(prim, "fabric:model", "token", fabric.model)
+    if fabric.surface_law != SURFACE_LAWS[0]:
+        _set(prim, "fabric:surfaceLaw", "token", fabric.surface_law)
     if fabric.opaque:
         _set(prim, "fabric:opaque", "bool", True)
     _set_numbers(prim, attributes.FABRIC, fabric)

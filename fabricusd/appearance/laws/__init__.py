@@ -26,6 +26,13 @@ def law_of(fabric: Fabric) -> Law:
     return REGISTRY.get(fabric.surface_law, REGISTRY[SURFACE_LAWS[0]])
 
 
+def law_summary(name: str) -> str:
+    """A phrase that says what a surface law is; name : one of `fabric.SURFACE_LAWS`."""
+    if name == FACETS:
+        return "threads as microfacets, the law of conserving threads"
+    return REGISTRY[name].summary
+
+
 def _part(name: str) -> Any:
     """A kernel (R, tables, ...) that selects one field of `Law` by the type of the tables."""
     return by_type(lambda tables: getattr(_BY_TYPE[tables], name))

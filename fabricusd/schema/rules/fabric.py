@@ -9,6 +9,7 @@ import numpy as np
 from pxr import Sdf, Usd
 
 from fabricusd.schema.access import (
+    allowed_tokens,
     kind_of,
     lost_targets,
     next_targets,
@@ -17,6 +18,7 @@ from fabricusd.schema.access import (
     type_of,
     value,
 )
+from fabricusd.fabric import FACETS
 from fabricusd.schema.build import build_side
 from fabricusd.schema.rules.table import FABRIC, Fault, rule
 from fabricusd.weaves import rows as weave_rows
@@ -97,6 +99,27 @@ def coverage_at_most_one(prim: Usd.Prim) -> Iterator[Fault]:
     total = sum(v for v in values if v is not None and math.isfinite(v) and v > 0)
     if total > 1.0 + 1e-9:
         yield "fabric:weft:coverage", f"and the warp's add up to {total:g}; it must be at most 1"
+
+
+@rule(FABRIC)
+def surface_law_allowed(prim: Usd.Prim) -> Iterator[Fault]:
+    """The surface law is an allowed token, and facets only where every thread is conserving."""
+    name = "fabric:surfaceLaw"
+    allowed, token = allowed_tokens(prim, name), value(prim, name)
+    if token not in allowed:
+        yield name, f"is '{token}'; it must be one of {', '.join(allowed)}"
+    elif token == FACETS:
+        inherited = str(value(prim, "fabric:model"))
+        for thread in thread_prims(prim):
+            own = str(value(thread, "thread:model"))
+            model = inherited if own == "inherit" else own
+            if model != "conserving":
+                yield (
+                    name,
+                    f"is {FACETS}, the law of conserving threads, but {thread.GetPath()} is "
+                    f"{model}; it must be one of {', '.join(t for t in allowed if t != FACETS)}",
+                )
+                return
 
 
 @rule(FABRIC)
