@@ -89,7 +89,7 @@ def plain_moments(made: Recipe, fabric: Fabric, step: np.ndarray, size: int) -> 
             for k, value in enumerate((su, sv, su * su, sv * sv, su * sv)):
                 total[m.SLOPE + k] += value
             length = made.cloth.runs[i, j, 0, 1] * fabric.warp.pitch
-            lift = made.cloth.half_thickness[0, 0]
+            lift = made.cloth.half_height[0, 0]
             total[m.HEIGHT] += (np.interp(s, *_heights(fabric)) * length + lift) * seen
             total[m.FRESNEL] += seen * ((thread.ior - 1) / (thread.ior + 1)) ** 2
             at = np.degrees(angle) + 90.0

@@ -40,7 +40,7 @@ def all_shares(fabric: Fabric, level: str, uv: Array) -> dict[str, Array]:
     return {
         method: shares(
             fabric, uv, cloth,
-            compile_shadow(fabric, method, level=level, precision=np.float64),
+            compile_shadow(fabric, method, precision=np.float64),
         )
         for method in METHODS
     }  # fmt: skip
@@ -98,7 +98,7 @@ def by_table(level: str, count: int) -> None:
             wi = np.array([light(*pair) for pair in zip(e, a, strict=True)])
             cloth = compile_fabric(fabric, precision=np.float64)
             table = compile_shadow(
-                fabric, level=level, azimuths=azimuths, texels=texels, precision=np.float64
+                fabric, azimuths=azimuths, texels=texels, precision=np.float64
             )
             true = shadowing(fabric, wi, uv, "traced", level=level)
             row.append(f"{rms(shadowing(fabric, wi, uv, compiled=(cloth, table)) - true):.3f}")

@@ -47,7 +47,7 @@ def compare(fabric: Fabric, pairs: int, count: int) -> Array:
     rng = np.random.default_rng(1)
     cloth = compile_fabric(fabric, precision=np.float64)
     traced, ribbons = (
-        compile_shadow(fabric, "traced", level=level, precision=np.float64)
+        compile_shadow(fabric, "traced", precision=np.float64)
         for level in ("thread", "weave")
     )
     k = np.arange(count)[:, None]
@@ -75,8 +75,8 @@ def compare(fabric: Fabric, pairs: int, count: int) -> Array:
             a, b = angles(i), angles(o)
             value = plain.thread_value(share.thread, share.model, i, o).mean(axis=-1)
             f[here] = value * np.cos(a.theta)
-            m[here] = plain.masked(a.phi, b.phi, fabric.masking_width)
-            p[here] = plain.masked(a.psi, b.psi, fabric.masking_width)
+            m[here] = plain_masked(a.phi, b.phi, fabric.masking_width)
+            p[here] = plain_masked(a.psi, b.psi, fabric.masking_width)
             caught[here] = np.maximum(i[:, 2], 0)
             # Cosines of the tube's normal, sqrt(1 - w^2) n_t + w b, with the viewer and with N.
             w = np.clip(hit.across[here], -0.999, 0.999)

@@ -112,7 +112,7 @@ def evaluate(
     i, o = _pairs(wi, wo, uv if level != "far" else None)
     hit, places = _places(fabric, uv, level, i.shape[1])
     _check_shadow(shadow)
-    out = _evaluate(_law(fabric, level, shadow, max_error, multiple), level, hit, i, o)
+    out = _evaluate(_law(fabric, shadow, max_error, multiple), level, hit, i, o)
     if level != "far" and shadow != "none":
         out *= _lit(fabric, shadow, places, i)
     return np.ascontiguousarray(out.T)
@@ -133,7 +133,7 @@ def pdf(
     i, o = _pairs(wi, wo, uv if level != "far" else None)
     hit, _ = _places(fabric, uv, level, i.shape[1])
     _check_shadow(shadow)
-    return _density(_law(fabric, level, shadow), level, hit, i, o)
+    return _density(_law(fabric, shadow), level, hit, i, o)
 
 
 def sample(
@@ -160,7 +160,7 @@ def sample(
     o = _repeated(_directions("wo", wo), len(numbers), "wo")
     hit, places = _places(fabric, uv, level, len(numbers))
     _check_shadow(shadow)
-    law = _law(fabric, level, shadow)
+    law = _law(fabric, shadow)
     i = np.empty_like(o)
     real: Any = np.float64
     turned = np.ascontiguousarray(numbers.T)
@@ -181,12 +181,11 @@ def _density(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats)
 
 def _law(
     fabric: Fabric,
-    level: str,
     shadow: str,
     max_error: float | None = None,
     multiple: bool = True,
 ) -> SurfaceLaw:
-    held = shadow if level == "far" and law_of(fabric).absolute else "none"
+    held = shadow if law_of(fabric).absolute else "none"
     return _kept_law(fabric, held, max_error, multiple)
 
 

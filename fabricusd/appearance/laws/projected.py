@@ -8,7 +8,8 @@ With `q = 1/max(n_t.N, cos 85 degrees)` the area of thread on a unit of cloth an
 The gaps close as the view turns from the normal, since threads are as high as their sections:
 `gap(w)` is the product over the sets of `1 - 2 sqrt(half_width^2 + half_height^2 t^2)/pitch`, with
 t the tangent of the view's angle across the threads of the set. That is exact for straight threads,
-and within .02 of the traced tubes on linen. Source: ours; it is what explicit threads are nearest
+and within .02 of the traced tubes on linen. Views from which the cloth would be brighter than a
+white sky are divided by its brightness there. Source: ours; it is what explicit threads are nearest
 to, docs/geometry.md.
 """
 
@@ -22,6 +23,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.laws.excess import EXCESS_FIELDS, excess_at, no_excess
 from fabricusd.appearance.laws.law import Law, no_mask, no_overlap, tables_class
 from fabricusd.appearance.laws.lit import (
     LIGHT_FIELDS,
@@ -41,7 +43,7 @@ LEAST_COSINE = math.cos(PILE_ANGLE)
 """Least n_t.N that thread counts with: steeper thread would take all of the view."""
 
 
-Projected = tables_class(__name__, "Projected", "wide_2", "tall_2", *LIGHT_FIELDS)
+Projected = tables_class(__name__, "Projected", "wide_2", "tall_2", *LIGHT_FIELDS, *EXCESS_FIELDS)
 """wide_2, tall_2 : (2,) real - squared widths and heights of the threads of each set, in pitches"""
 
 
@@ -63,6 +65,7 @@ def _make(fabric: Fabric, shadow: Any, precision: Any) -> dict[str, Any]:
         "wide_2": (wide**2).astype(precision),
         "tall_2": (tall**2).astype(precision),
         **light_fields(shadow, precision),
+        **no_excess(precision),
     }
 
 
@@ -82,7 +85,8 @@ def _openness(R, tables, ox, oy, oz):
 
 @njit(**INLINE)
 def _total(R, tables, seen, ox, oy, oz):
-    return seen / (R(1) - _openness(R, tables, ox, oy, oz))
+    most = excess_at(R, tables, ox, oy, oz)
+    return seen * most / (R(1) - _openness(R, tables, ox, oy, oz))
 
 
 def _plain_weight(fabric: Fabric, psi0: Any, i: Angles, o: Angles) -> Array:

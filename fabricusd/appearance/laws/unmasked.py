@@ -1,7 +1,8 @@
 """Surface law `unmasked`: [Bisker2011] eq. 5.1, `f_s g`, each thread by the share of the cloth it
 covers.
 
-There is neither mask nor weight. Light that neighbouring threads hold back is lost.
+There is neither mask nor weight. Light that neighbouring threads hold back is lost. Views from which
+the cloth would be brighter than a white sky are divided by its brightness there.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from fabricusd.appearance.laws.excess import EXCESS_FIELDS, excess_at, no_excess
 from fabricusd.appearance.laws.law import Law, no_mask, no_overlap, same_gap, tables_class
 from fabricusd.appearance.laws.lit import (
     LIGHT_FIELDS,
@@ -25,11 +27,11 @@ from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE
 
 
-Unmasked = tables_class(__name__, "Unmasked", *LIGHT_FIELDS)
+Unmasked = tables_class(__name__, "Unmasked", *LIGHT_FIELDS, *EXCESS_FIELDS)
 
 
 def _make(fabric: Fabric, shadow: Any, precision: Any) -> dict[str, Any]:
-    return light_fields(shadow, precision)
+    return {**light_fields(shadow, precision), **no_excess(precision)}
 
 
 @njit(**INLINE)
@@ -39,8 +41,8 @@ def _weight(R, tables, c, s, pair):
 
 @njit(**INLINE)
 def _total(R, tables, seen, ox, oy, oz):
-    """1, since the shares of threads and gap add up to it."""
-    return R(1)
+    """1, since the shares of threads and gap add up to it; more where the cloth is too bright."""
+    return excess_at(R, tables, ox, oy, oz)
 
 
 def _plain_weight(fabric: Fabric, psi0: Any, i: Angles, o: Angles) -> Array:

@@ -11,7 +11,7 @@ from numba import njit
 from fabricusd.appearance.frame import WARP
 from fabricusd.appearance import laws
 from fabricusd.appearance.published.segment import SetPair, along_set
-from fabricusd.appearance.published.tables import NODE_COS, NODE_SIN, NODE_WEIGHT
+from fabricusd.appearance.published.columns import NODE_COS, NODE_SIN, NODE_WEIGHT
 from fabricusd.kernels.real import BLOCK, INLINE, index
 
 ALONG_I, ACROSS_I, UP_I, SCALE_I = 0, BLOCK, 2 * BLOCK, 3 * BLOCK

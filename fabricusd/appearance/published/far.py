@@ -33,7 +33,7 @@ from fabricusd.appearance.published.segment import (
     mean_segment,
     segment,
 )
-from fabricusd.appearance.published.tables import NODE_COS, NODE_HALF, NODE_SIN, NODE_WEIGHT
+from fabricusd.appearance.published.columns import NODE_COS, NODE_HALF, NODE_SIN, NODE_WEIGHT
 from fabricusd.appearance.scattering.columns import ALBEDO_B, ALBEDO_G, ALBEDO_R, MODEL
 from fabricusd.appearance.scattering.models import PUBLISHED_MODELS
 from fabricusd.appearance.scattering.terms import CELL_MODELS

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.laws import law_of
+from fabricusd.appearance.published.excess import excess_of
 from fabricusd.appearance.scattering.columns import LAW
 from fabricusd.appearance.scattering.model import PUBLISHED
 from fabricusd.appearance.scattering.models import model_of
@@ -21,10 +22,6 @@ from fabricusd.fabric import Fabric
 
 Reals = NDArray[Any]
 """float32 or float64: the precision that the tables were made for."""
-
-NODE_COS, NODE_SIN, NODE_WEIGHT, NODE_HALF = 0, 1, 2, 3
-"""Columns of `SurfaceTables.nodes`: cosine and sine of the tangent angle, share of the cloth's
-area, and half the range of angles [rad] over which the node's lobes are averaged."""
 
 class SurfaceTables(Protocol):
     """Arrays of one fabric for the surface law; `real` is the precision asked for.
@@ -87,7 +84,12 @@ def surface_tables(
         gap=precision(coverage(fabric).gap),
         **law.make(fabric, held, precision),
     )
-    return made
+    if not law.absolute:
+        return made
+    excess = excess_of(made, precision)
+    if not (excess > 1.0).any():
+        return made
+    return made._replace(excess=np.ascontiguousarray(excess, dtype=precision).reshape(-1))
 
 
 def has_cell_lobes(fabric: Fabric) -> bool:

@@ -13,7 +13,7 @@ The value of the cloth is multiplied by `shade`. Under a surface law that is `ab
 and level `far` holds its mean. Under the others it is `g` over its mean over the places that
 scatter alike: the law already contains the mean shadow, and `g` only says where it falls. Either
 way level `far` is the mean of the others. Threads are round across their width at every level. See
-docs/decisions/004 and 014.
+docs/decisions/004 and 017.
 """
 
 from __future__ import annotations

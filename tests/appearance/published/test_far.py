@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from fabricusd.appearance import plain, surface
 from fabricusd.appearance.accuracy import choose_rule, measure_rule, spread_pairs
 from fabricusd.appearance.law import surface_law
+from fabricusd.appearance.laws.masked import plain_masked
 from fabricusd.appearance.published.far import far_value, far_values, normalization
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.scattering import models
@@ -181,11 +182,11 @@ def test_weights_sum_to_the_covered_area_and_counts_are_what_is_made(rule):
 )
 def test_masking_lies_between_the_product_and_the_minimum_and_is_symmetric(x, y, width):
     x, y = np.array([x]), np.array([y])
-    m = plain.masked(x, y, width)
+    m = plain_masked(x, y, width)
     mx, my = np.maximum(np.cos(x), 0), np.maximum(np.cos(y), 0)
     assert m <= np.minimum(mx, my) + 1e-15
     assert m >= mx * my - 1e-15
-    assert m == pytest.approx(plain.masked(y, x, width), abs=1e-15)
+    assert m == pytest.approx(plain_masked(y, x, width), abs=1e-15)
 
 
 @given(st.integers(0, 5), st.floats(0.02, 1.0), st.floats(0.02, 1.0), st.floats(0, 360))

@@ -67,7 +67,7 @@ def test_round_threads_fall_to_the_axis_at_their_edges() -> None:
 def test_a_thread_of_unknown_thickness_is_as_thick_as_it_looks() -> None:
     compiled = compile_fabric(cloth(PLAIN, HUMP, thickness=0.0), precision=np.float64)
     half = 0.5 * coverage(cloth(PLAIN, HUMP)).width
-    np.testing.assert_allclose(compiled.half_thickness[:, 0], half * [2e-3, 1e-3])
+    np.testing.assert_allclose(compiled.half_height[:, 0], half * [2e-3, 1e-3])
 
 
 @given(fabrics(back=False))

@@ -1,0 +1,68 @@
+"""How much brighter than a white sky cloth would be, by view: what keeps a law from making light.
+
+Threads of the published models are brighter than white at grazing views, and so are traced tubes of
+them. Laws with an absolute shadow divide by what the cloth would reflect of a white sky, where that
+is above 1 in some channel. The table is by view: rows evenly spaced in sqrt(1 - N.wo), columns in
+the diamond angle.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.appearance.laws.excess import COLUMNS, ROWS
+from fabricusd.appearance.published.far import far_values
+
+Floats = NDArray[np.float64]
+
+RINGS, AROUND = 24, 48
+"""Directions of the sky: Gauss-Legendre points in the sine of the elevation, and azimuths."""
+
+LOWEST = 0.01
+"""Sine of the lowest view: at 0 the law is not defined."""
+
+
+def excess_of(tables: Any, precision: type[np.floating[Any]]) -> Floats:
+    """(ROWS, COLUMNS + 1) reflected of a white sky, at least 1.
+
+    tables : of the law in `precision`, with an excess of 1
+    """
+    sky, weight = white_sky()
+    found = np.empty((ROWS, COLUMNS + 1))
+    wi = np.ascontiguousarray(sky.T, dtype=precision)
+    out = np.empty_like(wi)
+    for row in range(ROWS):
+        z = max(1.0 - (row / (ROWS - 1)) ** 2, LOWEST)
+        for column in range(COLUMNS):
+            turn = 4.0 * column / COLUMNS
+            x, y = _on_diamond(turn)
+            flat = np.sqrt(1.0 - z * z) / np.hypot(x, y)
+            wo = np.repeat(np.array([[flat * x], [flat * y], [z]], precision), len(sky), axis=1)
+            real: Any = precision
+            far_values(real, tables, wi, wo, out, 0, len(sky))
+            found[row, column] = max(1.0, float((out @ weight.astype(precision)).max()))
+    found[:, COLUMNS] = found[:, 0]
+    return found
+
+
+def _on_diamond(turn: float) -> tuple[float, float]:
+    """(x, y) with |x| + |y| = 1 of a diamond angle in [0, 4)."""
+    quadrant, f = divmod(turn, 1.0)
+    x, y = 1.0 - f, f
+    for _ in range(int(quadrant)):
+        x, y = -y, x
+    return x, y
+
+
+def white_sky() -> tuple[Floats, Floats]:
+    """(n, 3) directions above the cloth and (n,) their solid angles."""
+    z, ring = np.polynomial.legendre.leggauss(RINGS)
+    z, ring = 0.5 * (z + 1.0), 0.5 * ring
+    turn = 2.0 * np.pi * (np.arange(AROUND) + 0.5) / AROUND
+    height, angle = (x.ravel() for x in np.meshgrid(z, turn, indexing="ij"))
+    flat = np.sqrt(1.0 - height * height)
+    sky = np.stack((flat * np.cos(angle), flat * np.sin(angle), height), axis=1)
+    return sky, np.repeat(ring, AROUND) * (2.0 * np.pi / AROUND)
