@@ -34,7 +34,7 @@ from fabricusd.schema import load
 Array = np.ndarray
 
 
-def all_shares(fabric: Fabric, level: str, uv: Array) -> dict[str, Array]:
+def all_shares(fabric: Fabric, uv: Array) -> dict[str, Array]:
     """Method -> (elevations, azimuths, places) `g`."""
     cloth = compile_fabric(fabric, precision=np.float64)
     return {
@@ -46,9 +46,9 @@ def all_shares(fabric: Fabric, level: str, uv: Array) -> dict[str, Array]:
     }  # fmt: skip
 
 
-def by_elevation(name: str, level: str, uv: Array, found: dict[str, Array]) -> None:
+def by_elevation(name: str, uv: Array, found: dict[str, Array]) -> None:
     """Print the mean share of light and its rms difference from `traced`, by elevation."""
-    print(f"\n**{name}, level {level}** (mean `g`; in brackets rms difference from `traced`)\n")
+    print(f"\n**{name}** (mean `g`; in brackets rms difference from `traced`)\n")
     print("| elevation | traced | none | peak | horizon |")
     print("|---|---|---|---|---|")
     for k, elevation in enumerate(ELEVATIONS):
@@ -83,9 +83,9 @@ def by_azimuth(fabric: Fabric, uv: Array, found: dict[str, Array]) -> None:
     print("| " + " | ".join(cells) + " |")
 
 
-def by_table(level: str, count: int) -> None:
+def by_table(count: int) -> None:
     """Print the error of finer tables, over all woven presets."""
-    print(f"\n**Size of the table, level {level}** (rms difference from `traced`, 2° to 70°)\n")
+    print("\n**Size of the table** (rms difference from `traced`, 2° to 70°)\n")
     print("| azimuths, texels | bytes a cell | " + " | ".join(WOVEN) + " |")
     print("|---|---|" + "---|" * len(WOVEN))
     rng = np.random.default_rng(0)
@@ -97,13 +97,11 @@ def by_table(level: str, count: int) -> None:
             e, a = rng.uniform(2, 70, len(uv)), rng.uniform(0, 360, len(uv))
             wi = np.array([light(*pair) for pair in zip(e, a, strict=True)])
             cloth = compile_fabric(fabric, precision=np.float64)
-            table = compile_shadow(
-                fabric, azimuths=azimuths, texels=texels, precision=np.float64
-            )
-            true = shadowing(fabric, wi, uv, "traced", level=level)
+            table = compile_shadow(fabric, azimuths=azimuths, texels=texels, precision=np.float64)
+            true = shadowing(fabric, wi, uv, "traced")
             row.append(f"{rms(shadowing(fabric, wi, uv, compiled=(cloth, table)) - true):.3f}")
-        size = azimuths * texels[0] * texels[1]
-        print(f"| {azimuths}, {texels[0]} × {texels[1]} | {size} | " + " | ".join(row) + " |")
+        size = azimuths * texels
+        print(f"| {azimuths}, {texels} | {size} | " + " | ".join(row) + " |")
 
 
 def speed(count: int) -> None:
@@ -169,15 +167,13 @@ def main() -> None:
     parser.add_argument("--places", type=int, default=4000)
     parser.add_argument("--figure", type=Path, help="draw the maps of g to this file")
     options = parser.parse_args()
-    for level in ("weave", "thread"):
-        for name in WOVEN:
-            fabric = load(name)
-            uv = places_on_threads(fabric, options.places)
-            found = all_shares(fabric, level, uv)
-            by_elevation(name, level, uv, found)
-            if level == "weave":
-                by_azimuth(fabric, uv, found)
-        by_table(level, options.places)
+    for name in WOVEN:
+        fabric = load(name)
+        uv = places_on_threads(fabric, options.places)
+        found = all_shares(fabric, uv)
+        by_elevation(name, uv, found)
+        by_azimuth(fabric, uv, found)
+    by_table(options.places)
     speed(50 * options.places)
     if options.figure:
         figure(options.figure)

@@ -50,7 +50,8 @@ SMALL = 96
 
 
 def far_law(fabric: Any, dr: Any, mi: Any) -> Any:
-    """`far.far_value` as a function of two directions, one term per node: `model.md` section 4."""
+    """`far.far_value` under the law `masked` as a function of two directions, one term per node:
+    `model.md` section 4."""
     tables = surface_tables(fabric, precision=np.float32)
     if tables.nodes[:, 3].any():
         raise SystemExit("the plugin has nodes that are points only")
@@ -60,7 +61,7 @@ def far_law(fabric: Any, dr: Any, mi: Any) -> Any:
 
     def overlap(s: Any, c: Any) -> Any:
         half = dr.acos(dr.minimum(0.5 * dr.sqrt(s * s + c * c), 1.0))
-        return dr.exp(-float(tables.overlap_precision) * half * half)
+        return dr.exp(-float(tables.precision) * half * half)
 
     def fresnel(excess: float, c: Any) -> Any:
         c = dr.maximum(c, 1e-12)

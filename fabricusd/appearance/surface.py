@@ -190,14 +190,10 @@ def _law(
 
 
 @lru_cache(maxsize=32)
-def _kept_law(
-    fabric: Fabric, shadow: str, max_error: float | None, multiple: bool
-) -> SurfaceLaw:
+def _kept_law(fabric: Fabric, shadow: str, max_error: float | None, multiple: bool) -> SurfaceLaw:
     rule = None if max_error is None else choose_rule(fabric, max_error)
     kept = _shadowed(fabric, shadow)[1] if shadow != "none" else None
-    return surface_law(
-        fabric, precision=np.float64, rule=rule, multiple=multiple, shadow=kept
-    )
+    return surface_law(fabric, precision=np.float64, rule=rule, multiple=multiple, shadow=kept)
 
 
 @lru_cache(maxsize=32)

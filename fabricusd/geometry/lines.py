@@ -100,6 +100,4 @@ def repeat_lines(fabric: Fabric, squash: float = 1.0) -> Repeat:
                 )
             )
     size = np.array([ends * pitch[WARP], picks * pitch[WEFT]])
-    return Repeat(
-        lines=tuple(lines), size=size, tall=squash * fitted.tall, reach=fitted.reach
-    )
+    return Repeat(lines=tuple(lines), size=size, tall=squash * fitted.tall, reach=fitted.reach)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.errors import FabricError
 from fabricusd.appearance.weave.centre import RINGS
+from fabricusd.errors import FabricError
 from fabricusd.geometry.lines import Line, Repeat
 
 Floats = NDArray[np.float64]

@@ -21,9 +21,9 @@ from fabricusd.appearance.weave.bands import seen_length
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.coverage import coverage, sets
 from fabricusd.appearance.weave.curve import Pieces, pieces
+from fabricusd.appearance.weave.sections import APART
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
-from fabricusd.appearance.weave.sections import APART
 from fabricusd.geometry.lines import Line, Repeat
 from fabricusd.geometry.mesh import Mesh, Rings, faces, outline
 

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from fabricusd.appearance import laws, plain, surface
+from fabricusd.appearance.published.excess import white_sky
 from fabricusd.appearance.weave.coverage import true_repeat
 from fabricusd.appearance.weave.lookup import lookup
-from fabricusd.appearance.weave.quadrature import POINTS, Rule, curve_nodes
 from fabricusd.errors import FabricError
 from fabricusd.fabric import FACETS, SURFACE_LAWS, Fabric
 from fabricusd.geometry.judge import judge
+from fabricusd.geometry.nearest import scaled
 from fabricusd.geometry.tables import table
 from tests.appearance.presets import PRESETS
 
@@ -48,8 +49,9 @@ def test_every_law_has_a_module_and_facets_another_room() -> None:
 @pytest.mark.parametrize("law", PUBLISHED)
 @pytest.mark.parametrize("name", ["linen_plain", "silk_shot", "velvet"])
 def test_kernels_are_the_plain_formula(name: str, law: str) -> None:
-    fabric = replace(PRESETS[name], surface_law=law)
-    wi, wo = directions(60, 1), directions(60, 2)
+    # So dark that no view is brighter than white, which the plain formula does not look at.
+    fabric = scaled(replace(PRESETS[name], surface_law=law), 0.2)
+    wi, wo = directions(60, 1, 0.1), directions(60, 2, 0.2)
     found = surface.evaluate(fabric, wi, wo, max_error=2e-3)
     expected = plain.far(fabric, wi, wo, per_segment=256)
     assert np.abs(found - expected).mean() < 3e-3 * expected.mean()
@@ -148,14 +150,13 @@ def test_gaps_close_as_the_view_turns() -> None:
     """Tubes pass .34 at 0 degrees, .303 at 45, .067 at 75 in the mean over azimuths."""
     fabric = replace(PRESETS["linen_plain"], surface_law="projected")
     found = table("linen_plain").gap.reshape(-1, 3).mean(axis=1)
-    whole = 1.0 - plain.gap(fabric)
+    law = laws.REGISTRY["projected"]
+    one = np.ones(1)
     shown = [
         np.mean(
             [
-                1.0
-                - whole / plain.normalization(fabric, wo[None], wo[None])[0] * _seen(fabric, wo)
-                * (1.0 / whole)
-                for wo in (light(90 - polar, a) for a in (0, 45, 90))
+                1.0 - 1.0 / law.plain_total(fabric, one, 0.0, light(90 - polar, a)[None])[0]
+                for a in (0, 45, 90)
             ]
         )
         for polar in (0, 30, 45, 60, 75)
@@ -163,12 +164,18 @@ def test_gaps_close_as_the_view_turns() -> None:
     assert shown == pytest.approx(found[:5], abs=0.03)
 
 
-def _seen(fabric: Fabric, wo: np.ndarray) -> float:
-    """The sum of a <weight> of the law `projected`."""
-    nodes = curve_nodes(fabric, Rule(POINTS, 0.25))
-    along = np.where(np.arange(len(nodes.psi0)) < nodes.warp_start, wo[0], wo[1])
-    facing = np.maximum(np.sin(nodes.psi0) * along + np.cos(nodes.psi0) * wo[2], 0)
-    return float((nodes.weight * facing / np.cos(nodes.psi0)).sum())
+@pytest.mark.parametrize("law", ["unmasked", "projected"])
+def test_no_view_is_brighter_than_a_white_sky(law: str) -> None:
+    """With threads three times as bright as published ones."""
+    fabric = scaled(replace(PRESETS["linen_plain"], surface_law=law), 3.0)
+    sky, weight = white_sky()
+    shares = [
+        weight @ surface.evaluate(fabric, sky, light(90 - polar, azimuth), shadow="horizon")
+        for polar in (0, 20, 45, 60, 75, 82, 88)
+        for azimuth in (0, 33, 150)
+    ]
+    assert np.max(shares) < 1.03
+    assert np.max(shares) > 0.97
 
 
 def test_facets_are_for_conserving_threads_alone() -> None:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.weave.centre import RINGS, centre_line
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEGREE, TangentCurve, Weave
 from fabricusd.geometry import tubes
-from fabricusd.appearance.weave.centre import RINGS, centre_line
 from fabricusd.geometry.rays import NOTHING, blocked, nearest
 from fabricusd.schema import load, preset_names
 

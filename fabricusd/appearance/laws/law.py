@@ -37,7 +37,7 @@ def tables_class(module: str, name: str, *own: str) -> Any:
     A law's own fields are not in a tuple of their own, because numba's parallel loops take no tuple
     of tuples.
     """
-    return namedtuple(name, (*COMMON, *own), module=module)  # noqa: PYI024
+    return namedtuple(name, (*COMMON, *own), module=module)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,14 +29,21 @@ softness : real - width of a shadow's edge [rad]
 """
 
 
-def light_fields(shadow: tuple[NDArray[np.float64], float] | None, precision: Any) -> dict[str, Any]:
+def light_fields(
+    shadow: tuple[NDArray[np.float64], float] | None, precision: Any
+) -> dict[str, Any]:
     """LIGHT_FIELDS in `precision`.
 
     shadow : horizons (columns + 1, nodes, GROUPS) of `shadow.mean.node_groups`, and the softness
         [rad]; None for light that nothing holds back
     """
     if shadow is None:
-        nothing = {"horizons": np.zeros(1, precision), "columns": 0, "lit_nodes": 0, "groups": GROUPS}
+        nothing = {
+            "horizons": np.zeros(1, precision),
+            "columns": 0,
+            "lit_nodes": 0,
+            "groups": GROUPS,
+        }
         return {**nothing, "softness": precision(1)}
     horizons, softness = shadow
     return {

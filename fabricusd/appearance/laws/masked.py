@@ -61,9 +61,7 @@ def _weight(R, tables, c, s, pair):
 @njit(**INLINE)
 def _mask(R, tables, cos_phi_i, cos_phi_o, cos_half):
     """`M`."""
-    return masked(
-        R, max(cos_phi_i, R(0)), max(cos_phi_o, R(0)), _overlap(R, tables, cos_half)
-    )
+    return masked(R, max(cos_phi_i, R(0)), max(cos_phi_o, R(0)), _overlap(R, tables, cos_half))
 
 
 @njit(**INLINE)

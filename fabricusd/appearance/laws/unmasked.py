@@ -26,7 +26,6 @@ from fabricusd.appearance.scattering.plain_lobes import Angles, Array
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE
 
-
 Unmasked = tables_class(__name__, "Unmasked", *LIGHT_FIELDS, *EXCESS_FIELDS)
 
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from numba import njit
 
-from fabricusd.appearance.frame import WARP
 from fabricusd.appearance import laws
-from fabricusd.appearance.published.segment import SetPair, along_set
+from fabricusd.appearance.frame import WARP
 from fabricusd.appearance.published.columns import NODE_COS, NODE_SIN, NODE_WEIGHT
+from fabricusd.appearance.published.segment import SetPair, along_set
 from fabricusd.kernels.real import BLOCK, INLINE, index
 
 ALONG_I, ACROSS_I, UP_I, SCALE_I = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
@@ -70,9 +70,7 @@ def add_weight(R, tables, k, size, block, at=0):
         tables.nodes[k, NODE_WEIGHT],
     )
     for x in range(size):
-        block[NORMALIZATION + x] += weight * laws.weight(
-            R, tables, c, s, pair_at(block, at + x)
-        )
+        block[NORMALIZATION + x] += weight * laws.weight(R, tables, c, s, pair_at(block, at + x))
 
 
 @njit(**INLINE)

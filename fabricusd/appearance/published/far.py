@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance import laws
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.published.blocks import (
     BLUE,
     GREEN,
@@ -28,12 +28,12 @@ from fabricusd.appearance.published.blocks import (
     pair_at,
     prepare,
 )
+from fabricusd.appearance.published.columns import NODE_COS, NODE_HALF, NODE_SIN, NODE_WEIGHT
 from fabricusd.appearance.published.segment import (
     along_set,
     mean_segment,
     segment,
 )
-from fabricusd.appearance.published.columns import NODE_COS, NODE_HALF, NODE_SIN, NODE_WEIGHT
 from fabricusd.appearance.scattering.columns import ALBEDO_B, ALBEDO_G, ALBEDO_R, MODEL
 from fabricusd.appearance.scattering.models import PUBLISHED_MODELS
 from fabricusd.appearance.scattering.terms import CELL_MODELS

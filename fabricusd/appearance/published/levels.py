@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance import laws
+from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.published.blocks import (
     ACROSS_I,
     ACROSS_O,
@@ -75,9 +75,7 @@ def point_value(R, tables, across_too, place, ix, iy, iz, ox, oy, oz):
     pair = along_set(R, tables, place.thread_set, ix, iy, iz, ox, oy, oz)
     c, s = cos(R, place.psi0), sin(R, place.psi0)
     p = laws.weight(R, tables, c, s, pair)
-    surface, volume = _segment_at(
-        R, tables, int(row[MODEL]), across_too, row, c, s, place.w, pair
-    )
+    surface, volume = _segment_at(R, tables, int(row[MODEL]), across_too, row, c, s, place.w, pair)
     p /= q
     surface *= p
     volume *= p

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from numba import njit
 
+from fabricusd.appearance import laws
 from fabricusd.appearance.frame import (
     WARP,
     cos_half_difference,
@@ -22,7 +23,6 @@ from fabricusd.appearance.scattering.terms import (
     published_factors,
     published_lobes,
 )
-from fabricusd.appearance import laws
 from fabricusd.kernels.real import INLINE
 
 
@@ -75,7 +75,9 @@ def segment(R, tables, model, row, c, s, pair):
 @njit(**INLINE)
 def mean_segment(R, tables, model, row, half, c, s, pair):
     """`segment` with its lobes averaged over tangent angles `half` [rad] to each side."""
-    t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o, surface, volume = _factors(R, tables, model, row, c, s, pair)
+    t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o, surface, volume = _factors(
+        R, tables, model, row, c, s, pair
+    )
     on_surface, on_volume = cell_lobes(
         R, model, row, half, t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o
     )

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from fabricusd.appearance.published.far import far_values
 from fabricusd.appearance.laws import law_of
+from fabricusd.appearance.published.far import far_values
 from fabricusd.appearance.published.levels import point_value
 from fabricusd.appearance.published.tables import SurfaceTables
 from fabricusd.appearance.sampling.fit import Singles, fitted_mixture

@@ -23,6 +23,7 @@ from fabricusd.fabric import Fabric
 Reals = NDArray[Any]
 """float32 or float64: the precision that the tables were made for."""
 
+
 class SurfaceTables(Protocol):
     """Arrays of one fabric for the surface law; `real` is the precision asked for.
 

@@ -11,6 +11,7 @@ spaced in the diamond angle, which needs no arctangent. `horizon_lookup` reads t
 from __future__ import annotations
 
 import math
+
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
@@ -131,9 +132,7 @@ def _fill_texel(cloth, highest, directions, i, j, slot, along, out):
         h = height_on(np.float64, cloth, which, thread, s, length) + crown
         origin = Origin(u, v, which, crown, h)
         for a in range(azimuths):
-            k = steepest(
-                cloth, highest, origin, directions[a, 0], directions[a, 1], LOWEST, False
-            )
+            k = steepest(cloth, highest, origin, directions[a, 0], directions[a, 1], LOWEST, False)
             total[a] += k / math.sqrt(1.0 + k * k) if k > LOWEST else 0.0
     for a in range(azimuths):
         out[a] = np.uint8(255.0 * total[a] / max(count, 1) + 0.5)

@@ -51,14 +51,14 @@ class Stretches(NamedTuple):
     piece_first, piece_last : (k, p) int32 - first stretch of a piece, from that of the type on; the
         number of stretches in it less 1
     piece_scale : (k, p) float - stretches per run length
-    count : int - number of stretches
+    total : int - number of stretches
     """
 
     first: NDArray[np.int32]
     piece_first: NDArray[np.int32]
     piece_last: NDArray[np.int32]
     piece_scale: Floats
-    count: int
+    total: int
 
 
 def stretches(fabric: Fabric, longest: int) -> Stretches:

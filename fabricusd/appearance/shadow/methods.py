@@ -204,7 +204,7 @@ def compile_shadow(
         all_absolute=int(_absolute(fabric).all()),
     )
     if double.method != NONE:
-        double = double._replace(mean=_mean(fabric, cloth, double, cut.count))
+        double = double._replace(mean=_mean(fabric, cloth, double, cut.total))
     return Shadow(*(_in_precision(value, precision) for value in double))
 
 

@@ -32,10 +32,10 @@ ELEVATIONS = (5, 10, 20, 30, 45, 60)
 """Elevations of the light [degrees]."""
 
 AZIMUTHS = 16
-TABLES = ((16, (4, 2)), (16, (8, 4)), (32, (8, 4)), (16, (16, 8)), (64, (32, 16)))
-"""Sizes of the `horizon` table, including the usual one: azimuths, (texels along, across)."""
+TABLES = ((16, 4), (16, 8), (32, 8), (16, 16), (64, 32))
+"""Sizes of the `horizon` table, including the usual one: azimuths, texels along a thread."""
 
-USUAL = "horizon, 16 of 8×4"
+USUAL = "horizon, 16 of 8"
 
 
 def places_on_threads(fabric: Fabric, count: int) -> Floats:
@@ -120,7 +120,7 @@ def _shadows(fabric: Fabric, quick: bool) -> dict[str, Shadow]:
     """Every method, and `horizon` with tables of other sizes, all in single precision."""
     found = {method: compile_shadow(fabric, method) for method in METHODS}
     for azimuths, texels in () if quick else TABLES:
-        name = f"horizon, {azimuths} of {texels[0]}×{texels[1]}"
+        name = f"horizon, {azimuths} of {texels}"
         if name != USUAL:
             found[name] = compile_shadow(fabric, azimuths=azimuths, texels=texels)
     return found
@@ -136,7 +136,7 @@ PANEL = Panel(
         "the threads of one repeat, at level `weave`, for lights at "
         f"{', '.join(map(str, ELEVATIONS))} degrees of elevation and {AZIMUTHS} azimuths. "
         "Methods run in single precision. The reference is the height field marched in float64. "
-        "The default `horizon` table has 16 azimuths and 8×4 texels per cell."
+        "The default `horizon` table has 16 azimuths and 8 texels along a thread in a cell."
     ),
     run=run,
 )

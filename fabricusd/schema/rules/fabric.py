@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Sdf, Usd
 
+from fabricusd.fabric import FACETS
 from fabricusd.schema.access import (
     allowed_tokens,
     kind_of,
@@ -18,7 +19,6 @@ from fabricusd.schema.access import (
     type_of,
     value,
 )
-from fabricusd.fabric import FACETS
 from fabricusd.schema.build import build_side
 from fabricusd.schema.rules.table import FABRIC, Fault, rule
 from fabricusd.weaves import rows as weave_rows
