@@ -298,8 +298,8 @@ class Fabric:
     weave : Weave
     warp, weft : ThreadSet - warp runs along V, weft along U
     model : str - one of MODELS, for every thread that does not name one
-    surface_law : str - one of SURFACE_LAWS: how light on threads becomes light on cloth. `conserving`
-        threads follow "facets" whatever it is, and threads of other models cannot
+    surface_law : str - one of SURFACE_LAWS: how light on threads becomes light on cloth.
+        `conserving` threads follow "facets" whatever it is, and threads of other models cannot
     opaque : bool - whether it lets no light through: cloth with a backing, or pile
     masking_width : float - standard deviation of `u`, the correlation of shadowing and masking in
         azimuth [rad]; 20 degrees in [Sadeghi2013]

@@ -75,7 +75,7 @@ def surface_law(
     rule : quadrature over the curves; None takes the default of each model
     multiple : whether `conserving` cloth scatters light more than once; its table takes a second to
         compute
-    shadow : the shadowing whose mean level `far` holds under a law that does not mask; None for none
+    shadow : the shadowing whose mean level `far` holds under a law that does not mask, or None
     """
     kind = PUBLISHED_ONLY
     if any_conserving(fabric):

@@ -99,8 +99,8 @@ def evaluate(
     uv : (n, 2) weave coordinates in threads (ends along U, picks along V), or (2,) for all;
         required at levels `weave` and `thread`
     level : one of LEVELS
-    shadow : one of `shadow.METHODS`; at level `far` its mean under a surface law that does not mask,
-        and ignored under the others
+    shadow : one of `shadow.METHODS`; at level `far` its mean under a surface law that does not
+        mask, and ignored under the others
     max_error : bound on the mean relative error of the quadrature over the curves, see
         `accuracy.choose_rule`; None takes `quadrature.default_rule`
     multiple : whether `conserving` cloth scatters light more than once

@@ -4,8 +4,8 @@ Every law of published threads has the form
 
     L_o = sum a weight f_s mask cos(theta_i) g / total(sum a weight)
 
-per unit `L_i dwi`, with the sum over the pieces of thread that the repeat shows, `a` their shares of
-the cloth, and `g` the share of the light that neighbouring threads let through. `weight` says how
+per unit `L_i dwi`, with the sum over the pieces of thread that the repeat shows, `a` their shares
+of the cloth, and `g` the share of the light that neighbouring threads let through. `weight` says how
 much of the view a piece takes. Level `far` is the sum, `weave` and `thread` are one term of it. A
 law's tables have a class of their own, and kernels are compiled for it: those of one law contain no
 code for the others. Source: `docs/model.md` section 4.
@@ -49,8 +49,8 @@ class Law:
     make : (fabric, shadow as `lit.light_fields` takes it, precision) -> the fields that are its own
     absolute : whether light that neighbouring threads hold back is lost. Otherwise the mask already
         contains the mean shadow, and `g` only says where in the repeat it falls
-    overlap : (R, tables, cos_half) -> a number that `weight` and `mask` may need of two angles, from
-        cos(d/2), d their difference
+    overlap : (R, tables, cos_half) -> a number that `weight` and `mask` may need of two angles,
+        from cos(d/2), d their difference
     weight : (R, tables, c, s, pair) -> the weight of thread at the tangent angle with cosine c and
         sine s; pair : a `segment.SetPair`
     mask : (R, tables, cos_phi_i, cos_phi_o, cos_half) -> the factor of `f_s`, from azimuths

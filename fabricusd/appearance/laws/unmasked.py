@@ -1,8 +1,8 @@
 """Surface law `unmasked`: [Bisker2011] eq. 5.1, `f_s g`, each thread by the share of the cloth it
 covers.
 
-There is neither mask nor weight. Light that neighbouring threads hold back is lost. Views from which
-the cloth would be brighter than a white sky are divided by its brightness there.
+There is neither mask nor weight. Light that neighbouring threads hold back is lost. Views from
+which the cloth would be brighter than a white sky are divided by its brightness there.
 """
 
 from __future__ import annotations

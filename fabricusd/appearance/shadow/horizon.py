@@ -108,7 +108,7 @@ def diamond_directions(azimuths: int) -> NDArray[np.float64]:
 @njit(parallel=True, **KERNEL)
 def _fill(cloth, highest, directions, cells, entries):
     """Compute the mean horizon across every texel of `cells` (n, 2), in every direction."""
-    count, slots, rows, azimuths = entries.shape
+    count, slots, rows = entries.shape[:3]
     for cell in prange(count):
         for slot in range(slots):
             for row in range(rows):

@@ -56,8 +56,8 @@ def split_table(table, u, v):
 
 @njit(**INLINE)
 def horizon_at(R, cloth, table, u, v, which, x, y):
-    """Sine of the horizon's elevation towards (x, y), seen from (u, v) on the thread of `which`: the
-    mean across the thread."""
+    """Sine of the horizon's elevation towards (x, y), seen from (u, v) on the thread of `which`:
+    the mean across the thread."""
     i, j, _, _, p, q = split(R, cloth, u, v)
     in_u, in_v = split_table(table, u, v)
     top = int(cloth.grid[i, j])

@@ -124,8 +124,8 @@ def _number(R, cloth, shadow, sets, threads, s, out):
 def groups_of(number: NDArray[np.int64], count: int, horizon: Floats) -> Floats:
     """(count, columns + 1, GROUPS) mean horizons of each group of places, lowest first.
 
-    number : (n,) ascending stretch of each place; horizon : (n, columns). Stretches that no place is
-    on have level horizons; the last column repeats the first.
+    number : (n,) ascending stretch of each place; horizon : (n, columns). Stretches that no place
+    is on have level horizons; the last column repeats the first.
     """
     found = np.zeros((count, horizon.shape[1] + 1, GROUPS))
     for stretch in np.unique(number):

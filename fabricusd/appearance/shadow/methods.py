@@ -112,15 +112,15 @@ class Shadow(NamedTuple):
 
     method : int - NONE, PEAK, HORIZON or TRACED
     highest : real - greatest height of the field [m]
-    softness : real - width of the shadow's edge in the light's elevation [rad]; of its mean only for
-        `traced`
+    softness : real - width of the shadow's edge in the light's elevation [rad]; of its mean only
+        for `traced`
     crest_first, crest_last : (k, q) real - intervals of each type's run that are as high as its
         peak; an interval is empty if its last position is less than its first
     crest_height : (k,) real - height there, in run lengths
     table : (I, J, slots, along, azimuths) uint8 - sine of the horizon's elevation times
         255, see `horizon`; a single zero for the other methods
     texels : the same memory as a one-dimensional array
-    mean : (stretches, columns + 1, GROUPS) real, flat - see `mean.groups_of`, horizons in softnesses;
+    mean : (stretches, columns + 1, GROUPS) real, flat - `mean.groups_of`, horizons in softnesses;
         one entry for `none`
     mean_columns, groups : int - its azimuths; GROUPS
     mean_first, piece_first, piece_last, piece_scale : see `mean.Stretches`

@@ -22,7 +22,7 @@ from fabricusd.appearance.shadow.methods import METHODS, compile_shadow, mean_li
 from fabricusd.appearance.weave.compiled import compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
 from fabricusd.appearance.weave.lookup import lookup
-from fabricusd.appearance.weave.place import NOWHERE, Place, Places
+from fabricusd.appearance.weave.place import NOWHERE, Hit, Place, Places
 from fabricusd.appearance.weave.quadrature import POINTS, Rule, curve_nodes
 from fabricusd.fabric import MODELS
 from tests.appearance.directions import VIEWS, direction, random_directions
