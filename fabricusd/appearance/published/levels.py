@@ -3,8 +3,8 @@
 `L_o(x) = weight f_s mask(x)/Q cos theta_i` with the same `Q` as level `far`, so the mean over the
 repeat is the value at level `far`. At level `thread` the two terms are modulated across the width
 by factors with a mean of 1, so the mean over the width is the value at level `weave`. The value is
-0 unless both directions are above the cloth; a gap reflects nothing. Shadowing multiplies the value and is
-applied by the caller. Source: `docs/model.md` section 4, [Bisker2011] eq. 5.1.
+0 unless both directions are above the cloth; a gap reflects nothing. Shadowing multiplies the value
+and is applied by the caller. Source: `docs/model.md` section 4, [Bisker2011] eq. 5.1.
 """
 
 from __future__ import annotations
