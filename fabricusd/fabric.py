@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
+from fabricusd.sides import Sides
 
 MODELS = ("thesis", "microcylinder", "conserving")
 """Thread scattering models; each is a module of that name in `appearance/scattering/models` and a
@@ -293,6 +294,7 @@ class Fabric:
     warp, weft : ThreadSet - warp runs along V, weft along U
     model : str - one of MODELS, for every thread that does not name one
     opaque : bool - whether it lets no light through: cloth with a backing, or pile
+    sides : Sides - where its light goes (`conserving` only)
     masking_width : float - standard deviation of `u`, the correlation of shadowing and masking in
         azimuth [rad]; 20 degrees in [Sadeghi2013]
     back : Fabric or None - the other side, if it is a fabric of its own; None mirrors this one
@@ -306,6 +308,7 @@ class Fabric:
     weft: ThreadSet = ThreadSet()
     model: str = DEFAULT_MODEL
     opaque: bool = False
+    sides: Sides = Sides()
     masking_width: float = field(
         default=20 * DEGREE, metadata=_limits(above=0.0, maximum=2 * math.pi)
     )
