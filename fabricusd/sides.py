@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
 
-POLAR = (0.0, 30.0, 45.0, 60.0, 75.0, 80.0, 85.0)
+POLAR = (0.0, 20.0, 40.0, 55.0, 65.0, 75.0, 82.0, 86.0, 89.0)
 """Angles to the normal at which shares are stated [degrees]; beyond the last, the last holds."""
 
-AZIMUTHS = (0.0, 45.0, 90.0)
+AZIMUTHS = (0.0, 22.5, 45.0, 67.5, 90.0)
 """Azimuths at which shares are stated, from U towards V [degrees]. Cloth is taken to be the same
 at the azimuths a, -a and 180 - a."""
 

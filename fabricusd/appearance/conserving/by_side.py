@@ -12,23 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
-
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.fabric import Fabric
-from fabricusd.sides import POLAR, Sides, spread
+from fabricusd.sides import AZIMUTHS, POLAR, Sides, spread
 
 Floats = NDArray[np.float64]
 
-CLOSING = (1.0, 0.99, 0.94, 0.78, 0.24, 0.09, 0.0)
+CLOSING = (1.0, 0.99, 0.94, 0.78,.5, 0.24, 0.09, 0.0,0.0)
 """Gap at POLAR over the gap seen from above; median over the presets and azimuths."""
 
-MEDIAN = Sides(
-    surface=(0.40, 0.39, 0.38, 0.39, 0.46, 0.52, 0.65),
-    reflected=(0.475, 0.473, 0.472, 0.471, 0.482, 0.496, 0.512),
-    transmitted=(0.209, 0.210, 0.208, 0.206, 0.180, 0.157, 0.124),
-    forward=(0.612, 0.618, 0.613, 0.611, 0.623, 0.633, 0.639),
-)
+MEDIAN = Sides(surface=(.4,),reflected=(.48,),transmitted=(.2,),forward=(.61,))
 """Shares of cloth that states none; medians over the presets and azimuths."""
 
 
@@ -70,16 +63,10 @@ def by_side(fabric: Fabric, theta: Floats, phi: Floats) -> BySide:
 
 def _between(values: tuple[float, ...], theta: Floats, phi: Floats) -> Floats:
     """Shares between those stated: monotone cubics in the polar angle, harmonics in azimuth."""
-    zero, diagonal, quarter = spread(values).T
-    terms = np.stack(
-        (
-            0.25 * (zero + 2.0 * diagonal + quarter),
-            0.5 * (zero - quarter),
-            0.25 * (zero - 2.0 * diagonal + quarter),
-        ),
-        axis=1,
-    )
+    from scipy.interpolate import PchipInterpolator
+
+    order = 2.0 * np.arange(len(AZIMUTHS))
+    harmonics = np.linalg.solve(np.cos(np.radians(AZIMUTHS)[:, None] * order), spread(values).T)
     polar = np.radians(POLAR)
-    found = PchipInterpolator(polar, terms, axis=0)(np.minimum(theta, polar[-1]))
-    even = found[..., 0] + found[..., 1] * np.cos(2.0 * phi) + found[..., 2] * np.cos(4.0 * phi)
-    return np.asarray(np.clip(even, 0.0, 1.0))
+    found = PchipInterpolator(polar, harmonics.T, axis=0)(np.minimum(theta, polar[-1]))
+    return np.asarray(np.clip((found * np.cos(phi[..., None] * order)).sum(axis=-1), 0.0, 1.0))
