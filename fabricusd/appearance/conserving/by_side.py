@@ -18,10 +18,15 @@ from fabricusd.sides import AZIMUTHS, POLAR, Sides, spread
 
 Floats = NDArray[np.float64]
 
-CLOSING = (1.0, 0.99, 0.94, 0.78,.5, 0.24, 0.09, 0.0,0.0)
+CLOSING = (1.0, 1.0, 0.96, 0.86, 0.63, 0.01, 0.0, 0.0, 0.0)
 """Gap at POLAR over the gap seen from above; median over the presets and azimuths."""
 
-MEDIAN = Sides(surface=(.4,),reflected=(.48,),transmitted=(.2,),forward=(.61,))
+MEDIAN = Sides(
+    surface=(0.391, 0.385, 0.381, 0.38, 0.402, 0.458, 0.573, 0.664, 1.0),
+    reflected=(0.473, 0.471, 0.471, 0.47, 0.469, 0.476, 0.496, 0.51, 0.508),
+    transmitted=(0.211, 0.211, 0.208, 0.206, 0.201, 0.18, 0.131, 0.078, 0.038),
+    forward=(0.609, 0.613, 0.615, 0.61, 0.609, 0.621, 0.635, 0.643, 0.647),
+)
 """Shares of cloth that states none; medians over the presets and azimuths."""
 
 

@@ -70,7 +70,7 @@ def test_conserving_far_is_the_written_model_to_rounding_on_level_pieces(name):
     fabric = with_threads(with_model(PRESETS[name], "conserving"), curve=STEPS)
     wi, wo = random_directions(60, 3, upper=False), random_directions(60, 4, upper=False)
     law = surface_law(fabric, precision=np.float64, multiple=False)
-    assert law.conserving.lost.size == 0
+    assert law.conserving.sides.size == 0
     found = surface.evaluate(replace(fabric, opaque=False), wi, wo, multiple=False)
     written = plain.conserving_far(fabric, wi, wo, per_segment=1)
     # The tables of E and of the light that is completed have other nodes: at 0.1 degrees from the
