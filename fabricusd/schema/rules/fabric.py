@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Sdf, Usd
 
+from fabricusd.schema import attributes
 from fabricusd.schema.access import (
     kind_of,
     lost_targets,
@@ -19,6 +20,7 @@ from fabricusd.schema.access import (
 )
 from fabricusd.schema.build import build_side
 from fabricusd.schema.rules.table import FABRIC, Fault, rule
+from fabricusd.sides import LENGTHS, spread
 from fabricusd.weaves import rows as weave_rows
 
 
@@ -97,6 +99,26 @@ def coverage_at_most_one(prim: Usd.Prim) -> Iterator[Fault]:
     total = sum(v for v in values if v is not None and math.isfinite(v) and v > 0)
     if total > 1.0 + 1e-9:
         yield "fabric:weft:coverage", f"and the warp's add up to {total:g}; it must be at most 1"
+
+
+@rule(FABRIC)
+def sides_are_shares(prim: Usd.Prim) -> Iterator[Fault]:
+    """Shares by side are as many as directions, and reflected and transmitted at most 1 together."""
+    stated = {}
+    for entry in attributes.SIDES:
+        held = tuple(value(prim, entry.name))
+        if len(held) not in LENGTHS:
+            lengths = ", ".join(str(n) for n in LENGTHS[:-1])
+            yield entry.name, f"has {len(held)} shares; it must have {lengths} or {LENGTHS[-1]}"
+        elif held and all(0.0 <= share <= 1.0 for share in held):
+            stated[entry.field] = spread(held)
+    if {"reflected", "transmitted"} <= stated.keys():
+        most = float((stated["reflected"] + stated["transmitted"]).max())
+        if most > 1.0 + 1e-9:
+            yield (
+                "fabric:sides:transmitted",
+                f"and fabric:sides:reflected add up to {most:g}; they must add up to at most 1",
+            )
 
 
 @rule(FABRIC)
