@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
-from fabricusd.sides import Sides
+from fabricusd.sides import UNSTATED, Sides
 
 MODELS = ("thesis", "microcylinder", "conserving")
 """Thread scattering models; each is a module of that name in `appearance/scattering/models` and a
@@ -308,7 +308,7 @@ class Fabric:
     weft: ThreadSet = ThreadSet()
     model: str = DEFAULT_MODEL
     opaque: bool = False
-    sides: Sides = Sides()
+    sides: Sides = UNSTATED
     masking_width: float = field(
         default=20 * DEGREE, metadata=_limits(above=0.0, maximum=2 * math.pi)
     )

@@ -72,6 +72,10 @@ class Sides:
                 )
 
 
+UNSTATED = Sides()
+"""States nothing: the gap of the bands, the medians of the presets."""
+
+
 def spread(values: tuple[float, ...]) -> NDArray[np.float64]:
     """(POLAR, AZIMUTHS) shares from 1, POLAR, or POLAR times AZIMUTHS of them."""
     shape = len(POLAR), len(AZIMUTHS)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.fabric import Fabric
 from fabricusd.sides import AZIMUTHS, POLAR, Sides, spread

@@ -188,9 +188,7 @@ def between_sides(R, tables, ix, iy, iz, ox, oy, oz):
 def conserving_value(R, tables, ix, iy, iz, ox, oy, oz):
     """(r, g, b) of the whole repeat: radiance per unit `L_i dwi`, on both sides of the cloth."""
     on_surface, on_volume, share = between_sides(R, tables, ix, iy, iz, ox, oy, oz)
-    red, green, blue = conserving_single(
-        R, tables, on_surface, on_volume, ix, iy, iz, ox, oy, oz
-    )
+    red, green, blue = conserving_single(R, tables, on_surface, on_volume, ix, iy, iz, ox, oy, oz)
     side = 0 if (iz > R(0)) == (oz > R(0)) else 1
     return (
         red + share * tables.strength[side, 0],

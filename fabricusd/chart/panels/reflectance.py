@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance import plain
-from fabricusd.appearance.conserving.multiple import conserving_tables
 from fabricusd.appearance.accuracy import spread_pairs
+from fabricusd.appearance.conserving.multiple import conserving_tables
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.surface import evaluate, far_all, points_all
 from fabricusd.appearance.weave.lookup import WeaveHit, lookup

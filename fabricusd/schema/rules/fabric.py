@@ -103,7 +103,7 @@ def coverage_at_most_one(prim: Usd.Prim) -> Iterator[Fault]:
 
 @rule(FABRIC)
 def sides_are_shares(prim: Usd.Prim) -> Iterator[Fault]:
-    """Shares by side are as many as directions, and reflected and transmitted at most 1 together."""
+    """Shares by side are one for each direction; reflected and transmitted add up to at most 1."""
     stated = {}
     for entry in attributes.SIDES:
         held = tuple(value(prim, entry.name))

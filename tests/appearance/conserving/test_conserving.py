@@ -11,7 +11,6 @@ from fabricusd.appearance import plain
 from fabricusd.appearance.conserving import facets, levels, multiple
 from fabricusd.appearance.conserving import single as conserving
 from fabricusd.appearance.conserving.by_side import by_side
-from fabricusd.appearance.conserving.grid import mean_share
 from fabricusd.appearance.conserving.shares import conserving_mixture
 from fabricusd.appearance.sampling.mixture import density, direction
 from fabricusd.appearance.weave.place import Place
@@ -155,19 +154,6 @@ def test_a_grazing_view_of_white_cloth_gains_nothing_either():
             assert abs(total + _gap(tables, view) - 1) < 0.005, (name, degrees)
 
 
-@pytest.mark.parametrize("name", WOVEN)
-def test_facets_without_factors_are_dark(name):
-    # Measured: 0.20 (linen) to 0.32 (shot) reflected, 0.10 (satin) to 0.32 (shot) transmitted.
-    sent = facets.white_facets(WHITE[name], draws=1024).sent.sum(axis=(2, 3))
-    assert 0.19 < sent[:, 0].min() < sent[:, 0].max() < 0.34
-    assert 0.09 < sent[:, 1].min() < sent[:, 1].max() < 0.34
-
-
-def test_velvet_reflects_hardly_anything_once():
-    sent = facets.white_facets(WHITE["velvet"], draws=512).sent.sum(axis=(2, 3))
-    assert mean_share(sent[:, 0].reshape(facets.PILE_TABLE[:2])) < 0.04
-
-
 @pytest.mark.parametrize("multiple_too", [False, True], ids=["single", "multiple"])
 @pytest.mark.parametrize("name", ["linen_plain", "polyester_satin_charmeuse"])
 def test_cloth_sends_to_each_side_what_its_fabric_states(name, multiple_too):
@@ -268,39 +254,6 @@ def test_the_mean_over_the_bits_of_thread_is_the_repeat(name):
         value = multiple.conserving_point_value(np.float64, tables, place, *wi, *wo)
         total += area * np.array(value)
     np.testing.assert_allclose(total, _value(tables, wi[None], wo[None])[0], rtol=1e-10)
-
-
-@pytest.mark.parametrize("across", [False, True], ids=["weave", "thread"])
-@pytest.mark.parametrize("degrees", [0, 45, 70, 85])
-@pytest.mark.parametrize("name", ["linen_plain", "polyester_satin_charmeuse", "velvet"])
-def test_the_mean_over_places_and_what_passes_them_is_the_repeat(name, degrees, across):
-    # At linen's gap of .34 from above, all of it passes; at 85 degrees nothing does. The satin has
-    # no gap, and passes nothing anywhere unless its fabric states what passes.
-    fabric = WHITE[name]
-    if name == "polyester_satin_charmeuse":
-        fabric = replace(fabric, sides=Sides(gap=(0.13,)))
-    tables = multiple.conserving_tables(fabric)
-    wi, wo = _view(40, 20), _view(degrees, 110)
-    real = np.float64
-    x, w = np.polynomial.legendre.leggauss(24)
-    total, passes = np.zeros(3), 0.0
-    for k, (c, s, weight) in enumerate(tables.nodes):
-        area = weight * max(c, math.cos(math.radians(85)))
-        psi0, is_warp = math.atan2(s, c), int(k >= tables.warp_start)
-        passes += area * levels.passing(real, tables, False, *wo)
-        for at, share in zip(x, w, strict=True) if across else ((0.0, 2.0),):
-            place = Place(is_warp, tables.node_thread[k], psi0, at)
-            value = levels.conserving_level_value(real, tables, across, place, *wi, *wo)
-            total += area * 0.5 * share * np.array(value)
-    gap = 1.0 - tables.covered
-    passes += gap * levels.passing(real, tables, True, *wo)
-    place = Place(2, 0, 0.0, 0.0)
-    total += gap * np.array(
-        levels.conserving_level_value(real, tables, across, place, *wi, *wo)
-    )
-    assert passes == pytest.approx(_gap(tables, wo), abs=1e-12)
-    want = _value(tables, wi[None], wo[None])[0]
-    np.testing.assert_allclose(total, want, rtol=1e-4 if across else 1e-10)
 
 
 def test_the_term_is_off_unless_asked_for():
