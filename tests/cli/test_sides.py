@@ -19,7 +19,10 @@ def Scope "Cloth"
     {
         double fabric:warp:coverage = 0.4
         double fabric:weft:coverage = 0.4
-        def WovenThread "Yarn" { }
+        def WovenThread "Yarn"
+        {
+            double[] thread:curve:angles = [-20, 20]
+        }
     }
 }
 """

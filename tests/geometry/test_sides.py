@@ -74,12 +74,13 @@ def test_white_cloth_keeps_nothing_and_gains_nothing(name: str) -> None:
 @pytest.mark.parametrize("name", ["linen_plain", "polyester_satin_charmeuse"])
 def test_a_preset_states_what_is_measured(name: str) -> None:
     fabric = load(name)
-    anew = measure_sides(fabric, count=1 << 12, seed=99)
+    anew = measure_sides(fabric, count=1 << 14, seed=99)
     for f in fields(Sides):
-        off = spread(getattr(anew, f.name)) - spread(getattr(fabric.sides, f.name))
-        # Towards the horizon little light is left to take shares of.
-        assert np.abs(off[:6]).max() < 0.06, f.name
-        assert np.abs(off).mean() < 0.015, f.name
+        off = np.abs(spread(getattr(anew, f.name)) - spread(getattr(fabric.sides, f.name)))
+        # Surfaces reflect a tenth of the light, and towards the horizon little is left to share.
+        off *= 0.1 if f.name == "surface" else 1.0
+        assert off[:6].max() < 0.05, f.name
+        assert off.mean() < 0.012, f.name
 
 
 def test_shares_depend_little_on_how_threads_scatter() -> None:
