@@ -3,8 +3,14 @@
 The gap of the cloth as a whole depends on the direction; the places where a point of the weave lies
 in a gap do not. Light from w therefore passes a place in a gap with the probability gap(w)/gap, and
 a place on a thread with (gap(w) - gap)/(1 - gap), whichever is between 0 and 1. What does not pass
-in a gap meets the side of some thread: it is scattered as by the whole repeat. In the mean over the
-repeat, gap(w) passes, and the value is that of level `far`.
+in a gap meets the side of some thread: it is scattered as by the whole repeat. Of the light that
+the repeat scatters, the share
+
+    G(w) = (gap - gap(w))/(1 - gap(w)), at least 0,
+
+is then scattered in gaps, and threads scatter the rest of it; for a pair of directions the share is
+min(G(wi), G(wo)), so that every place is reciprocal. In the mean over the repeat, gap(w) passes, and
+the value is that of level `far`.
 """
 
 from __future__ import annotations
@@ -45,18 +51,26 @@ def passing(R, tables, in_gap, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
+def _share_of_gaps(R, tables, x, y, z):  # type: ignore[no-untyped-def]
+    """G(w): the share of the scattered light that places in gaps scatter."""
+    open_to_it = gap_towards(R, tables, x, y, z)
+    closed = max(R(0), R(1) - tables.covered - open_to_it)
+    return closed / (R(1) - open_to_it) if closed > R(0) else R(0)
+
+
+@njit(**PART)
 def conserving_level_value(R, tables, across_too, place, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """(r, g, b) at a `Place`, in a gap too, with the factors across the width if `across_too`."""
-    in_gap = place.thread_set > WARP
-    meets = R(1) - gap_towards(R, tables, ox, oy, oz)
-    share = R(1) - passing(R, tables, in_gap, ox, oy, oz)
-    if meets <= R(0) or share <= R(0):
-        return R(0), R(0), R(0)
-    if in_gap:
+    in_gaps = R(0)
+    if tables.covered < R(1):
+        in_gaps = min(_share_of_gaps(R, tables, ix, iy, iz), _share_of_gaps(R, tables, ox, oy, oz))
+    if place.thread_set > WARP:
+        if in_gaps == R(0):
+            return R(0), R(0), R(0)
+        share = in_gaps / (R(1) - tables.covered)
         red, green, blue = conserving_value(R, tables, ix, iy, iz, ox, oy, oz)
-        share /= meets
         return share * red, share * green, share * blue
-    share *= tables.covered / meets
+    share = R(1) - in_gaps
     row = tables.threads[place.thread]
     if across_too and row[LAW] == R(CONSERVING):
         red, green, blue = _across_value(R, tables, place, ix, iy, iz, ox, oy, oz)

@@ -29,7 +29,7 @@ def test_the_mean_over_places_and_what_passes_them_is_the_repeat(name, degrees, 
     if name == "polyester_satin_charmeuse":
         fabric = replace(fabric, sides=Sides(gap=(0.13,)))
     tables = multiple.conserving_tables(fabric)
-    wi, wo = _view(40, 20), _view(degrees, 110)
+    wi, wo = _view(80, 20), _view(degrees, 110)
     real = np.float64
     x, w = np.polynomial.legendre.leggauss(24)
     total, passes = np.zeros(3), 0.0
