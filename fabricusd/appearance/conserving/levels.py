@@ -8,9 +8,9 @@ the repeat scatters, the share
 
     G(w) = (gap - gap(w))/(1 - gap(w)), at least 0,
 
-is then scattered in gaps, and threads scatter the rest of it; for a pair of directions the share is
-min(G(wi), G(wo)), so that every place is reciprocal. In the mean over the repeat, gap(w) passes, and
-the value is that of level `far`.
+is then scattered in gaps, and threads scatter the rest of it; for a pair of directions the share
+is min(G(wi), G(wo)), so that every place is reciprocal. In the mean over the repeat, gap(w) passes,
+and the value is that of level `far`.
 """
 
 from __future__ import annotations
