@@ -73,8 +73,10 @@ SHARES = """
 ## `conserving` threads
 
 Reflected, transmitted and passed by the gap, of a white sky, with the preset's threads in
-`conserving` at A = {shades}: first after one scattering, then after all, then the law. *lost* ends
-where tubes overlap, and on velvet's backing.
+`conserving` at A = {shades}: first after one scattering, then after all, then the law with the
+shares by side that the preset states (`fabricusd sides`, other paths than these). *lost* ends
+where tubes overlap, which the law counts as leaving on both sides alike, and on velvet's backing,
+which the law takes to be white.
 
 | preset | angle | gap | once R | once T | R | T | law R | law T | lost |
 |---|---|---|---|---|---|---|---|---|---|"""

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
+from fabricusd.sides import UNSTATED, Sides
 
 MODELS = ("thesis", "microcylinder", "conserving")
 """Thread scattering models; each is a module of that name in `appearance/scattering/models` and a
@@ -301,6 +302,7 @@ class Fabric:
     surface_law : str - one of SURFACE_LAWS: how light on threads becomes light on cloth.
         `conserving` threads follow "facets" whatever it is, and threads of other models cannot
     opaque : bool - whether it lets no light through: cloth with a backing, or pile
+    sides : Sides - where its light goes (`conserving` only)
     masking_width : float - standard deviation of `u`, the correlation of shadowing and masking in
         azimuth [rad]; 20 degrees in [Sadeghi2013]
     back : Fabric or None - the other side, if it is a fabric of its own; None mirrors this one
@@ -315,6 +317,7 @@ class Fabric:
     model: str = DEFAULT_MODEL
     surface_law: str = SURFACE_LAWS[0]
     opaque: bool = False
+    sides: Sides = UNSTATED
     masking_width: float = field(
         default=20 * DEGREE, metadata=_limits(above=0.0, maximum=2 * math.pi)
     )

@@ -65,6 +65,7 @@ RANGES = {
     "thickness": Range(low=0, high=1000, unit="mm"),
     "color": Range(low=0, high=1000),
     "difference": Range(low=0, high=1000),
+    "paths": Range(low=64, high=2**20, whole=True, unit="paths a direction"),
     "significance": Range(low=0, high=0.5, above=True),
 }
 """Name of the setting -> its range. A number beyond it is a slip, or asks for more than a machine

@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from fabricusd.fabric import DEGREE, MODELS, Fabric, TangentCurve, Thread, ThreadSet, Weave
+from fabricusd.sides import LENGTHS, Sides
 
 NAMES = st.from_regex(r"[A-Za-zäßαя麻_][A-Za-z0-9äßαя麻_]{0,10}", fullmatch=True)
 TEXT = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), max_size=40)
@@ -69,6 +70,14 @@ def thread_sets(draw: st.DrawFn, count: int, coverage: float | None) -> ThreadSe
     )
 
 
+SHARES = st.sampled_from(LENGTHS).flatmap(
+    lambda count: st.lists(numbers(0, 0.5), min_size=count, max_size=count).map(tuple)
+)
+SIDES = st.just(Sides()) | st.builds(
+    Sides, gap=SHARES, surface=SHARES, reflected=SHARES, transmitted=SHARES, forward=SHARES
+)
+
+
 @st.composite
 def fabrics(draw: st.DrawFn, back: bool = True) -> Fabric:
     names = draw(st.lists(NAMES, min_size=1, max_size=4, unique=True))
@@ -82,6 +91,7 @@ def fabrics(draw: st.DrawFn, back: bool = True) -> Fabric:
         weft=draw(thread_sets(len(names), coverages[1])),
         model=draw(st.sampled_from(MODELS)),
         opaque=draw(st.booleans()),
+        sides=draw(SIDES),
         masking_width=draw(degrees(1, 90)),
         back=draw(st.none() | fabrics(back=False)) if back else None,
         documentation=draw(TEXT),

@@ -124,7 +124,7 @@ def _far(fabric: Fabric, rule: Rule, pairs: int) -> Floats:
 def _add_single(R, tables, wi, wo, out):  # type: ignore[no-untyped-def]
     for k in prange(wi.shape[1]):
         r, g, b = conserving_single(
-            R, tables, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
+            R, tables, R(1), R(1), wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
         )
         out[0, k] += r
         out[1, k] += g

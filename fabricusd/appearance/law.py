@@ -23,6 +23,7 @@ from fabricusd.appearance.conserving.single import (
     ConservingTables,
     single_tables,
 )
+from fabricusd.appearance.frame import WARP
 from fabricusd.appearance.levels import FAR, THREAD
 from fabricusd.appearance.published.far import far_value
 from fabricusd.appearance.published.levels import point_value
@@ -108,7 +109,7 @@ def law_value(R, law, level, place, ix, iy, iz, ox, oy, oz):  # type: ignore[no-
         r, g, b = R(0), R(0), R(0)
         if level == FAR:
             r, g, b = conserving_value(R, law.conserving, ix, iy, iz, ox, oy, oz)
-        elif place.thread_set < 2:
+        else:
             r, g, b = conserving_level_value(
                 R, law.conserving, level == THREAD, place, ix, iy, iz, ox, oy, oz
             )
@@ -128,7 +129,8 @@ def law_density(R, law, level, place, ix, iy, iz, ox, oy, oz):  # type: ignore[n
                 R, law.published.threads, law.lobes, level == THREAD, place, ix, iy, iz, ox, oy, oz
             )
     if law.kind != PUBLISHED_ONLY:
-        if level == FAR:
+        # In a gap, what does not pass is scattered as by the whole repeat.
+        if level == FAR or place.thread_set > WARP:
             q = density(R, law.conserving_lobes, ix, iy, iz, ox, oy, oz)
         else:
             q = point_density(
@@ -158,7 +160,7 @@ def law_direction(R, law, level, place, ox, oy, oz, u0, u1, u2):  # type: ignore
         return point_direction(
             R, law.published.threads, law.lobes, level == THREAD, place, ox, oy, oz, u0, u1, u2
         )
-    if level == FAR:
+    if level == FAR or place.thread_set > WARP:
         return direction(R, law.conserving_lobes, ox, oy, oz, u0, u1, u2)
     return point_direction(
         R, law.conserving.threads, law.conserving_lobes, level == THREAD, place,

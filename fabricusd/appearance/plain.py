@@ -174,9 +174,21 @@ def point(
     return _published(value, normalization(fabric, wi, wo, per_segment), wi, wo)
 
 
-def conserving_far(fabric: Fabric, wi: Array, wo: Array, per_segment: int = 64) -> Array:
-    """(n, 3) single scattering of `conserving` cloth over the whole sphere, cosine included."""
+def conserving_far(
+    fabric: Fabric, wi: Array, wo: Array, per_segment: int = 64, sides: Array | None = None
+) -> Array:
+    """(n, 3) single scattering of `conserving` cloth over the whole sphere, cosine included.
+
+    sides : (2, rows, columns, 3) - `ConservingTables.sides`, of which the first two entries are the
+        factors of surface and volume; None for factors of 1
+    """
     wi, wo = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    factors = np.ones((*wi.shape[:-1], 2))
+    if sides is not None:
+        own = (wi[..., 2] > 0) == (wo[..., 2] > 0)
+        for w in (wi, wo):
+            pair = [between_entries(table[..., :2], w) for table in sides]
+            factors = factors * np.where(own[..., None], *pair)
     value = np.zeros((*wi.shape[:-1], 3))
     s_i, s_o = np.zeros(wi.shape[:-1]), np.zeros(wi.shape[:-1])
     for share, psi0, area in _nodes(fabric, per_segment):
@@ -186,7 +198,9 @@ def conserving_far(fabric: Fabric, wi: Array, wo: Array, per_segment: int = 64) 
         mu_o = np.maximum(np.sign(wo[..., 2]) * to[..., 2], 0)
         q = area / max(math.cos(psi0), math.cos(PILE_ANGLE))
         s_i, s_o = s_i + q * mu_i, s_o + q * mu_o
-        f_s = thread_value(share.thread, "conserving", ti, to)
+        surface, volume = thread_terms(share.thread, "conserving", angles(ti), angles(to))
+        surface, volume = surface * factors[..., 0], volume * factors[..., 1]
+        f_s = surface[..., None] + volume[..., None] * albedo_of(share.thread, "conserving")
         value = value + (q * mu_i * mu_o)[..., None] * f_s
     covered = 1.0 - gap(fabric)
     up_i, up_o = np.abs(wi[..., 2]), np.abs(wo[..., 2])
@@ -195,6 +209,34 @@ def conserving_far(fabric: Fabric, wi: Array, wo: Array, per_segment: int = 64) 
         scale = g_i * g_o / up_o
     scale = np.where((up_i > 0) & (up_o > 0) & (s_i > 0) & (s_o > 0), scale, 0.0)
     return np.asarray(value * scale[..., None])
+
+
+def between_entries(table: Array, w: Array) -> Array:
+    """(n, k) entries of a (rows, columns, k) table by direction, at least 0; see
+    `conserving.grid`."""
+    rows, columns = table.shape[:2]
+    w = np.where(w[..., 2:] < 0, -w, w)
+    theta, phi = np.arccos(np.clip(w[..., 2], -1, 1)), np.arctan2(w[..., 1], w[..., 0])
+    i = 2 / math.pi * np.arcsin(np.clip(2 / math.pi * theta, 0, 1)) * (rows - 1)
+    j = phi * columns / (2 * math.pi)
+    # Rows beyond the pole, which the opposite azimuth has, and beyond the horizon.
+    beyond = np.roll(table[1:3][::-1], columns // 2, axis=1)
+    whole = np.concatenate((beyond, table, table[-3:-1][::-1]))
+    row, column = np.minimum(np.floor(i), rows - 2), np.floor(j)
+    total = np.zeros((*w.shape[:-1], table.shape[2]))
+    for a in range(-1, 3):
+        for b in range(-1, 3):
+            weight = _catmull_rom(i - row - a) * _catmull_rom(j - column - b)
+            k, m = (row + a + 2).astype(int), (column + b).astype(int) % columns
+            total += weight[..., None] * whole[k, m]
+    return np.maximum(total, 0.0)
+
+
+def _catmull_rom(x: Array) -> Array:
+    """The kernel of Catmull-Rom interpolation at a distance of x entries."""
+    x = np.abs(x)
+    near, far = 1.5 * x**3 - 2.5 * x**2 + 1, -0.5 * x**3 + 2.5 * x**2 - 4 * x + 2
+    return np.where(x < 1, near, np.where(x < 2, far, 0.0))
 
 
 def white(fabric: Fabric, albedo: float = 1.0) -> Fabric:

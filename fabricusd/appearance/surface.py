@@ -350,7 +350,7 @@ def _add_conserving(R, tables, level, places, wi, wo, out):  # type: ignore[no-u
             r, g, b = conserving_value(
                 R, tables, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
             )
-        elif places.sets[k] < 2:
+        else:
             r, g, b = conserving_level_value(
                 R, tables, level == THREAD, place_at(places, k),
                 wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k],

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance import plain
+from fabricusd.appearance.conserving.multiple import conserving_tables
 from fabricusd.appearance.scattering import plain_lobes
 from fabricusd.appearance.surface import evaluate
 from fabricusd.appearance.thread import evaluate as thread_value
@@ -126,8 +127,12 @@ def _albedo(fabric: Fabric, degrees: float, count: int = 1500) -> float:
     rng = np.random.default_rng(0)
     wi = _up(np.arccos(rng.random(count)), 2 * math.pi * rng.random(count))
     wo = np.tile(_up(np.radians([degrees])), (count, 1))
-    law = plain.conserving_far if fabric.model == "conserving" else plain.far
-    return 2 * math.pi * float(law(fabric, wi, wo, per_segment=12).mean())
+    if fabric.model == "conserving":
+        sides = conserving_tables(fabric).sides
+        value = plain.conserving_far(fabric, wi, wo, per_segment=12, sides=sides)
+    else:
+        value = plain.far(fabric, wi, wo, per_segment=12)
+    return 2 * math.pi * float(value.mean())
 
 
 def white_furnace() -> Case:

@@ -33,6 +33,7 @@ COMMANDS = {
     "new": "make a fabric from a preset, a weave, an image or a WIF draft",
     "cat": "describe a fabric in a weaver's words, and draw its draft",
     "check": "find faults in fabrics, threads and bindings",
+    "sides": "measure where a fabric's light goes, for the conserving model",
     "bake": "bake a fabric on a garment into textures",
     "material": "turn a bake into materials for USD, MaterialX and other tools",
     "render": "path-trace a scene for look-dev review",

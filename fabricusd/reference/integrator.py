@@ -46,6 +46,7 @@ from fabricusd.reference.stages.hits import add_emission, prepare
 from fabricusd.reference.stages.shadow_rays import settle, thin_out
 from fabricusd.reference.start.compile_ahead import CLOSE_UPS, EVERY_PICTURE, compile_ahead
 from fabricusd.reference.surfaces.fabric import FabricShader
+from fabricusd.reference.surfaces.fabric_gap import BY_DIRECTION, TABLE
 from fabricusd.reference.surfaces.normal_map import shade_mapped
 from fabricusd.reference.surfaces.preview import (
     EMISSIVE,
@@ -135,10 +136,14 @@ class Tracer:
         self.opacity = np.where(
             self.surfaces.table[:, OPACITY_MAP] >= 0, -1.0, self.surfaces.table[:, OPACITY]
         ).astype(np.float32)
+        directed = any(shader is not None and shader.gaps is not None for shader in self.shaders)
+        self.gaps = np.zeros((len(self.shaders) if directed else 0, *TABLE), np.float32)
         for k, shader in enumerate(self.shaders):
             if shader is not None:
                 self._limits[k] = limits.row(shader.fabric)
                 self.opacity[k] = 1.0 - shader.gap
+                if shader.gaps is not None:
+                    self.opacity[k], self.gaps[k] = BY_DIRECTION, shader.gaps
         self.see_through = bool((self.opacity < 1).any())
 
     def aim(self, lens: Lens, width: int, height: int) -> None:
@@ -243,8 +248,8 @@ class Tracer:
         for _ in range(MOST_LAYERS):
             self.accelerator.intersect(wave.shadows.rays, (count + 15) // 16)
             count = thin_out(
-                count, wave.shadows, self.opacity, self.surfaces, self.triangles, self.epsilon,
-                aovs, wave.film,
+                count, wave.shadows, self.opacity, self.gaps, self.surfaces, self.triangles,
+                self.epsilon, aovs, wave.film,
             )  # fmt: skip
             if count == 0:
                 break

@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Any
 
 from fabricusd.fabric import Binding, Fabric, Thread, ThreadSet
+from fabricusd.sides import Sides
 
 DEGREE = math.pi / 180.0
 MILLIMETRE = 1e-3
@@ -68,6 +69,12 @@ THREAD = (
 FABRIC = (Attribute("fabric:maskingWidth", "double", Fabric, "masking_width", DEGREE, "degrees"),)
 """Numbers of a WovenFabric; the sets, the weave, tokens and relationships are read apart."""
 
+SIDES = tuple(
+    Attribute(f"fabric:sides:{name}", "double[]", Sides, name)
+    for name in ("gap", "surface", "reflected", "transmitted", "forward")
+)
+"""Where the light of a WovenFabric goes; an empty array states nothing."""
+
 
 def thread_set(which: str) -> tuple[Attribute, Attribute]:
     """Density and coverage of `which`, "warp" or "weft"."""
@@ -92,7 +99,7 @@ BINDING = (
 
 def every_attribute() -> tuple[Attribute, ...]:
     """All of them, of the three schemas."""
-    return (*THREAD, *FABRIC, *thread_set("warp"), *thread_set("weft"), *BINDING)
+    return (*THREAD, *FABRIC, *SIDES, *thread_set("warp"), *thread_set("weft"), *BINDING)
 
 
 def to_si(value: Any, attribute: Attribute) -> Any:

@@ -13,6 +13,7 @@ from fabricusd.schema.access import thread_prims, value
 from fabricusd.schema.attributes import DEGREE, Attribute, to_si
 from fabricusd.schema.colors import color
 from fabricusd.schema.names import free_name
+from fabricusd.sides import Sides
 from fabricusd.weaves import rows as weave_rows
 
 
@@ -32,6 +33,7 @@ def build_side(prim: Usd.Prim) -> Fabric:
         model=str(value(prim, "fabric:model")),
         surface_law=str(value(prim, "fabric:surfaceLaw")),
         opaque=bool(value(prim, "fabric:opaque")),
+        sides=Sides(**build_numbers(prim, attributes.SIDES)),
         documentation=_documentation(prim),
         **build_numbers(prim, attributes.FABRIC),
     )

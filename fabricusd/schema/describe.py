@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ def in_words(fabric: Fabric, width: int = 80) -> str:
         f"  floats: {_floats(weave.cells)}",
         f"  seen from behind: {fabric.back.name if fabric.back else 'this weave, mirrored'}"
         + ("; opaque" if fabric.opaque else ""),
+        f"  light by side: {_stated(fabric)}",
         f"  model: {fabric.model}, surface law {fabric.surface_law}, masking width "
         f"{math.degrees(fabric.masking_width):.4g} degrees",
         "",
@@ -42,6 +44,15 @@ def in_words(fabric: Fabric, width: int = 80) -> str:
     for index, (name, thread) in enumerate(fabric.threads.items()):
         lines += _thread_lines(index, name, thread, width)
     return "\n".join(lines)
+
+
+def _stated(fabric: Fabric) -> str:
+    """Which shares of `Fabric.sides` are stated."""
+    names = [f.name for f in fields(fabric.sides)]
+    stated = [name for name in names if getattr(fabric.sides, name)]
+    if len(stated) in (0, len(names)):
+        return "stated" if stated else "the presets' median"
+    return f"{', '.join(stated)} stated; otherwise the presets' median"
 
 
 def _plural(number: int, noun: str) -> str:
@@ -161,6 +172,7 @@ def as_dict(fabric: Fabric) -> dict[str, Any]:
         "model": fabric.model,
         "surface_law": fabric.surface_law,
         "opaque": fabric.opaque,
+        "sides": {f.name: list(getattr(fabric.sides, f.name)) for f in fields(fabric.sides)},
         "masking_width": math.degrees(fabric.masking_width),
         "threads": {name: _thread_dict(thread) for name, thread in fabric.threads.items()},
         "back": as_dict(fabric.back) if fabric.back else None,

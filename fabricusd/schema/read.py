@@ -43,12 +43,22 @@ def load_noted(source: str | os.PathLike[str]) -> tuple[Fabric, tuple[str, ...]]
     return _load(source, notes.append), tuple(notes)
 
 
+@reads("a fabric")
+def load_placed(source: str | os.PathLike[str]) -> tuple[str, Fabric]:
+    """The path of the WovenFabric prim that `load` reads, and the fabric."""
+    return _load_placed(source, _warn)
+
+
 def _load(source: str | os.PathLike[str], tell: Note) -> Fabric:
+    return _load_placed(source, tell)[1]
+
+
+def _load_placed(source: str | os.PathLike[str], tell: Note) -> tuple[str, Fabric]:
     stage, file = open_stage(source)
     with usd_errors(file, "read as a fabric"), no_warnings():
         prim = find_fabric(stage, file, split_source(source)[1])
         try:
-            return _read_both_sides(prim, tell, None)
+            return str(prim.GetPath()), _read_both_sides(prim, tell, None)
         except FabricError as error:
             raise error.inside(f"{file}:") from error
 

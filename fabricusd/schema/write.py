@@ -16,6 +16,7 @@ from fabricusd.schema.attributes import DEGREE, Attribute, from_si, unscale
 from fabricusd.schema.colors import LINEAR
 from fabricusd.schema.names import free_name, prim_name
 from fabricusd.schema.source import usd_errors
+from fabricusd.sides import Sides
 from fabricusd.weaves import rows as weave_rows
 
 EXTENSIONS = (".usda", ".usdc", ".usd")
@@ -34,9 +35,14 @@ def save_all(
     Of fabrics that share a name, the first is written.
     """
     target = os.fspath(path)
-    if not target.lower().endswith(EXTENSIONS):
-        raise FabricError(target, f"has another suffix than {', '.join(EXTENSIONS)}")
+    require_layer_name(target)
     export(_layer(fabrics), target, clobber=clobber)
+
+
+def require_layer_name(path: str) -> None:
+    """Raise FabricError for a name that has no suffix of a USD layer."""
+    if not path.lower().endswith(EXTENSIONS):
+        raise FabricError(path, f"has another suffix than {', '.join(EXTENSIONS)}")
 
 
 def export(layer: Sdf.Layer, path: str | os.PathLike[str], *, clobber: bool = True) -> None:
@@ -64,6 +70,19 @@ def _layer(fabrics: Sequence[Fabric]) -> Sdf.Layer:
     # The layer has no geometry, but USD's validators want both on every layer.
     stage.SetMetadata("upAxis", "Y")
     stage.SetMetadata("metersPerUnit", 0.01)
+    return layer
+
+
+def sides_text(path: Sdf.Path | str, sides: Sides) -> str:
+    """A layer of USD text that states `sides` over the WovenFabric prim at `path`."""
+    return str(sides_layer(path, sides).ExportToString())
+
+
+def sides_layer(path: Sdf.Path | str, sides: Sides) -> Sdf.Layer:
+    """A layer that states `sides` over the WovenFabric prim at `path`, for stages to sublayer."""
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    stage = Usd.Stage.Open(layer)
+    write_sides(stage.OverridePrim(Sdf.Path(path)), sides)
     return layer
 
 
@@ -95,6 +114,7 @@ def write_fabric(stage: Usd.Stage, path: Sdf.Path | str, fabric: Fabric) -> Usd.
     if fabric.opaque:
         _set(prim, "fabric:opaque", "bool", True)
     _set_numbers(prim, attributes.FABRIC, fabric)
+    write_sides(prim, fabric.sides)
     if fabric.back is not None:
         name = free_name(prim_name(fabric.back.name), names)
         back = write_fabric(stage, path.AppendChild(name), fabric.back)
@@ -112,6 +132,13 @@ def write_thread(stage: Usd.Stage, path: Sdf.Path | str, thread: Thread) -> Usd.
     _set(prim, "thread:curve:positions", "double[]", Vt.DoubleArray(thread.curve.positions))
     _set(prim, "thread:curve:angles", "double[]", Vt.DoubleArray(angles))
     return prim
+
+
+def write_sides(prim: Usd.Prim, sides: Sides) -> None:
+    """Write what `sides` states to a WovenFabric prim, or to an over of one."""
+    for entry in attributes.SIDES:
+        if stated := getattr(sides, entry.field):
+            _set(prim, entry.name, entry.type_name, Vt.DoubleArray(stated))
 
 
 def write_binding(prim: Usd.Prim, fabric_path: Sdf.Path | str, binding: Binding) -> None:

@@ -37,6 +37,7 @@ OPTIONS = {
     ("compare", "--max-flip"): ("-0.1", "1001"),
     ("compare", "--max-error"): ("-0.1", "1001"),
     ("compare", "--significance"): ("0", "-0.1", "0.6"),
+    ("sides", "--paths"): ("0", "63", "1048577", "1.5"),
 }
 
 ARGUMENTS = {
@@ -44,6 +45,7 @@ ARGUMENTS = {
     "bake": ["x.obj", "--fabric", "velvet", "-o", "out"],
     "new": ["--weave", "plain", "-o", "out.usda"],
     "compare": ["a.png", "b.png", "-o", "out.png"],
+    "sides": ["linen_plain", "-o", "out.usda"],
 }
 
 TEXTS = {

@@ -16,6 +16,7 @@ from fabricusd.fabric import MODELS, Binding, Fabric, Thread, ThreadSet
 from fabricusd.schema import PLUGIN_PATH, attributes, load, save
 from fabricusd.schema.generate import generate
 from fabricusd.schema.plugin import VALIDATORS
+from fabricusd.sides import Sides
 
 TYPES = ("WovenFabric", "WovenThread")
 DEFINITIONS = [*TYPES, "WovenBindingAPI"]
@@ -138,7 +139,7 @@ def test_every_attribute_has_a_fallback_and_every_token_its_allowed_values(owner
 
 @pytest.mark.parametrize(
     "entry",
-    [*attributes.THREAD, *attributes.FABRIC, *attributes.BINDING,
+    [*attributes.THREAD, *attributes.FABRIC, *attributes.SIDES, *attributes.BINDING,
      *attributes.thread_set("warp"), *attributes.thread_set("weft")],
     ids=lambda entry: entry.name,
 )  # fmt: skip
@@ -155,6 +156,7 @@ def test_fallbacks_and_types_agree_with_the_dataclasses(entry):
         Thread: Thread(),
         ThreadSet: ThreadSet(),
         Fabric: Fabric(),
+        Sides: Sides(),
         Binding: Binding(fabric=Fabric()),
     }[entry.owner]
     if fallback is None:

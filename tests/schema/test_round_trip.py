@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -21,6 +21,7 @@ from fabricusd.schema import (
 )
 from fabricusd.schema.attributes import DEGREE, unscale
 from fabricusd.schema.names import prim_name
+from fabricusd.sides import Sides
 from tests.strategies import fabrics
 
 
@@ -58,6 +59,8 @@ OTHER_VALUES = {
     "fabric:warp:coverage": 0.25, "fabric:weft:coverage": 0.5,
     "fabric:weave:rows": ["110", "011"], "fabric:weave:name": "odd",
     "fabric:model": "conserving", "fabric:opaque": True, "fabric:maskingWidth": 12.5,
+    "fabric:sides:gap": [0.1], "fabric:sides:surface": [0.2], "fabric:sides:reflected": [0.3],
+    "fabric:sides:transmitted": [0.4], "fabric:sides:forward": [0.5],
     "thread:albedo": (0.1, 0.2, 0.3), "thread:color": (0.3, 0.2, 0.1), "thread:ior": 1.7,
     "thread:isotropic": 0.9, "thread:gammaSurface": 3.0, "thread:gammaVolume": 6.0,
     "thread:surfaceGain": 0.125, "thread:model": "thesis", "thread:thickness": 0.75,
@@ -68,7 +71,8 @@ OTHER_VALUES = {
 def test_every_property_of_the_schema_is_written_and_read():
     stage = Usd.Stage.CreateInMemory()
     fabric = Fabric(threads={"A": Thread(), "B": Thread()}, opaque=True, back=Fabric(name="Back"))
-    fabric = replace(fabric, weave=replace(fabric.weave, name="plain"))
+    sides = Sides(**{f.name: (0.45,) for f in fields(Sides)})
+    fabric = replace(fabric, weave=replace(fabric.weave, name="plain"), sides=sides)
     prim = write_fabric(stage, "/Cloth", fabric)
     for one in (prim, prim.GetChild("A")):
         schema = set(one.GetPrimDefinition().GetPropertyNames())

@@ -48,9 +48,9 @@ def _in_single_precision(tables: ConservingTables) -> ConservingTables:
         threads=tables.threads.astype(np.float32),
         nodes=tables.nodes.astype(np.float32),
         covered=np.float32(tables.covered),
-        lost=tables.lost.astype(np.float32),
+        sides=tables.sides.astype(np.float32),
+        gap=tables.gap.astype(np.float32),
         strength=tables.strength.astype(np.float32),
-        forward=np.float32(tables.forward),
     )
 
 

@@ -2,15 +2,17 @@
 
 One law covers the whole sphere, reflection and transmission alike:
 
-    f = G1(wi) G1(wo) / (|N.wi| |N.wo|) sum a <f_s mu(wi) mu(wo) q>,
+    f = h(wi) h(wo) G1(wi) G1(wo) / (|N.wi| |N.wo|) sum a <f_s mu(wi) mu(wo) q>,
     mu(w) = max(0, sign(N.w) n_t.w),  q = 1/max(n_t.N, cos 85),
     S(w) = sum a <mu q>,  G1 = min(1, (1 - gap) |N.w| / S),
 
-The law is reciprocal to rounding, and passive: a facet scatters at most mu(wo) <= cos theta_o of
-its thread's energy into wo, and the facets that see wi add up to S. Scattering between threads is
-the subject of `multiple`; `ConservingTables` has room for its table. Values carry the cosine
-|N.wi|; at the horizon itself there is no value. Callers account for the light that passes straight
-through the gaps. Source: MODEL sections 4 and 7.
+The law is reciprocal to rounding. With h = 1 it is passive too: a facet scatters at most mu(wo) <=
+cos theta_o of its thread's energy into wo, and the facets that see wi add up to S. It is then also
+too dark, since a facet keeps what a round thread would send past it. `multiple` therefore finds
+factors h, one for what surfaces reflect, one for what volumes reflect and one for what passes, with
+which as much light leaves to each side as the cloth's tubes let go; `ConservingTables` has room for
+them. Values carry the cosine |N.wi|; at the horizon itself there is no value. Callers account for
+the light that passes straight through the gaps. Source: MODEL sections 4 and 7.
 
 In a cloth that mixes models, all threads cast shadows, but only the `conserving` ones scatter here.
 """
@@ -50,6 +52,10 @@ or less with one width."""
 NODE_COS, NODE_SIN, NODE_WEIGHT = 0, 1, 2
 """Columns of `ConservingTables.nodes`: cosine and sine of the clamped tangent angle, and a q."""
 
+ON_SURFACE, ON_VOLUME, LOST = 0, 1, 2
+"""Last index of `ConservingTables.sides`: the factor h of the surface term and of the volume term,
+and the light that leaves on a side after more than one scattering."""
+
 _STEEPEST_COS = math.cos(PILE_ANGLE)
 
 
@@ -63,10 +69,11 @@ class ConservingTables(NamedTuple):
     warp_start : int - nodes from here on are warp
     covered : real - 1 - gap
     opaque : int - 1 if no light passes through the cloth
-    lost : (r, c) real - share of the energy that single scattering of a white cloth loses, by
-        direction; see `multiple`. (0, 0) without the multiple-scattering term
-    strength : (3,) real - C/(pi M) per channel
-    forward : real - share of the multiple-scattering term that leaves on the other side
+    sides : (2, r, c, 3) real - ON_SURFACE, ON_VOLUME, LOST by direction, of light that leaves on
+        its own side and on the other; (2, 0, 0, 3) for factors of 1 and nothing lost
+    gap : (r, c) real - share of the light that passes between the threads, by direction; (0, 0) for
+        the gap seen from above
+    strength : (2, 3) real - C/(pi M) per side and channel; 0 without multiple scattering
     """
 
     threads: Reals
@@ -76,9 +83,9 @@ class ConservingTables(NamedTuple):
     warp_start: int
     covered: Any
     opaque: int
-    lost: Reals
+    sides: Reals
+    gap: Reals
     strength: Reals
-    forward: Any
 
 
 def single_tables(
@@ -108,9 +115,9 @@ def single_tables(
         warp_start=q.warp_start,
         covered=precision(1.0 - coverage(fabric).gap),
         opaque=int(fabric.opaque),
-        lost=np.zeros((0, 0), precision),
-        strength=np.zeros(3, precision),
-        forward=precision(0),
+        sides=np.zeros((2, 0, 0, 3), precision),
+        gap=np.zeros((0, 0), precision),
+        strength=np.zeros((2, 3), precision),
     )
 
 
@@ -161,8 +168,11 @@ def facet_terms(R, row, thread_set, c, s, ix, iy, iz, ox, oy, oz):
 
 
 @njit(**PART)
-def conserving_single(R, tables, ix, iy, iz, ox, oy, oz):
-    """(r, g, b) of single scattering: radiance per unit `L_i dwi` of the whole repeat."""
+def conserving_single(R, tables, on_surface, on_volume, ix, iy, iz, ox, oy, oz):
+    """(r, g, b) of single scattering: radiance per unit `L_i dwi` of the whole repeat.
+
+    on_surface, on_volume : `h(wi) h(wo)` of the two terms
+    """
     red, green, blue = R(0), R(0), R(0)
     scale = visible(R, tables, ix, iy, iz) * visible(R, tables, ox, oy, oz) * abs(iz)
     if tables.opaque != 0 and (iz > R(0)) != (oz > R(0)):
@@ -178,6 +188,7 @@ def conserving_single(R, tables, ix, iy, iz, ox, oy, oz):
             tables.nodes[k, NODE_COS], tables.nodes[k, NODE_SIN], ix, iy, iz, ox, oy, oz,
         )  # fmt: skip
         weight = tables.nodes[k, NODE_WEIGHT] * scale
+        surface, volume = on_surface * surface, on_volume * volume
         red += weight * (surface + volume * row[ALBEDO_R])
         green += weight * (surface + volume * row[ALBEDO_G])
         blue += weight * (surface + volume * row[ALBEDO_B])
@@ -185,7 +196,7 @@ def conserving_single(R, tables, ix, iy, iz, ox, oy, oz):
 
 
 @njit(**PART)
-def conserving_point_single(R, tables, place, ix, iy, iz, ox, oy, oz):
+def conserving_point_single(R, tables, place, on_surface, on_volume, ix, iy, iz, ox, oy, oz):
     """`conserving_single` at a `Place` on a thread; the mean over the repeat is that value.
 
     The value is 0 on a thread of another model. `place.w` is not read.
@@ -200,6 +211,7 @@ def conserving_point_single(R, tables, place, ix, iy, iz, ox, oy, oz):
     c, s = cos(R, angle), sin(R, angle)
     surface, volume = facet_terms(R, row, place.thread_set, c, s, ix, iy, iz, ox, oy, oz)
     scale /= max(c, R(_STEEPEST_COS))
+    surface, volume = on_surface * surface, on_volume * volume
     return (
         scale * (surface + volume * row[ALBEDO_R]),
         scale * (surface + volume * row[ALBEDO_G]),

@@ -411,6 +411,7 @@ def back_of(fabric: Fabric) -> Fabric:
             coverage=float(area[WEFT]),
         ),
         model=fabric.model,
+        sides=fabric.sides,
         opaque=fabric.opaque,
         masking_width=fabric.masking_width,
         documentation=fabric.documentation,

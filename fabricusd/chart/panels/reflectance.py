@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance import plain
 from fabricusd.appearance.accuracy import spread_pairs
+from fabricusd.appearance.conserving.multiple import conserving_tables
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.surface import evaluate, far_all, points_all
 from fabricusd.appearance.weave.lookup import WeaveHit, lookup
@@ -81,7 +82,7 @@ def _run(quick: bool) -> list[Row]:
     # These kernels take longer to compile than all the rest takes to run.
     for name in () if quick else QUICK_PRESETS:
         one = replace(load(name), model="conserving")
-        truth = plain.conserving_far(one, *_checked(), per_segment=REFERENCE_NODES)
+        truth = _plain_conserving(one, _checked(), REFERENCE_NODES)()
         methods = conserving_methods(one, count // 8)
         rows += _group(f"{name}, far, conserving", truth, methods, rounds)
     return rows
@@ -223,7 +224,8 @@ def conserving_methods(fabric: Fabric, count: int) -> dict[str, Method]:
 def _plain_conserving(
     fabric: Fabric, pairs: tuple[Floats, Floats], nodes: int
 ) -> Callable[[], Floats]:
-    return lambda: plain.conserving_far(fabric, *pairs, per_segment=nodes)
+    sides = conserving_tables(fabric).sides
+    return lambda: plain.conserving_far(fabric, *pairs, per_segment=nodes, sides=sides)
 
 
 def _bounded(fabric: Fabric, bound: float, count: int) -> Callable[[], Floats]:

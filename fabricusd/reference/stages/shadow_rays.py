@@ -24,6 +24,7 @@ from fabricusd.reference.rays.embree import (
 )
 from fabricusd.reference.rays.triangles import D1, D2, E1, E2, P0, ST
 from fabricusd.reference.rays.wave import DIRECT, INDIRECT, LIT
+from fabricusd.reference.surfaces.fabric_gap import BY_DIRECTION, gap_along
 from fabricusd.reference.surfaces.preview import opacity_at
 
 R = np.float32
@@ -48,7 +49,7 @@ def settle(count, shadows, film, aovs):
 
 
 @njit(**LEAN)
-def thin_out(count, shadows, opacity, surfaces, triangles, epsilon, aovs, film):
+def thin_out(count, shadows, opacity, gaps, surfaces, triangles, epsilon, aovs, film):
     """Attenuate shadow rays at see-through surfaces, after `intersect`.
 
     A ray that hit nothing adds its light; a ray that hit an opaque surface ends; any other ray is
@@ -56,7 +57,8 @@ def thin_out(count, shadows, opacity, surfaces, triangles, epsilon, aovs, film):
     packed to the front.
 
     opacity : (materials,) float32 - the constant of each material, negative if its opacity varies
-        over the surface
+        over the surface, BY_DIRECTION if it depends on the direction
+    gaps : (materials, *TABLE) float32 - what passes the latter, by direction
     """
     rays, shadow, shadow_path = shadows
     records, triangle_material = triangles.records, triangles.material
@@ -78,7 +80,12 @@ def thin_out(count, shadows, opacity, surfaces, triangles, epsilon, aovs, film):
         record = records[triangle]
         u, v = rays[p, HIT_U, lane], rays[p, HIT_V, lane]
         blocked = opacity[material]
-        if blocked < R(0):
+        if blocked == R(BY_DIRECTION):
+            blocked = R(1) - gap_along(
+                gaps[material], record, u, v, rays[p, DX, lane], rays[p, DY, lane],
+                rays[p, DZ, lane],
+            )  # fmt: skip
+        elif blocked < R(0):
             blocked = opacity_at(
                 surfaces, material,
                 record[ST] + u * record[D1] + v * record[D2],

@@ -41,6 +41,7 @@ from fabricusd.reference.surfaces.fabric import (
     places_of,
 )
 from fabricusd.reference.surfaces.fabric_far import shade_far
+from fabricusd.reference.surfaces.fabric_gap import TABLE
 from fabricusd.reference.surfaces.preview import build_surfaces, shade_preview
 from fabricusd.scene.scene import Camera, Mesh, PreviewSurface, Scene
 
@@ -134,8 +135,8 @@ def _trace_and_settle() -> None:
     rays.occluded(wave.lanes.rays, 0)
     settle(0, wave.shadows, wave.film, False)
     thin_out(
-        0, wave.shadows, np.ones(1, np.float32), build_surfaces(scene), triangles, R(0), False,
-        wave.film,
+        0, wave.shadows, np.ones(1, np.float32), np.zeros((0, *TABLE), np.float32),
+        build_surfaces(scene), triangles, R(0), False, wave.film,
     )  # fmt: skip
     Film(4, 4, ("beauty",)).add(np.zeros(1, np.int32), 16, wave.film)
 
@@ -179,7 +180,10 @@ def _point_values() -> None:
 
 def _finish_point() -> None:
     scattering = Scattering(*[np.zeros((3, 0), np.float32)] * 5)
-    finish_point(R, *_woven(), R(1), R(0), 1, _sample().wave.hits.rows, 0, scattering, _points())
+    finish_point(
+        R, *_woven(), R(1), R(0), 1, _sample().wave.hits.rows, 0, scattering, _points(),
+        np.zeros(0, np.float32),
+    )  # fmt: skip
 
 
 EVERY_PICTURE, CLOSE_UPS = "every picture", "close-ups"

@@ -48,7 +48,8 @@ from fabricusd.reference.rays.wave import (
     F,
     Wave,
 )
-from fabricusd.reference.surfaces.fabric_far import STRAIGHT, finish_far, gather, shade_far
+from fabricusd.reference.surfaces.fabric_far import STRAIGHT, gather, shade_far
+from fabricusd.reference.surfaces.fabric_gap import gap_table, pass_far, pass_places
 
 R = np.float32
 _ONE_AT_A_TIME = threading.Lock()
@@ -96,6 +97,7 @@ class _Scratch:
         self.threads = np.empty(capacity, np.int32)
         self.psi0 = aligned_empty((capacity,))
         self.across = aligned_empty((capacity,))
+        self.passes = aligned_empty((capacity,))
         self.along = aligned_empty((capacity,))
         self.length = aligned_empty((capacity,))
 
@@ -150,6 +152,10 @@ class FabricShader:
 
     shadow : one of `shadow.METHODS`, at levels `weave` and `thread`
     make_ready : called before the first hit at one of those levels; many pictures have none
+
+    gap : share of the light that passes between the threads, seen from above; gaps : table of the
+        same by direction, None where the direction does not matter. Those of the front hold for
+        both sides.
     """
 
     def __init__(
@@ -157,7 +163,10 @@ class FabricShader:
     ) -> None:
         self.fabric = fabric
         self.sides = tuple(_Side(f, shadow, make_ready) for f in (fabric, back_of(fabric)))
-        self.gap = 0.0 if fabric.opaque else float(self.sides[0].law.published.gap)
+        law = self.sides[0].law
+        self.gap = 0.0 if fabric.opaque else float(law.published.gap)
+        self.gaps = gap_table(law, fabric.opaque)
+        self.is_open = R(0 if fabric.opaque else 1)
 
     def __call__(self, level: int, back: int, wave: Wave, first: int, last: int) -> None:
         """Shade the hits from `first` to before `last`, all on one side and at one level."""
@@ -169,22 +178,28 @@ class FabricShader:
         wave.scratch = scratch
         scattering = scratch.scattering(last - first)
         gather(hits, first, last - first, scattering.wo, scattering.wi)
+        passes = scratch.passes[: last - first]
         if level == FAR_LEVEL:
-            self._shade_by_law(side, hits, first, scattering)
+            self._shade_by_law(side, hits, first, scattering, passes)
         else:
             points = scratch.points(last - first)
-            self._shade_near(side, level, back, hits, first, scattering, points)
+            self._shade_near(side, level, back, hits, first, scattering, points, passes)
 
     def _shade_by_law(
-        self, side: _Side, hits: NDArray[np.float32], first: int, scattering: Scattering
+        self,
+        side: _Side,
+        hits: NDArray[np.float32],
+        first: int,
+        scattering: Scattering,
+        passes: NDArray[np.float32],
     ) -> None:
         """Shade hits at level `far` on cloth with `conserving` threads."""
-        _, _, go, towards, onwards = scattering
-        count = go.shape[1]
+        count = len(passes)
         none, real = np.zeros(count, np.uint8), np.zeros(count, np.float32)
         points = Points(none, none.astype(np.int32), real, real, real, real)
         _by_law(R, side.law, FAR_LEVEL, hits, first, scattering, places_of(points))
-        finish_far(R, hits, first, count, R(self.gap), go, towards, onwards)
+        pass_far(R, self.sides[0].law.conserving, self.is_open, scattering.wo, passes)
+        finish_by_law(R, hits, first, passes, scattering)
 
     def _shade_near(
         self,
@@ -195,6 +210,7 @@ class FabricShader:
         first: int,
         scattering: Scattering,
         points: Points,
+        passes: NDArray[np.float32],
     ) -> None:
         wo, wi, go, towards, onwards = scattering
         law, (cloth, shadow) = side.law, side.near
@@ -211,11 +227,13 @@ class FabricShader:
             near = (R, law.published, level == THREAD_LEVEL, places)
             point_values(*near, wi, wo, towards, 0, count)
             point_values(*near, go, wo, onwards, 0, count)
+            passes = passes[:0]
         else:
             _by_law(R, law, level, hits, first, scattering, places)
+            pass_places(R, law.conserving, self.is_open, points.sets, wo, passes)
         finish_point(
             R, cloth, shadow, v_sign, R(0 if self.gap == 0 else 1), side.types, hits, first,
-            scattering, points,
+            scattering, points, passes,
         )  # fmt: skip
 
 
@@ -262,6 +280,20 @@ def _finish(hits, h, keep, k, go, onwards):
 
 
 @njit(**LEAN)
+def finish_by_law(R, hits, first, passes, scattering):
+    """Write values and weights at level `far`; of each hit's paths, the share `passes` goes
+    straight on."""
+    _, _, go, towards, onwards = scattering
+    for k in range(passes.size):
+        h = first + k
+        keep = R(1) - passes[k]
+        for row in range(3):
+            hits[F + row, h] = towards[row, k]
+        hits[KEEP, h], hits[THREAD, h] = keep, R(-1)
+        _finish(hits, h, keep, k, go, onwards)
+
+
+@njit(**LEAN)
 def look_up(R, cloth, v_sign, hits, first, points):
     """Look up the thread under each hit."""
     sets, threads, along, across, psi0, length = points
@@ -275,12 +307,25 @@ def look_up(R, cloth, v_sign, hits, first, points):
 
 
 @njit(**LEAN)
-def finish_point(R, cloth, shadow, v_sign, open_gap, types, hits, first, scattering, points):
-    """Apply the shadowing of neighbouring threads; in a gap, the path goes straight on or ends."""
+def finish_point(
+    R, cloth, shadow, v_sign, open_gap, types, hits, first, scattering, points, passes
+):  # fmt: skip
+    """Apply the shadowing of neighbouring threads, and let paths through.
+
+    passes : (n,) probability with which a path goes straight on at its place; empty for published
+        cloth, where it goes straight on in gaps if `open_gap`, and ends there otherwise
+    """
     _, wi, go, towards, onwards = scattering
     sets, threads, along, across, _, length = points
     for k in range(wi.shape[1]):
         h = first + k
+        keep = R(1) - passes[k] if passes.size > 0 else R(1)
+        if sets[k] == GAP and passes.size > 0:
+            for row in range(3):
+                hits[F + row, h] = towards[row, k]
+            hits[KEEP, h], hits[THREAD, h] = keep, R(-1)
+            _finish(hits, h, keep, k, go, onwards)
+            continue
         if sets[k] == GAP:
             hits[F, h], hits[F + 1, h], hits[F + 2, h] = R(0), R(0), R(0)
             hits[F_PDF, h] = R(0)
@@ -302,6 +347,6 @@ def finish_point(R, cloth, shadow, v_sign, open_gap, types, hits, first, scatter
             hits[F + row, h] = light * towards[row, k]
             onwards[row, k] = bounce * onwards[row, k]
         # The same number as `weave.thread_number`.
-        hits[KEEP, h] = R(1)
+        hits[KEEP, h] = keep
         hits[THREAD, h] = R(threads[k] + (types if sets[k] == WARP else 0))
-        _finish(hits, h, R(1), k, go, onwards)
+        _finish(hits, h, keep, k, go, onwards)

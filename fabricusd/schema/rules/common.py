@@ -126,7 +126,7 @@ def _numbers(prim: Usd.Prim) -> tuple[Attribute, ...]:
         return attributes.THREAD
     if type_of(prim) == "WovenFabric":
         sets = (attributes.thread_set("warp"), attributes.thread_set("weft"))
-        return (*attributes.FABRIC, *sets[0], *sets[1])
+        return (*attributes.FABRIC, *attributes.SIDES, *sets[0], *sets[1])
     return attributes.BINDING
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from pxr import Sdf, Usd
 
 from fabricusd.fabric import FACETS
+from fabricusd.schema import attributes
 from fabricusd.schema.access import (
     allowed_tokens,
     kind_of,
@@ -21,6 +22,7 @@ from fabricusd.schema.access import (
 )
 from fabricusd.schema.build import build_side
 from fabricusd.schema.rules.table import FABRIC, Fault, rule
+from fabricusd.sides import LENGTHS, spread
 from fabricusd.weaves import rows as weave_rows
 
 
@@ -120,6 +122,26 @@ def surface_law_allowed(prim: Usd.Prim) -> Iterator[Fault]:
                     f"{model}; it must be one of {', '.join(t for t in allowed if t != FACETS)}",
                 )
                 return
+
+
+@rule(FABRIC)
+def sides_are_shares(prim: Usd.Prim) -> Iterator[Fault]:
+    """Shares by side are one for each direction; reflected and transmitted add up to at most 1."""
+    stated = {}
+    for entry in attributes.SIDES:
+        held = tuple(value(prim, entry.name))
+        if len(held) not in LENGTHS:
+            lengths = ", ".join(str(n) for n in LENGTHS[:-1])
+            yield entry.name, f"has {len(held)} shares; it must have {lengths} or {LENGTHS[-1]}"
+        elif held and all(0.0 <= share <= 1.0 for share in held):
+            stated[entry.field] = spread(held)
+    if {"reflected", "transmitted"} <= stated.keys():
+        most = float((stated["reflected"] + stated["transmitted"]).max())
+        if most > 1.0 + 1e-9:
+            yield (
+                "fabric:sides:transmitted",
+                f"and fabric:sides:reflected add up to {most:g}; they must add up to at most 1",
+            )
 
 
 @rule(FABRIC)

@@ -1,0 +1,55 @@
+"""What passes between the threads, as paths and shadow rays are told."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numba import njit
+
+from fabricusd.appearance.conserving.by_side import by_side
+from fabricusd.appearance.conserving.grid import entry_angles
+from fabricusd.appearance.law import CONSERVING_ONLY, PUBLISHED_ONLY
+from fabricusd.kernels.real import LEAN
+from fabricusd.reference.rays.triangles import RECORD, N, T
+from fabricusd.reference.surfaces.fabric_gap import TABLE, gap_along, gap_table
+from fabricusd.schema import load
+
+LINEN = load("linen_plain")
+
+
+def _law(gap, kind=CONSERVING_ONLY):
+    return SimpleNamespace(kind=kind, conserving=SimpleNamespace(gap=gap))
+
+
+@njit(**LEAN)
+def _along(gap, record, u, v, rays, out):
+    for k in range(len(rays)):
+        out[k] = gap_along(gap, record, u, v, rays[k, 0], rays[k, 1], rays[k, 2])
+
+
+def test_a_shadow_ray_meets_the_gap_of_its_direction_in_the_smooth_frame():
+    gap = by_side(LINEN, *entry_angles(*TABLE)).gap.astype(np.float32)
+    normal, along = np.array([0.48, 0.6, 0.64]), np.array([0.8, 0.0, -0.6])
+    record = np.zeros(RECORD, np.float32)
+    for corner in range(3):
+        # Of any length, and the direction of u not perpendicular to the normal.
+        record[N + 3 * corner : N + 3 * corner + 3] = 1.7 * normal
+        record[T + 3 * corner : T + 3 * corner + 3] = 0.4 * (along + 0.3 * normal)
+    rays = np.random.default_rng(3).standard_normal((400, 3)).astype(np.float32)
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    out = np.empty(len(rays), np.float32)
+    _along(gap, record, np.float32(0.2), np.float32(0.5), rays, out)
+    theta = np.arccos(np.clip(np.abs(rays @ normal), 0, 1))
+    phi = np.arctan2(rays @ np.cross(normal, along), rays @ along)
+    np.testing.assert_allclose(out, by_side(LINEN, theta, phi).gap, atol=0.01)
+    assert out.min() < 0.01 < 0.3 < out.max()
+
+
+def test_cloth_that_passes_the_same_from_everywhere_or_nothing_has_no_table():
+    gap = np.full(TABLE, 0.2)
+    assert gap_table(_law(gap), opaque=False) == pytest.approx(gap)
+    assert gap_table(_law(gap), opaque=True) is None
+    assert gap_table(_law(gap, PUBLISHED_ONLY), opaque=False) is None
+    assert gap_table(_law(0.0 * gap), opaque=False) is None
+    # Pile has another table, of one number.
+    assert gap_table(_law(np.full((25, 72), 0.2)), opaque=False) is None
