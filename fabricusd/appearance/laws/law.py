@@ -6,9 +6,9 @@ Every law of published threads has the form
 
 per unit `L_i dwi`, with the sum over the pieces of thread that the repeat shows, `a` their shares
 of the cloth, and `g` the share of the light that neighbouring threads let through. `weight` says
-how much of the view a piece takes. Level `far` is the sum, `weave` and `thread` are one term of it. A
-law's tables have a class of their own, and kernels are compiled for it: those of one law contain no
-code for the others. Source: `docs/model.md` section 4.
+how much of the view a piece takes. Level `far` is the sum, `weave` and `thread` are one term of it.
+A law's tables have a class of their own, and kernels are compiled for it: those of one law contain
+no code for the others. Source: `docs/model.md` section 4.
 """
 
 from __future__ import annotations

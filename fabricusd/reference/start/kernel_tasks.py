@@ -181,7 +181,7 @@ def _point_values() -> None:
 def _finish_point() -> None:
     scattering = Scattering(*[np.zeros((3, 0), np.float32)] * 5)
     finish_point(
-        R, *_woven(), R(1), R(0), 1, _sample().wave.hits.rows, 0, scattering, _points(),
+        R, *_woven(), R(1), True, 1, _sample().wave.hits.rows, 0, scattering, _points(),
         np.zeros(0, np.float32),
     )  # fmt: skip
 

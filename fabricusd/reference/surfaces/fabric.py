@@ -49,7 +49,7 @@ from fabricusd.reference.rays.wave import (
     Wave,
 )
 from fabricusd.reference.surfaces.fabric_far import STRAIGHT, gather, shade_far
-from fabricusd.reference.surfaces.fabric_gap import gap_table, pass_far, pass_places
+from fabricusd.reference.surfaces.fabric_gap import gap_table, pass_far, pass_gaps, pass_places
 
 R = np.float32
 _ONE_AT_A_TIME = threading.Lock()
@@ -172,7 +172,7 @@ class FabricShader:
         """Shade the hits from `first` to before `last`, all on one side and at one level."""
         side, hits = self.sides[back], wave.hits.rows
         if level == FAR_LEVEL and side.law.kind == PUBLISHED_ONLY:
-            shade_far(R, side.law.published, side.law.lobes, R(self.gap), hits, first, last)
+            shade_far(R, side.law.published, side.law.lobes, self.is_open, hits, first, last)
             return
         scratch = wave.scratch or _Scratch(wave.capacity)
         wave.scratch = scratch
@@ -227,12 +227,12 @@ class FabricShader:
             near = (R, law.published, level == THREAD_LEVEL, places)
             point_values(*near, wi, wo, towards, 0, count)
             point_values(*near, go, wo, onwards, 0, count)
-            passes = passes[:0]
+            pass_gaps(R, law.published, self.is_open, wo, passes)
         else:
             _by_law(R, law, level, hits, first, scattering, places)
             pass_places(R, law.conserving, self.is_open, points.sets, wo, passes)
         finish_point(
-            R, cloth, shadow, v_sign, R(0 if self.gap == 0 else 1), side.types, hits, first,
+            R, cloth, shadow, v_sign, law.kind == PUBLISHED_ONLY, side.types, hits, first,
             scattering, points, passes,
         )  # fmt: skip
 
@@ -308,29 +308,29 @@ def look_up(R, cloth, v_sign, hits, first, points):
 
 @njit(**LEAN)
 def finish_point(
-    R, cloth, shadow, v_sign, open_gap, types, hits, first, scattering, points, passes
+    R, cloth, shadow, v_sign, published, types, hits, first, scattering, points, passes
 ):  # fmt: skip
     """Apply the shadowing of neighbouring threads, and let paths through.
 
-    passes : (n,) probability with which a path goes straight on at its place; empty for published
-        cloth, where it goes straight on in gaps if `open_gap`, and ends there otherwise
+    passes : (n,) probability with which a path goes straight on at its place; of `published` cloth
+        in gaps alone, where what does not pass ends
     """
     _, wi, go, towards, onwards = scattering
     sets, threads, along, across, _, length = points
     for k in range(wi.shape[1]):
         h = first + k
-        keep = R(1) - passes[k] if passes.size > 0 else R(1)
-        if sets[k] == GAP and passes.size > 0:
+        keep = R(1) if published else R(1) - passes[k]
+        if sets[k] == GAP and published:
+            hits[F, h], hits[F + 1, h], hits[F + 2, h] = R(0), R(0), R(0)
+            hits[F_PDF, h] = R(0)
+            hits[KEEP, h], hits[THREAD, h] = R(1) - passes[k], R(-1)
+            hits[GO_PDF, h] = STRAIGHT if hits[CHANCE + 3, h] >= R(1) - passes[k] else R(0)
+            continue
+        if sets[k] == GAP:
             for row in range(3):
                 hits[F + row, h] = towards[row, k]
             hits[KEEP, h], hits[THREAD, h] = keep, R(-1)
             _finish(hits, h, keep, k, go, onwards)
-            continue
-        if sets[k] == GAP:
-            hits[F, h], hits[F + 1, h], hits[F + 2, h] = R(0), R(0), R(0)
-            hits[F_PDF, h] = R(0)
-            hits[KEEP, h], hits[THREAD, h] = R(1) - open_gap, R(-1)
-            hits[GO_PDF, h] = -open_gap
             continue
         u, v = float(hits[PLACE, h]), float(v_sign * hits[PLACE + 1, h])
         light, bounce = R(1), R(1)

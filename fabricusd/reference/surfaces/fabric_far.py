@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fabricusd.appearance import laws
 from fabricusd.appearance.published.far import far_values
 from fabricusd.appearance.sampling.blocks import Drawn, sample_far
 from fabricusd.kernels.real import BLOCK, KERNEL, LEAN, as_part
@@ -29,13 +30,16 @@ def gather(hits, first, size, wo, wi):
 
 
 @njit(**LEAN)
-def finish_far(R, hits, first, count, gap, go, towards, onwards):
-    """Write values and weights; the share `gap` of the paths goes straight on.
+def finish_far(R, hits, first, count, passes, go, towards, onwards):
+    """Write values and weights; of each hit's paths, the share `passes` goes straight
+    on.
 
     Works row by row: LLVM vectorises a loop over few rows, because it can check beforehand that
     they do not overlap.
     """
-    keep = R(1) - gap
+    kept, thread, f_pdf = hits[KEEP][first:], hits[THREAD][first:], hits[F_PDF][first:]
+    for k in range(count):
+        kept[k], thread[k] = R(1) - passes[k], R(-1)
     go_pdf, chances = hits[GO_PDF][first:], hits[CHANCE + 3][first:]
     for row in range(3):
         value, direction = hits[F + row][first:], hits[GO + row][first:]
@@ -45,13 +49,12 @@ def finish_far(R, hits, first, count, gap, go, towards, onwards):
         for k in range(count):
             direction[k] = go[row, k]
         for k in range(count):
-            pdf = go_pdf[k] * keep
+            pdf = go_pdf[k] * kept[k]
             weight[k] = onwards[row, k] / pdf if pdf > R(0) else R(0)
-    kept, thread, f_pdf = hits[KEEP][first:], hits[THREAD][first:], hits[F_PDF][first:]
     for k in range(count):
-        kept[k], thread[k] = keep, R(-1)
-        f_pdf[k] *= keep
+        f_pdf[k] *= kept[k]
     for k in range(count):
+        keep = kept[k]
         straight = chances[k] >= keep
         chances[k] = chances[k] if straight else chances[k] / keep
         go_pdf[k] = STRAIGHT if straight else go_pdf[k] * keep
@@ -63,11 +66,14 @@ _gather, _sample_far, _far_values, _finish_far = (
 
 
 @njit(**KERNEL)
-def shade_far(R, tables, sampling, gap, hits, first, last):
-    """Fill rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP and THREAD of hits `first` to before `last`."""
+def shade_far(R, tables, sampling, is_open, hits, first, last):
+    """Fill rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP and THREAD of hits `first` to before `last`.
+
+    is_open : 1 where light passes between the threads, 0 in opaque cloth
+    """
     wo, wi = np.empty((3, BLOCK), np.float32), np.empty((3, BLOCK), np.float32)
     go, towards = np.empty((3, BLOCK), np.float32), np.empty((3, BLOCK), np.float32)
-    onwards = np.empty((3, BLOCK), np.float32)
+    onwards, passes = np.empty((3, BLOCK), np.float32), np.empty(BLOCK, np.float32)
     for start in range(first, last, BLOCK):
         size = min(BLOCK, last - start)
         _gather(hits, start, size, wo, wi)
@@ -76,4 +82,6 @@ def shade_far(R, tables, sampling, gap, hits, first, last):
         _sample_far(R, sampling, wo, wi, numbers, drawn, start, size)
         _far_values(R, tables, wi, wo, towards, 0, size)
         _far_values(R, tables, go, wo, onwards, 0, size)
-        _finish_far(R, hits, start, size, gap, go, towards, onwards)
+        for k in range(size):
+            passes[k] = is_open * laws.openness(R, tables, wo[0, k], wo[1, k], wo[2, k])
+        _finish_far(R, hits, start, size, passes, go, towards, onwards)

@@ -1,4 +1,5 @@
-"""The light that passes between the threads of `conserving` cloth, whose gap has a direction.
+"""The light that passes between the threads of cloth whose gap has a direction: `conserving` cloth,
+and published cloth under a law that says so.
 
 For a path, the shader decides at the hit: by the repeat's gap(w) at level `far`, by the place at
 levels `weave` and `thread` (`appearance.conserving.levels.passing`). A shadow ray has no level and
@@ -13,8 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabricusd.appearance import laws
 from fabricusd.appearance.conserving.facets import WOVEN_TABLE
-from fabricusd.appearance.conserving.grid import share_at
+from fabricusd.appearance.conserving.grid import entry_angles, share_at
 from fabricusd.appearance.conserving.levels import gap_towards, passing
 from fabricusd.appearance.law import PUBLISHED_ONLY, SurfaceLaw
 from fabricusd.appearance.weave.coverage import GAP
@@ -37,10 +39,36 @@ BY_DIRECTION = -2.0
 def gap_table(law: SurfaceLaw, opaque: bool) -> NDArray[np.float32] | None:
     """TABLE of the share that passes cloth of this law; None where it is the same from all
     directions."""
+    if opaque:
+        return None
     gap = law.conserving.gap
-    if law.kind == PUBLISHED_ONLY or opaque or gap.shape != TABLE or gap.max() < OPEN:
+    if law.kind == PUBLISHED_ONLY:
+        gap = np.empty(TABLE, np.float32)
+        polar, azimuth = (x.ravel() for x in entry_angles(*TABLE))
+        towards = np.stack(
+            (np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar))
+        )
+        pass_published(R, law.published, R(1), towards.astype(np.float32), gap.reshape(-1))
+        if np.ptp(gap) < OPEN:
+            return None
+    if gap.shape != TABLE or gap.max() < OPEN:
         return None
     return np.ascontiguousarray(gap, np.float32)
+
+
+@njit(**LEAN)
+def pass_published(R, tables, is_open, wo, out):
+    """`pass_far` of published cloth."""
+    for k in range(out.size):
+        out[k] = is_open * laws.openness(R, tables, wo[0, k], wo[1, k], wo[2, k])
+
+
+@njit(**LEAN)
+def pass_gaps(R, tables, is_open, wo, out):
+    """Write the probability with which each viewer's ray passes a gap of published cloth."""
+    for k in range(out.size):
+        share = laws.openness(R, tables, wo[0, k], wo[1, k], wo[2, k])
+        out[k] = is_open * min(R(1), share / tables.gap) if tables.gap > R(0) else R(0)
 
 
 @njit(**LEAN)
