@@ -91,8 +91,8 @@ NONE, PEAK, HORIZON, TRACED = range(4)
 TRACED_SOFTNESS = math.radians(1.0)
 """Width [rad] of the soft edge used for the mean of `traced`; the marched `g` has a hard edge."""
 
-_COLUMNS = (1, 4, 64, 64)
-"""Azimuths for the mean of each method: for `horizon` four to each of the table's, so that places
+_COLUMNS = (1, 4, 128, 64)
+"""Azimuths for the mean of each method: for `horizon` eight to each of the table's, so that places
 keep their order from one to the next."""
 
 PEAK_SOFTNESS = math.radians(5.0)
