@@ -50,8 +50,28 @@ def threads(draw: st.DrawFn) -> Thread:
         curve=draw(curves()),
         model=draw(st.sampled_from(("", *MODELS))),
         color=draw(COLORS),
+        **draw(yarns()),
         documentation=draw(TEXT),
     )
+
+
+@st.composite
+def yarns(draw: st.DrawFn) -> dict[str, float | int]:
+    """Fields of a thread that say how even it is; half of all threads are."""
+    if draw(st.booleans()):
+        return {}
+    slub = draw(scaled(0.1, 50, 1e-3))
+    return {
+        "unevenness_cv": draw(numbers(0, 0.5)),
+        "unevenness_length": draw(scaled(0.5, 50, 1e-3)),
+        "unevenness_count": draw(numbers(0, 0.3)),
+        "unevenness_shade": draw(numbers(0, 0.5)),
+        "slub_amount": draw(numbers(0, 2)),
+        "slub_length": slub,
+        "slub_spacing": slub * draw(st.integers(1, 9)),
+        "plies": draw(st.integers(1, 4)),
+        "twist": draw(numbers(-2000, 2000)),
+    }
 
 
 @st.composite
@@ -83,6 +103,7 @@ def fabrics(draw: st.DrawFn, back: bool = True) -> Fabric:
         model=draw(st.sampled_from(MODELS)),
         opaque=draw(st.booleans()),
         masking_width=draw(degrees(1, 90)),
+        unevenness_seed=draw(st.integers(0, 2**31 - 1)),
         back=draw(st.none() | fabrics(back=False)) if back else None,
         documentation=draw(TEXT),
     )

@@ -30,7 +30,7 @@ def conserving_level_value(R, tables, across_too, place, ix, iy, iz, ox, oy, oz)
     _, b_o, n_o = to_thread(R, place.thread_set, c, s, ox, oy, oz)
     on_surface, on_volume = across_at(R, row, place.w, b_i, n_i, b_o, n_o)
     scale /= c
-    surface, volume = surface * on_surface * scale, volume * on_volume * scale
+    surface, volume = surface * on_surface * scale, volume * on_volume * scale * R(place.shade)
     share = multiple_share(R, tables, ix, iy, iz, ox, oy, oz) / tables.covered
     return (
         surface + volume * row[ALBEDO_R] + share * tables.strength[0],

@@ -199,6 +199,7 @@ def conserving_point_single(R, tables, place, ix, iy, iz, ox, oy, oz):
     angle = min(max(place.psi0, R(-PILE_ANGLE)), R(PILE_ANGLE))
     c, s = cos(R, angle), sin(R, angle)
     surface, volume = facet_terms(R, row, place.thread_set, c, s, ix, iy, iz, ox, oy, oz)
+    volume *= R(place.shade)
     scale /= max(c, R(_STEEPEST_COS))
     return (
         scale * (surface + volume * row[ALBEDO_R]),

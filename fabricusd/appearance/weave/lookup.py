@@ -20,6 +20,8 @@ from fabricusd.appearance.weave.bands import band_areas
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, coverage
 from fabricusd.appearance.weave.place import Places
+from fabricusd.appearance.yarn.compiled import Yarn, compile_yarn
+from fabricusd.appearance.yarn.lay import laid, strands_all
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave
 from fabricusd.kernels.real import INLINE, KERNEL, PART, index
@@ -45,6 +47,9 @@ class WeaveHit(NamedTuple):
     height : (n,) float - height of the thread's axis above the ends of the run [m]
     crown : (n,) float - height of the round thread's surface above its axis at `across` [m]
     gap : (n,) bool - whether no thread is seen
+    number : (n,) int64 - of the thread in its set, from the corner of the cloth
+    strand : (n,) float - position across the strand that is seen, of a thread of plies; else w
+    shade : (n,) float - factor of the thread's albedo; (0,) where that is 1 everywhere
     """
 
     set: NDArray[np.uint8]
@@ -55,11 +60,14 @@ class WeaveHit(NamedTuple):
     height: NDArray[Any]
     crown: NDArray[Any]
     gap: NDArray[np.bool_]
+    number: NDArray[np.int64]
+    strand: NDArray[Any]
+    shade: NDArray[Any]
 
     @property
     def places(self) -> Places:
         """The hits as the kernels of the surface laws take them, in the precision of the lookup."""
-        return Places(self.set, self.thread, self.angle, self.across)
+        return Places(self.set, self.thread, self.angle, self.strand, self.shade)
 
 
 @njit(**INLINE)
@@ -335,15 +343,19 @@ def heights_all(R, cloth, sets, threads, s, w, length, height, crown):
             crown[k] = crown_on(R, cloth, sets[k], threads[k], w[k])
 
 
-def lookup(cloth: Fabric | CompiledFabric, uv_threads: ArrayLike) -> WeaveHit:
+def lookup(
+    cloth: Fabric | CompiledFabric, uv_threads: ArrayLike, yarn: Yarn | None = None
+) -> WeaveHit:
     """The thread under each of (n, 2) weave coordinates, in threads.
 
-    A `Fabric` is compiled for float64; with a `CompiledFabric` the result has its precision. The
+    A `Fabric` is compiled for float64, its yarn included; with a `CompiledFabric` the result has
+    its precision, and its threads are even unless `yarn` says how they are not. The
     coordinates must already include the rotation of the grain: `Binding.weave_coordinates`. Raises
     `FabricError` for coordinates that are not finite or lie beyond 2^52 threads, where float64 has
     no fractional part.
     """
     if isinstance(cloth, Fabric):
+        yarn = compile_yarn(cloth, precision=np.float64) if cloth.is_uneven else None
         cloth = compile_fabric(cloth, precision=np.float64)
     uv = np.ascontiguousarray(uv_threads, np.float64)
     if uv.ndim != 2 or uv.shape[1] != 2:
@@ -360,9 +372,20 @@ def lookup(cloth: Fabric | CompiledFabric, uv_threads: ArrayLike) -> WeaveHit:
     n = len(uv)
     sets, threads = np.empty(n, np.uint8), np.empty(n, np.int32)
     s, w, angle, length, height, crown = (np.empty(n, real) for _ in range(6))
-    find_all(real, cloth, uv, sets, threads, s, w, angle, length)
+    if yarn is None:
+        places, numbers = uv, np.floor(uv[:, ::-1]).astype(np.int64)
+    else:
+        places, numbers, shades = laid(yarn, uv)
+    find_all(real, cloth, places, sets, threads, s, w, angle, length)
     heights_all(real, cloth, sets, threads, s, w, length, height, crown)
-    return WeaveHit(sets, threads, s, w, angle, height, crown, sets == GAP)
+    strand, shade = w, np.empty(0, real)
+    on = np.arange(n), (sets == WARP).astype(np.intp)
+    if yarn is not None:
+        strand, shade = np.empty(n, real), shades[on].astype(real)
+        strands_all(real, yarn, uv, sets, threads, numbers, w, strand)
+    return WeaveHit(
+        sets, threads, s, w, angle, height, crown, sets == GAP, numbers[on], strand, shade
+    )
 
 
 NO_THREAD = -1
@@ -413,5 +436,6 @@ def back_of(fabric: Fabric) -> Fabric:
         model=fabric.model,
         opaque=fabric.opaque,
         masking_width=fabric.masking_width,
+        unevenness_seed=fabric.unevenness_seed,
         documentation=fabric.documentation,
     )

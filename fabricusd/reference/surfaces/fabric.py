@@ -27,9 +27,11 @@ from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.sampling.blocks import Drawn, sample_points
 from fabricusd.appearance.shadow.methods import NONE, Shadow, compile_shadow, shade
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.weave.coverage import GAP, WARP
+from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
 from fabricusd.appearance.weave.lookup import back_of, find
 from fabricusd.appearance.weave.place import Hit, Places, place_at
+from fabricusd.appearance.yarn.compiled import compile_yarn
+from fabricusd.appearance.yarn.lay import NOT_LAID, lay, sound, strand
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE, LEAN
 from fabricusd.reference.rays.embree import aligned_empty
@@ -37,10 +39,12 @@ from fabricusd.reference.rays.wave import (
     CHANCE,
     F_PDF,
     FAR_LEVEL,
+    FOOTPRINT,
     GO,
     GO_PDF,
     KEEP,
     PLACE,
+    PRIMITIVE,
     THREAD,
     THREAD_LEVEL,
     WEIGHT,
@@ -51,12 +55,16 @@ from fabricusd.reference.surfaces.fabric_far import STRAIGHT, finish_far, gather
 
 R = np.float32
 _ONE_AT_A_TIME = threading.Lock()
+NOWHERE_ELSE = np.zeros((0, 2), np.int64)
+"""`TriangleTables.home` of a scene without uneven threads."""
 
 
 class Points(NamedTuple):
     """The thread under each of n hits, as `weave.lookup.find` gives it.
 
     sets : (n,) uint8; threads : (n,) int32; along, across, psi0, length : (n,) float32
+    strand : (n,) float32 - position across the strand of plies; `across` itself where none shows
+    shade : (n,) float32 - factor of the albedo; (0,) for even threads
     """
 
     sets: NDArray[np.uint8]
@@ -65,11 +73,13 @@ class Points(NamedTuple):
     across: NDArray[np.float32]
     psi0: NDArray[np.float32]
     length: NDArray[np.float32]
+    strand: NDArray[np.float32]
+    shade: NDArray[np.float32]
 
 
 def places_of(points: Points) -> Places:
     """What the surface laws read of `points`."""
-    return Places(points.sets, points.threads, points.psi0, points.across)
+    return Places(points.sets, points.threads, points.psi0, points.strand, points.shade)
 
 
 class Scattering(NamedTuple):
@@ -97,24 +107,31 @@ class _Scratch:
         self.across = aligned_empty((capacity,))
         self.along = aligned_empty((capacity,))
         self.length = aligned_empty((capacity,))
+        self.strand = aligned_empty((capacity,))
+        self.shade = aligned_empty((capacity,))
 
     def scattering(self, count: int) -> Scattering:
         """C-contiguous arrays for `count` hits."""
         return Scattering(*(v[: 3 * count].reshape(3, count) for v in self.vectors))
 
-    def points(self, count: int) -> Points:
+    def points(self, count: int, *, uneven: bool) -> Points:
         """Arrays for `count` hits."""
+        across = self.across[:count]
         return Points(
-            self.sets[:count], self.threads[:count], self.along[:count], self.across[:count],
+            self.sets[:count], self.threads[:count], self.along[:count], across,
             self.psi0[:count], self.length[:count],
+            self.strand[:count] if uneven else across, self.shade[: count if uneven else 0],
         )  # fmt: skip
 
 
 class _Side:
     """The tables of one side of a cloth, made on demand."""
 
-    def __init__(self, fabric: Fabric, shadow: str, make_ready: Callable[[], None]) -> None:
+    def __init__(
+        self, fabric: Fabric, front: Fabric | None, shadow: str, make_ready: Callable[[], None]
+    ) -> None:
         self.fabric, self.method, self.make_ready = fabric, shadow, make_ready
+        self.yarn = compile_yarn(fabric, back_of=front) if fabric.is_uneven else None
         self.types = len(fabric.threads)
         self._law: SurfaceLaw | None = None
         self._near: dict[int, tuple[CompiledFabric, Shadow]] = {}
@@ -147,13 +164,18 @@ class FabricShader:
 
     shadow : one of `shadow.METHODS`, at levels `weave` and `thread`
     make_ready : called before the first hit at one of those levels; many pictures have none
+
+    home : `TriangleTables.home` of the scene, read if the threads are uneven
     """
 
     def __init__(
         self, fabric: Fabric, shadow: str, make_ready: Callable[[], None] = lambda: None
     ) -> None:
-        self.fabric = fabric
-        self.sides = tuple(_Side(f, shadow, make_ready) for f in (fabric, back_of(fabric)))
+        self.fabric, self.home = fabric, NOWHERE_ELSE
+        self.sides = (
+            _Side(fabric, None, shadow, make_ready),
+            _Side(back_of(fabric), fabric, shadow, make_ready),
+        )
         self.gap = 0.0 if fabric.opaque else float(self.sides[0].law.published.gap)
 
     def __call__(self, level: int, back: int, wave: Wave, first: int, last: int) -> None:
@@ -169,8 +191,8 @@ class FabricShader:
         if level == FAR_LEVEL:
             self._shade_by_law(side, hits, first, scattering)
         else:
-            points = scratch.points(last - first)
-            self._shade_near(side, level, back, hits, first, scattering, points)
+            points = scratch.points(last - first, uneven=side.yarn is not None)
+            self._shade_near(side, level, back, wave, first, scattering, points)
 
     def _shade_by_law(
         self, side: _Side, hits: NDArray[np.float32], first: int, scattering: Scattering
@@ -179,7 +201,7 @@ class FabricShader:
         _, _, go, towards, onwards = scattering
         count = go.shape[1]
         none, real = np.zeros(count, np.uint8), np.zeros(count, np.float32)
-        points = Points(none, none.astype(np.int32), real, real, real, real)
+        points = Points(none, none.astype(np.int32), real, real, real, real, real, real[:0])
         _by_law(R, side.law, FAR_LEVEL, hits, first, scattering, places_of(points))
         finish_far(R, hits, first, count, R(self.gap), go, towards, onwards)
 
@@ -188,17 +210,24 @@ class FabricShader:
         side: _Side,
         level: int,
         back: int,
-        hits: NDArray[np.float32],
+        wave: Wave,
         first: int,
         scattering: Scattering,
         points: Points,
     ) -> None:
         wo, wi, go, towards, onwards = scattering
+        hits = wave.hits.rows
         law, (cloth, shadow) = side.law, side.near(level)
         count = wo.shape[1]
         places = places_of(points)
         v_sign = R(-1) if back else R(1)
-        look_up(R, cloth, v_sign, hits, first, points)
+        if side.yarn is None:
+            look_up(R, cloth, v_sign, hits, first, points)
+        else:
+            look_up_uneven(
+                R, cloth, side.yarn, self.home, v_sign, wave.hits.tags[PRIMITIVE], hits, first,
+                points,
+            )  # fmt: skip
         if law.kind == PUBLISHED_ONLY:
             sample_points(
                 R, law.published.threads, law.lobes, level == THREAD_LEVEL, places, wo, wi,
@@ -261,7 +290,7 @@ def _finish(hits, h, keep, k, go, onwards):
 @njit(**LEAN)
 def look_up(R, cloth, v_sign, hits, first, points):
     """Look up the thread under each hit."""
-    sets, threads, along, across, psi0, length = points
+    sets, threads, along, across, psi0, length, _, _ = points
     for k in range(sets.shape[0]):
         h = first + k
         which, thread, s, w, angle, run = find(
@@ -272,10 +301,43 @@ def look_up(R, cloth, v_sign, hits, first, points):
 
 
 @njit(**LEAN)
+def look_up_uneven(R, cloth, yarn, home, v_sign, triangles, hits, first, points):
+    """Look up the uneven thread under each hit; PLACE becomes the place of the even cloth at which
+    that thread lies, for the shadows.
+
+    home : `TriangleTables.home`; triangles : (n,) of each hit
+    """
+    sets, threads, along, across, psi0, length, strands, shades = points
+    for k in range(sets.shape[0]):
+        h = first + k
+        u, v = float(hits[PLACE, h]), float(hits[PLACE + 1, h])
+        ends, picks = home[triangles[h], 0], home[triangles[h], 1]
+        warp, weft = NOT_LAID, NOT_LAID
+        whole_u, whole_v = u + ends, v + picks
+        if sound(whole_u, whole_v):
+            blur = hits[FOOTPRINT, h] * R(yarn.cell[WEFT])
+            warp, weft = lay(R, yarn, whole_u, whole_v, blur)
+            u = float(warp.number - ends) + float(warp.place)
+            v = float(weft.number - picks) + float(weft.place)
+        which, thread, s, w, angle, run = find(R, cloth, u, v_sign * v)
+        sets[k], threads[k], along[k], across[k] = which, thread, s, w
+        psi0[k], length[k], strands[k], shades[k] = angle, run, w, R(1)
+        if which == WARP:
+            shades[k] = warp.shade
+            strands[k] = strand(
+                R, yarn, WARP, thread, warp.number, w, v_sign * whole_v * yarn.cell[WARP]
+            )
+        elif which == WEFT:
+            shades[k] = weft.shade
+            strands[k] = strand(R, yarn, WEFT, thread, weft.number, w, whole_u * yarn.cell[WEFT])
+        hits[PLACE, h], hits[PLACE + 1, h] = R(u), R(v)
+
+
+@njit(**LEAN)
 def finish_point(R, cloth, shadow, v_sign, open_gap, types, hits, first, scattering, points):
     """Apply the shadowing of neighbouring threads; in a gap, the path goes straight on or ends."""
     _, wi, go, towards, onwards = scattering
-    sets, threads, along, across, _, length = points
+    sets, threads, along, across, _, length, _, _ = points
     for k in range(wi.shape[1]):
         h = first + k
         if sets[k] == GAP:

@@ -1,0 +1,126 @@
+"""Noise along a thread and from thread to thread, whose mean vanishes as fast as a mean can.
+
+The noise of a thread is a cubic B-spline over a lattice of hashed numbers in which the neighbours
+2i and 2i + 1 are opposite. Whole pairs sum to nothing, so the mean over a window falls as one over
+its length, where that of independent numbers falls as the root of it. Each thread has a phase of
+its own: otherwise all threads would be even where the two of a pair meet. Numbers from thread to
+thread are opposite in pairs, too.
+
+A hash of 32 bits makes two numbers of 16 bits: one for the width, one for the shade.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabricusd.kernels.real import INLINE
+
+Floats = NDArray[np.float64]
+
+_U = np.uint32
+
+
+@njit(**INLINE)
+def mixed(x):
+    """Hash 32 bits to 32 bits: `lowbias32` of [Wellons2018]."""
+    x = _U(x)
+    x = _U(x ^ _U(x >> _U(16)))
+    x = _U(x * _U(0x7FEB352D))
+    x = _U(x ^ _U(x >> _U(15)))
+    x = _U(x * _U(0x846CA68B))
+    return _U(x ^ _U(x >> _U(16)))
+
+
+@njit(**INLINE)
+def key_of(seed, which, number):
+    """The key of thread `number` (int64) of a set."""
+    return mixed(_U(mixed(_U(_U(number) ^ seed)) + _U(which)))
+
+
+@njit(**INLINE)
+def hashed(key, number):
+    """Hash `number` (int64) under a key."""
+    return mixed(_U(key + _U(_U(number) * _U(0x9E3779B1))))
+
+
+@njit(**INLINE)
+def low(R, h):
+    """The lower 16 bits of a hash as a number in (-1, 1)."""
+    return R(np.int32(h & _U(0xFFFF))) * R(2.0**-15) - R(1.0 - 2.0**-16)
+
+
+@njit(**INLINE)
+def high(R, h):
+    """The upper 16 bits of a hash as a number in (-1, 1)."""
+    return R(np.int32(h >> _U(16))) * R(2.0**-15) - R(1.0 - 2.0**-16)
+
+
+@njit(**INLINE)
+def along(R, key, x):
+    """(first, second): two independent noises of a thread at x (float64) in lattice distances.
+
+    Their variance is VARIANCE, and they lie within PEAK of 0.
+    """
+    x += R(np.int32(key & _U(0xFFFF))) * 2.0**-15
+    whole = np.floor(x)
+    t = R(x - whole)
+    i = np.int64(whole)
+    s = R(1) - t
+    b0, b3 = s * s * s, t * t * t
+    b1 = R(4) - t * t * (R(6) - R(3) * t)
+    b2 = R(6) - b0 - b1 - b3
+    a = (i - 1) >> 1
+    odd = (i & 1) != 0
+    c0 = b0 - b1 if odd else -b0
+    c1 = b2 - b3 if odd else b1 - b2
+    c2 = R(0) if odd else b3
+    h0, h1, h2 = hashed(key, a), hashed(key, a + 1), hashed(key, a + 2)
+    sixth = R(1.0 / 6.0)
+    return (
+        sixth * (c0 * low(R, h0) + c1 * low(R, h1) + c2 * low(R, h2)),
+        sixth * (c0 * high(R, h0) + c1 * high(R, h1) + c2 * high(R, h2)),
+    )
+
+
+@njit(**INLINE)
+def between(R, seed, which, number):
+    """(first, second): two independent numbers in (-1, 1) of a thread; 2k and 2k + 1 are
+    opposite."""
+    h = mixed(_U(key_of(seed, which + 2, number >> 1)))
+    sign = R(-1) if number & 1 else R(1)
+    return sign * low(R, h), sign * high(R, h)
+
+
+def _transfer(window: float, steps: int = 64) -> Floats:
+    """(phases, lattice points) weights of the lattice points in the mean over `window` lattice
+    distances, at phases over two of them."""
+    reach = math.ceil(window / 2) + 4
+    t = np.arange(-2, 2, 1.0 / steps) + 0.5 / steps
+    a = np.abs(t)
+    spline = np.where(a < 1, (4 - 6 * a**2 + 3 * a**3) / 6, np.maximum(2 - a, 0) ** 3 / 6)
+    total = np.concatenate(([0.0], np.cumsum(spline))) / steps
+    phase = np.arange(2 * steps) / steps
+    lattice = np.arange(-2 * reach, 2 * reach)
+    ends = np.concatenate((t - 0.5 / steps, [2.0]))
+    half = max(window, 1.0 / steps) / 2
+    right, left = (
+        np.interp(phase[:, None] + side * half - lattice, ends, total) for side in (1, -1)
+    )
+    return np.asarray((right - left) / (2 * half))
+
+
+def variance(window: float) -> float:
+    """Variance of the mean of a noise over `window` lattice distances."""
+    w = _transfer(window)
+    pairs = w[:, 0::2] - w[:, 1::2]
+    return float((pairs**2).sum(axis=1).mean() / 3.0)
+
+
+VARIANCE = variance(0.0)
+
+PEAK = float(np.abs(_transfer(0.0)[:, 0::2] - _transfer(0.0)[:, 1::2]).sum(axis=1).max())
+"""The greatest value that a noise can have."""
