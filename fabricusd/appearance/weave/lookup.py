@@ -21,7 +21,7 @@ from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, coverage
 from fabricusd.appearance.weave.place import Places
 from fabricusd.appearance.yarn.compiled import Yarn, compile_yarn
-from fabricusd.appearance.yarn.lay import laid, strands_all
+from fabricusd.appearance.yarn.lay import crest, laid, strands_all
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave
 from fabricusd.kernels.real import INLINE, KERNEL, PART, index
@@ -343,6 +343,33 @@ def heights_all(R, cloth, sets, threads, s, w, length, height, crown):
             crown[k] = crown_on(R, cloth, sets[k], threads[k], w[k])
 
 
+@njit(parallel=True, **KERNEL)
+def crests_all(R, cloth, yarn, uv, sets, threads, numbers, s, length, angle):
+    """Write the tangent angle at the `crest` of each place to angle (n,).
+
+    uv : (n, 2) - places on the even cloth; numbers : (n, 2) int64 as in `Laid`; the others are what
+        `find_all` gives there
+    """
+    for k in prange(uv.shape[0]):
+        which = int(sets[k])
+        if which != GAP and length[k] > R(0):
+            angle[k] = crest_angle(
+                R, cloth, yarn, which, threads[k], numbers[k, which], s[k], length[k],
+                uv[k, 1] if which == WARP else uv[k, 0],
+            )  # fmt: skip
+
+
+@njit(**INLINE)
+def crest_angle(R, cloth, yarn, which, thread, number, s, length, place):
+    """Tangent angle [rad] at `s` of a visible run of an uneven thread.
+
+    number : of the thread; length : of the run [m]; place : where s lies along the thread of the
+        even cloth [cells], float64
+    """
+    moved = crest(R, yarn, which, thread, number, s, length / R(yarn.cell[which]), place)
+    return angle_on(R, cloth, thread, min(moved, cloth.last))
+
+
 def lookup(
     cloth: Fabric | CompiledFabric, uv_threads: ArrayLike, yarn: Yarn | None = None
 ) -> WeaveHit:
@@ -381,6 +408,7 @@ def lookup(
     strand, shade = w, np.empty(0, real)
     on = np.arange(n), (sets == WARP).astype(np.intp)
     if yarn is not None:
+        crests_all(real, cloth, yarn, places, sets, threads, numbers, s, length, angle)
         strand, shade = np.empty(n, real), shades[on].astype(real)
         strands_all(real, yarn, uv, sets, threads, numbers, w, strand)
     return WeaveHit(

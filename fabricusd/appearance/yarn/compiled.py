@@ -28,12 +28,21 @@ LEAST = 0.15
 SPREAD = 0.5
 """Heights of slubs lie within this of their mean, relative to it."""
 
+STRAY = 1.0
+"""How far threads lie off their places where there is room, in pitches, over the variation of their
+width."""
+
+CRESTS, FARTHEST_CREST = 10.0, 0.8
+"""How far the crests of runs move at most, times 4, over the variation of the mass; and its limit:
+at 1, a crest would reach the end of its run."""
+
 BUMP = 8.0 / 15.0
 """Mean of a slub's (1 - x^2)^2 over its length."""
 
-(RATE, WIDTH, COUNT, SHADE, SLUB, SLUB_RATE, SLUB_HALF, SLUB_MEAN, STRANDS, WINDING, COLUMNS) = (
-    range(11)
-)
+(
+    RATE, WIDTH, COUNT, SHADE, SLUB, SLUB_RATE, SLUB_HALF, SLUB_MEAN, STRANDS, WINDING, CREST,
+    COLUMNS,
+) = range(12)  # fmt: skip
 """Columns of `Yarn.rows`.
 RATE : 1/(length of the lattice) [1/m]
 WIDTH, COUNT : relative change of the width per unit of noise along the thread, and between threads
@@ -41,15 +50,17 @@ SHADE : relative change of the albedo per unit of noise
 SLUB : change of the width in the middle of a mean slub
 SLUB_RATE, SLUB_HALF, SLUB_MEAN : slubs per metre, half their length over their distance, mean of
     the slubs along the thread
+CREST : how far the crest of a run moves at most, times 4 [runs]
 STRANDS, WINDING : strands seen across the thread, strands that pass per metre times 2; 0 if single
 """
 
-(OF_WIDTH, OWN, SHARED, MOST, SET_COLUMNS) = range(5)
+(OF_WIDTH, OWN, SHARED, MOST, ASTRAY, SET_COLUMNS) = range(6)
 """Columns of `Yarn.sets`.
 OF_WIDTH : `CompiledFabric.width`
 OWN : share of a thread's unevenness by which its edges part
 SHARED : by how much the border between two threads moves for a unit of difference [cells]
 MOST : how far a border can move [cells]
+ASTRAY : how far a thread lies off its place for a unit of unevenness [cells]
 """
 
 
@@ -124,6 +135,7 @@ def _row(fabric: Fabric, t: Thread) -> NDArray[np.float64]:
         row[SLUB], row[SLUB_RATE] = t.slub_amount, 1.0 / t.slub_spacing
         row[SLUB_HALF] = 0.5 * t.slub_length / t.slub_spacing
         row[SLUB_MEAN] = t.slub_amount * BUMP * t.slub_length / t.slub_spacing
+    row[CREST] = min(FARTHEST_CREST, CRESTS * math.hypot(t.unevenness_cv, t.unevenness_count))
     if t.shows_plies:
         row[STRANDS] = (t.plies + 1) // 2
         row[WINDING] = 2.0 * t.plies * t.twist
@@ -161,4 +173,6 @@ def _of_set(width: float, rows: NDArray[np.float64]) -> NDArray[np.float64]:
     out[OWN] = p
     out[SHARED] = a * width
     out[MOST] = 0.5 * width * (1.0 - LEAST - p * thinner)
+    if along.max() > 0:
+        out[ASTRAY] = min(STRAY, 0.5 * (1.0 - width * (1.0 + p * thicker)) / float(along.max()))
     return out

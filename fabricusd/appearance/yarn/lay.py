@@ -1,6 +1,7 @@
 """Lay uneven threads: a map of the weave's coordinates to those of the even cloth.
 
-Where a thread is thick, its edges part; where threads touch, the border between them moves. The map
+Where a thread is thick, its edges part; where threads touch, the border between them moves; where
+there is a gap, threads stray into it. The map
 takes a place of the cloth to the place of the even cloth at which the same thread is seen, as far
 across it; all that is known of a place of the even cloth is then looked up there. Across a set the
 map is linear in pieces: thread to thread, gap to gap. A thread is 1 + e times as wide, with e of
@@ -20,7 +21,9 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.weave.coverage import WARP, WEFT
 from fabricusd.appearance.yarn.compiled import (
+    ASTRAY,
     COUNT,
+    CREST,
     MOST,
     OF_WIDTH,
     OWN,
@@ -37,7 +40,16 @@ from fabricusd.appearance.yarn.compiled import (
     WINDING,
     Yarn,
 )
-from fabricusd.appearance.yarn.noise import VARIANCE, along, between, hashed, high, key_of, low
+from fabricusd.appearance.yarn.noise import (
+    VARIANCE,
+    along,
+    between,
+    first,
+    hashed,
+    key_of,
+    second,
+    third,
+)
 from fabricusd.kernels.real import INLINE, KERNEL
 
 FARTHEST = 2.0**52
@@ -72,23 +84,25 @@ def type_of(yarn, which, number):
 
 @njit(**INLINE)
 def thickness(R, yarn, which, number, metres, blur):
-    """(e, shade) of thread `number` (int64) of a set at `metres` (float64) along it.
+    """(e, aside, shade) of thread `number` (int64) of a set at `metres` (float64) along it.
 
-    e : its width is 1 + e times that of the even thread; shade : factor of its albedo
+    e : its width is 1 + e times that of the even thread
+    aside : where it lies between its neighbours, in the same units; shade : factor of its albedo
     blur : extent of the footprint along the thread [m], which evens the noise out
     """
     row = yarn.rows[which, type_of(yarn, which, number)]
     key = key_of(yarn.seed, which, number)
-    wide, light = along(R, key, metres * row[RATE])
-    count, tone = between(R, yarn.seed, which, number)
+    wide, light, beside = along(R, key, metres * row[RATE])
+    count, tone, place = between(R, yarn.seed, which, number)
     f = blur * row[RATE]
     sharp = R(1) / (R(1) + f * f)
     e = sharp * row[WIDTH] * wide + row[COUNT] * count
+    aside = sharp * row[WIDTH] * beside + row[COUNT] * place
     if row[SLUB] > R(0):
         g = blur * row[SLUB_RATE] / row[SLUB_HALF]
         e += _slub(R, row, key, metres) / (R(1) + R(0.25) * g * g)
     shade = R(1) + row[SHADE] * (sharp * R(_SHADE_ALONG) * light + R(_SHADE_BETWEEN) * tone)
-    return e, shade
+    return e, aside, shade
 
 
 @njit(**INLINE)
@@ -98,9 +112,9 @@ def _slub(R, row, key, metres):
     whole = np.floor(x)
     n = np.int64(whole)
     pair, own = hashed(_U(~key), n >> 1), hashed(_U(key ^ _U(0x5BD1E995)), n)
-    tall = R(1) + (R(-SPREAD) if n & 1 else R(SPREAD)) * low(R, pair)
+    tall = R(1) + (R(-SPREAD) if n & 1 else R(SPREAD)) * first(R, pair)
     room = R(0.5) - row[SLUB_HALF]
-    d = (R(x - whole) - R(0.5) - room * high(R, own)) / row[SLUB_HALF]
+    d = (R(x - whole) - R(0.5) - room * second(R, own)) / row[SLUB_HALF]
     rest = max(R(0), R(1) - d * d)
     return row[SLUB] * tall * rest * rest - row[SLUB_MEAN]
 
@@ -119,33 +133,34 @@ def lateral(R, yarn, which, across, metres, blur):
     width, own, shared, most = columns[OF_WIDTH], columns[OWN], columns[SHARED], columns[MOST]
     whole = np.floor(across)
     number, y = np.int64(whole), R(across - whole)
-    e, shade = thickness(R, yarn, which, number, metres, blur)
+    e, aside, shade = thickness(R, yarn, which, number, metres, blur)
     left, right = R(0), R(0)
     if shared > R(0):
         step = -1 if y < R(0.5) else 1
-        near, near_shade = thickness(R, yarn, which, number + step, metres, blur)
+        near, near_aside, near_shade = thickness(R, yarn, which, number + step, metres, blur)
         border = _moved(shared, most, (near - e) if step < 0 else (e - near))
         beyond = y < border if step < 0 else y >= R(1) + border
         # The other border of the thread that is seen.
         if beyond:
             number += step
             y -= R(step)
-            third, _ = thickness(R, yarn, which, number + step, metres, blur)
-            other = _moved(shared, most, (third - near) if step < 0 else (near - third))
-            e, shade = near, near_shade
+            further, _, _ = thickness(R, yarn, which, number + step, metres, blur)
+            other = _moved(shared, most, (further - near) if step < 0 else (near - further))
+            e, aside, shade = near, near_aside, near_shade
             left, right = (other, border) if step < 0 else (border, other)
         else:
-            third, _ = thickness(R, yarn, which, number - step, metres, blur)
-            other = _moved(shared, most, (e - third) if step < 0 else (third - e))
+            further, _, _ = thickness(R, yarn, which, number - step, metres, blur)
+            other = _moved(shared, most, (e - further) if step < 0 else (further - e))
             left, right = (border, other) if step < 0 else (other, border)
     half = R(0.5) * width
     grown = half * (R(1) + own * e) + R(0.5) * (right - left)
-    d = y - R(0.5) - R(0.5) * (right + left)
+    astray = columns[ASTRAY] * aside
+    d = y - R(0.5) - R(0.5) * (right + left) - astray
     a = abs(d)
     if a <= grown:
         d *= half / grown
     else:
-        room = R(0.5) + R(0.5) * (right - left) - grown
+        room = R(0.5) + R(0.5) * (right - left) - grown - (astray if d > R(0) else -astray)
         a = half + min(R(1), (a - grown) / max(room, R(1e-6))) * (R(0.5) - half)
         d = a if d > R(0) else -a
     return Lateral(number, min(max(d + R(0.5), R(0)), R(0.9999999)), shade)
@@ -160,6 +175,24 @@ def lay(R, yarn, u, v, blur):
     warp = lateral(R, yarn, WARP, u, v * yarn.cell[WARP], blur)
     weft = lateral(R, yarn, WEFT, v, u * yarn.cell[WEFT], blur)
     return warp, weft
+
+
+@njit(**INLINE)
+def crest(R, yarn, which, thread, number, s, cells, place):
+    """Place on the even run at which the curve is as steep as at `s` on this run, both in [0, 1].
+
+    cells : length of the run; place : where s lies along the thread of the even cloth (float64),
+        which tells one run of the thread from the next
+
+    The crest of each run is moved by q s (1 - s), of the place on the even run, with q of mean 0:
+    every place is as long as on the even run, on average.
+    """
+    most = yarn.rows[which, thread, CREST]
+    begun = np.int64(np.rint(place - float(s) * float(cells)))
+    key = _U(key_of(yarn.seed, which, number) ^ _U(0xA511E9B3))
+    q = most * third(R, hashed(key, begun))
+    b = R(1) + q
+    return R(2) * s / (b + np.sqrt(max(R(0), b * b - R(4) * q * s)))
 
 
 @njit(**INLINE)
@@ -254,12 +287,13 @@ def _widths(R, yarn, which, numbers, metres, out):
     columns = yarn.sets[which]
     for k in range(numbers.size):
         at, place = numbers[k], metres[k]
-        e, shade = thickness(R, yarn, which, at, place, R(0))
+        e, aside, shade = thickness(R, yarn, which, at, place, R(0))
         left, right = R(0), R(0)
         if columns[SHARED] > R(0):
-            before, _ = thickness(R, yarn, which, at - 1, place, R(0))
-            after, _ = thickness(R, yarn, which, at + 1, place, R(0))
+            before, _, _ = thickness(R, yarn, which, at - 1, place, R(0))
+            after, _, _ = thickness(R, yarn, which, at + 1, place, R(0))
             left = _moved(columns[SHARED], columns[MOST], before - e)
             right = _moved(columns[SHARED], columns[MOST], e - after)
         half = R(0.5) * columns[OF_WIDTH] * (R(1) + columns[OWN] * e)
-        out[k, 0], out[k, 1], out[k, 2] = R(0.5) - half + left, R(0.5) + half + right, shade
+        middle = R(0.5) + columns[ASTRAY] * aside
+        out[k, 0], out[k, 1], out[k, 2] = middle - half + left, middle + half + right, shade

@@ -6,7 +6,8 @@ its length, where that of independent numbers falls as the root of it. Each thre
 its own: otherwise all threads would be even where the two of a pair meet. Numbers from thread to
 thread are opposite in pairs, too.
 
-A hash of 32 bits makes two numbers of 16 bits: one for the width, one for the shade.
+A hash of 32 bits makes three independent numbers: for the width, for the shade, and for where the
+thread lies.
 """
 
 from __future__ import annotations
@@ -48,20 +49,26 @@ def hashed(key, number):
 
 
 @njit(**INLINE)
-def low(R, h):
-    """The lower 16 bits of a hash as a number in (-1, 1)."""
-    return R(np.int32(h & _U(0xFFFF))) * R(2.0**-15) - R(1.0 - 2.0**-16)
+def first(R, h):
+    """The lowest 11 bits of a hash as a number in (-1, 1)."""
+    return R(np.int32(h & _U(0x7FF))) * R(2.0**-10) - R(1.0 - 2.0**-11)
 
 
 @njit(**INLINE)
-def high(R, h):
-    """The upper 16 bits of a hash as a number in (-1, 1)."""
-    return R(np.int32(h >> _U(16))) * R(2.0**-15) - R(1.0 - 2.0**-16)
+def second(R, h):
+    """The next 11 bits of a hash as a number in (-1, 1)."""
+    return R(np.int32(_U(h >> _U(11)) & _U(0x7FF))) * R(2.0**-10) - R(1.0 - 2.0**-11)
+
+
+@njit(**INLINE)
+def third(R, h):
+    """The upper 10 bits of a hash as a number in (-1, 1)."""
+    return R(np.int32(h >> _U(22))) * R(2.0**-9) - R(1.0 - 2.0**-10)
 
 
 @njit(**INLINE)
 def along(R, key, x):
-    """(first, second): two independent noises of a thread at x (float64) in lattice distances.
+    """Three independent noises of a thread at x (float64) in lattice distances.
 
     Their variance is VARIANCE, and they lie within PEAK of 0.
     """
@@ -81,18 +88,18 @@ def along(R, key, x):
     h0, h1, h2 = hashed(key, a), hashed(key, a + 1), hashed(key, a + 2)
     sixth = R(1.0 / 6.0)
     return (
-        sixth * (c0 * low(R, h0) + c1 * low(R, h1) + c2 * low(R, h2)),
-        sixth * (c0 * high(R, h0) + c1 * high(R, h1) + c2 * high(R, h2)),
+        sixth * (c0 * first(R, h0) + c1 * first(R, h1) + c2 * first(R, h2)),
+        sixth * (c0 * second(R, h0) + c1 * second(R, h1) + c2 * second(R, h2)),
+        sixth * (c0 * third(R, h0) + c1 * third(R, h1) + c2 * third(R, h2)),
     )
 
 
 @njit(**INLINE)
 def between(R, seed, which, number):
-    """(first, second): two independent numbers in (-1, 1) of a thread; 2k and 2k + 1 are
-    opposite."""
+    """Three independent numbers in (-1, 1) of a thread; those of 2k and 2k + 1 are opposite."""
     h = mixed(_U(key_of(seed, which + 2, number >> 1)))
     sign = R(-1) if number & 1 else R(1)
-    return sign * low(R, h), sign * high(R, h)
+    return sign * first(R, h), sign * second(R, h), sign * third(R, h)
 
 
 def _transfer(window: float, steps: int = 64) -> Floats:

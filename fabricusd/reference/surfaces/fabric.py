@@ -28,7 +28,7 @@ from fabricusd.appearance.sampling.blocks import Drawn, sample_points
 from fabricusd.appearance.shadow.methods import NONE, Shadow, compile_shadow, shade
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
-from fabricusd.appearance.weave.lookup import back_of, find
+from fabricusd.appearance.weave.lookup import back_of, crest_angle, find
 from fabricusd.appearance.weave.place import Hit, Places, place_at
 from fabricusd.appearance.yarn.compiled import compile_yarn
 from fabricusd.appearance.yarn.lay import NOT_LAID, lay, sound, strand
@@ -322,14 +322,14 @@ def look_up_uneven(R, cloth, yarn, home, v_sign, triangles, hits, first, points)
         which, thread, s, w, angle, run = find(R, cloth, u, v_sign * v)
         sets[k], threads[k], along[k], across[k] = which, thread, s, w
         psi0[k], length[k], strands[k], shades[k] = angle, run, w, R(1)
-        if which == WARP:
-            shades[k] = warp.shade
-            strands[k] = strand(
-                R, yarn, WARP, thread, warp.number, w, v_sign * whole_v * yarn.cell[WARP]
-            )
-        elif which == WEFT:
-            shades[k] = weft.shade
-            strands[k] = strand(R, yarn, WEFT, thread, weft.number, w, whole_u * yarn.cell[WEFT])
+        if which != GAP:
+            seen = warp if which == WARP else weft
+            shades[k] = seen.shade
+            # Along the thread: on the even cloth in true threads, and as it is.
+            place, at = (v + picks, v_sign * whole_v) if which == WARP else (u + ends, whole_u)
+            strands[k] = strand(R, yarn, which, thread, seen.number, w, at * yarn.cell[which])
+            if run > R(0):
+                psi0[k] = crest_angle(R, cloth, yarn, which, thread, seen.number, s, run, place)
         hits[PLACE, h], hits[PLACE + 1, h] = R(u), R(v)
 
 
