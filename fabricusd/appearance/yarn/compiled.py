@@ -72,7 +72,9 @@ class Yarn(NamedTuple):
     sequence : (2, n) int32; sequence_length : (2,) int64 - as in `CompiledFabric`; of the back of
         a cloth they are in the order in which the front counts
     cell : (2,) float64 - what threads of a set pass from one crossing to the next [m]
-    seed : uint32
+    seed : (2,) uint32 - of each set
+    alike : (2,) uint8 - whether all threads of a set are of one type
+    slubs : (2,) uint8 - whether any thread of a set has slubs
     plies : int - whether any thread shows its plies
     """
 
@@ -81,7 +83,9 @@ class Yarn(NamedTuple):
     sequence: NDArray[np.int32]
     sequence_length: NDArray[np.int64]
     cell: NDArray[np.float64]
-    seed: Any
+    seed: NDArray[np.uint32]
+    alike: NDArray[np.uint8]
+    slubs: NDArray[np.uint8]
     plies: int
 
 
@@ -117,7 +121,9 @@ def compile_yarn(
         sequence=sequence,
         sequence_length=lengths,
         cell=pitch[::-1].copy(),
-        seed=np.uint32((back_of or fabric).unevenness_seed * 0x2545F491 & 0xFFFFFFFF),
+        seed=np.random.SeedSequence((back_of or fabric).unevenness_seed).generate_state(2),
+        alike=np.array([len(set(s.sequence)) == 1 for s in sets(fabric)], np.uint8),
+        slubs=(rows[..., SLUB] > 0).any(axis=1).astype(np.uint8),
         plies=int(any(t.shows_plies for t in fabric.thread_list)),
     )
 

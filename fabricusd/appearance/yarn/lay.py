@@ -46,14 +46,13 @@ from fabricusd.appearance.yarn.noise import (
     between,
     first,
     hashed,
-    key_of,
     second,
     third,
 )
-from fabricusd.kernels.real import INLINE, KERNEL
+from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART
 
-FARTHEST = 2.0**52
-"""Threads beyond which float64 has no fractional part."""
+FARTHEST = 2.0**29
+"""Threads, and distances of a noise's lattice, beyond which cloth is even: an int32 counts them."""
 
 _U = np.uint32
 _SHADE_ALONG = 1.0 / float(np.sqrt(VARIANCE))
@@ -61,7 +60,7 @@ _SHADE_BETWEEN = float(np.sqrt(3.0))
 
 
 class Lateral(NamedTuple):
-    """The thread of a set at a place. number : int64 - true number; place : real - in [0, 1), where
+    """The thread of a set at a place. number : int32 - true number; place : real - in [0, 1), where
     it lies in the cell of the even cloth; shade : real - factor of its albedo, of mean 1."""
 
     number: Any
@@ -69,8 +68,30 @@ class Lateral(NamedTuple):
     shade: Any
 
 
-NOT_LAID = Lateral(np.int64(0), np.float32(0), np.float32(1))
-"""In place of a thread at coordinates that are not sound; in float32."""
+class Spun(NamedTuple):
+    """The columns of `Yarn.rows` that say how a thread varies, as numbers: a loop can keep them."""
+
+    rate: Any
+    width: Any
+    count: Any
+    shade: Any
+    slub: Any
+    slub_rate: Any
+    slub_half: Any
+    slub_mean: Any
+
+
+class Lane(NamedTuple):
+    """What holds for all threads of a set: columns of `Yarn.sets`, its seed, and whether any of its
+    threads has slubs."""
+
+    width: Any
+    own: Any
+    shared: Any
+    most: Any
+    astray: Any
+    seed: Any
+    slubs: bool
 
 
 @njit(**INLINE)
@@ -83,98 +104,214 @@ def type_of(yarn, which, number):
 
 
 @njit(**INLINE)
-def thickness(R, yarn, which, number, metres, blur):
-    """(e, aside, shade) of thread `number` (int64) of a set at `metres` (float64) along it.
+def spun_of(yarn, which, kind):
+    """The `Spun` of a thread type in a set."""
+    row = yarn.rows[which, kind]
+    return Spun(
+        row[RATE], row[WIDTH], row[COUNT], row[SHADE], row[SLUB], row[SLUB_RATE], row[SLUB_HALF],
+        row[SLUB_MEAN],
+    )  # fmt: skip
+
+
+@njit(**INLINE)
+def lane_of(yarn, which):
+    """The `Lane` of a set."""
+    row = yarn.sets[which]
+    return Lane(
+        row[OF_WIDTH], row[OWN], row[SHARED], row[MOST], row[ASTRAY], yarn.seed[which],
+        yarn.slubs[which] != 0,
+    )  # fmt: skip
+
+
+@njit(**INLINE)
+def thickness(R, spun, seed, slubs, number, metres, blur):
+    """(e, aside, shade) of thread `number` (int32) at `metres` (float64) along it.
 
     e : its width is 1 + e times that of the even thread
     aside : where it lies between its neighbours, in the same units; shade : factor of its albedo
     blur : extent of the footprint along the thread [m], which evens the noise out
     """
-    row = yarn.rows[which, type_of(yarn, which, number)]
-    key = key_of(yarn.seed, which, number)
-    wide, light, beside = along(R, key, metres * row[RATE])
-    count, tone, place = between(R, yarn.seed, which, number)
-    f = blur * row[RATE]
+    key = hashed(seed, number)
+    wide, light, beside = along(R, key, metres * spun.rate)
+    count, tone, place = between(R, seed, number)
+    f = blur * spun.rate
     sharp = R(1) / (R(1) + f * f)
-    e = sharp * row[WIDTH] * wide + row[COUNT] * count
-    aside = sharp * row[WIDTH] * beside + row[COUNT] * place
-    if row[SLUB] > R(0):
-        g = blur * row[SLUB_RATE] / row[SLUB_HALF]
-        e += _slub(R, row, key, metres) / (R(1) + R(0.25) * g * g)
-    shade = R(1) + row[SHADE] * (sharp * R(_SHADE_ALONG) * light + R(_SHADE_BETWEEN) * tone)
+    e = sharp * spun.width * wide + spun.count * count
+    aside = sharp * spun.width * beside + spun.count * place
+    if slubs:
+        e += _slub(R, spun, key, metres, blur)
+    shade = R(1) + spun.shade * (sharp * R(_SHADE_ALONG) * light + R(_SHADE_BETWEEN) * tone)
     return e, aside, shade
 
 
 @njit(**INLINE)
-def _slub(R, row, key, metres):
+def _slub(R, spun, key, metres, blur):
     """Change of the width by slubs: one in each cell of the slubs' distance, anywhere inside it."""
-    x = metres * row[SLUB_RATE] + R(np.int32(key >> _U(16))) * 2.0**-15
+    x = metres * spun.slub_rate + float(R(np.int32(key >> _U(16)))) * 2.0**-15
     whole = np.floor(x)
-    n = np.int64(whole)
-    pair, own = hashed(_U(~key), n >> 1), hashed(_U(key ^ _U(0x5BD1E995)), n)
-    tall = R(1) + (R(-SPREAD) if n & 1 else R(SPREAD)) * first(R, pair)
-    room = R(0.5) - row[SLUB_HALF]
-    d = (R(x - whole) - R(0.5) - room * second(R, own)) / row[SLUB_HALF]
+    n = np.int32(whole)
+    pair, own = hashed(_U(~key), np.int32(n >> 1)), hashed(_U(key ^ _U(0x5BD1E995)), n)
+    tall = R(1) + R(SPREAD) * (R(1) - R(2) * R(np.int32(n & 1))) * first(R, pair)
+    half = max(spun.slub_half, R(1e-6))
+    d = (R(x - whole) - R(0.5) - (R(0.5) - half) * second(R, own)) / half
     rest = max(R(0), R(1) - d * d)
-    return row[SLUB] * tall * rest * rest - row[SLUB_MEAN]
+    g = blur * spun.slub_rate / half
+    return (spun.slub * tall * rest * rest - spun.slub_mean) / (R(1) + R(0.25) * g * g)
 
 
 @njit(**INLINE)
-def _moved(shared, most, difference):
+def _moved(R, lane, difference):
     """How far the border of two threads moves [cells]: an odd function, which keeps its mean 0."""
-    x = shared * difference
-    return x * most / np.sqrt(most * most + x * x)
+    x = lane.shared * difference
+    return x * lane.most / np.sqrt(max(lane.most * lane.most + x * x, R(1e-30)))
 
 
 @njit(**INLINE)
-def lateral(R, yarn, which, across, metres, blur):
-    """The `Lateral` of a set at `across` [threads, float64] and `metres` along the thread."""
-    columns = yarn.sets[which]
-    width, own, shared, most = columns[OF_WIDTH], columns[OWN], columns[SHARED], columns[MOST]
-    whole = np.floor(across)
-    number, y = np.int64(whole), R(across - whole)
-    e, aside, shade = thickness(R, yarn, which, number, metres, blur)
-    left, right = R(0), R(0)
-    if shared > R(0):
-        step = -1 if y < R(0.5) else 1
-        near, near_aside, near_shade = thickness(R, yarn, which, number + step, metres, blur)
-        border = _moved(shared, most, (near - e) if step < 0 else (e - near))
-        beyond = y < border if step < 0 else y >= R(1) + border
-        # The other border of the thread that is seen.
-        if beyond:
-            number += step
-            y -= R(step)
-            further, _, _ = thickness(R, yarn, which, number + step, metres, blur)
-            other = _moved(shared, most, (further - near) if step < 0 else (near - further))
-            e, aside, shade = near, near_aside, near_shade
-            left, right = (other, border) if step < 0 else (border, other)
-        else:
-            further, _, _ = thickness(R, yarn, which, number - step, metres, blur)
-            other = _moved(shared, most, (e - further) if step < 0 else (further - e))
-            left, right = (border, other) if step < 0 else (other, border)
-    half = R(0.5) * width
-    grown = half * (R(1) + own * e) + R(0.5) * (right - left)
-    astray = columns[ASTRAY] * aside
+def apart(R, lane, e, aside, left, right, y):
+    """Where y [cells] in the cell of a thread lies in the cell of the even thread, in [0, 1).
+
+    e, aside : of `thickness`; left, right : how far the borders of its cell have moved [cells]
+    """
+    half, out = R(0.5) * lane.width, R(0.5) * (right - left)
+    grown = half * (R(1) + lane.own * e) + out
+    astray = lane.astray * aside
     d = y - R(0.5) - R(0.5) * (right + left) - astray
     a = abs(d)
-    if a <= grown:
-        d *= half / grown
-    else:
-        room = R(0.5) + R(0.5) * (right - left) - grown - (astray if d > R(0) else -astray)
-        a = half + min(R(1), (a - grown) / max(room, R(1e-6))) * (R(0.5) - half)
-        d = a if d > R(0) else -a
-    return Lateral(number, min(max(d + R(0.5), R(0)), R(0.9999999)), shade)
+    inside = d * (half / max(grown, R(1e-6)))
+    room = R(0.5) + out - grown - (astray if d > R(0) else -astray)
+    beyond = half + min(R(1), (a - grown) / max(room, R(1e-6))) * (R(0.5) - half)
+    d = inside if a <= grown else (beyond if d > R(0) else -beyond)
+    return min(max(d + R(0.5), R(0)), R(0.9999999))
 
 
 @njit(**INLINE)
-def lay(R, yarn, u, v, blur):
-    """(warp, weft): the `Lateral` of either set at weave coordinates (float64) of the front.
+def lateral_loose(R, spun, lane, slubs, across, metres, blur):
+    """The `Lateral` of a set whose threads all have room, at `across` [threads, float64]."""
+    whole = np.floor(across)
+    number = np.int32(whole)
+    e, aside, shade = thickness(R, spun, lane.seed, slubs, number, metres, blur)
+    y = apart(R, lane, e, aside, R(0), R(0), R(across - whole))
+    return Lateral(number, y, shade)
 
-    blur : extent of the footprint [m]
+
+@njit(**INLINE)
+def lateral_tight(R, spun, lane, slubs, across, metres, blur):
+    """The `Lateral` of a set whose threads move their borders."""
+    whole = np.floor(across)
+    number, y = np.int32(whole), R(across - whole)
+    before = y < R(0.5)
+    step = np.int32(-1) if before else np.int32(1)
+    sign = R(-1) if before else R(1)
+    mine = thickness(R, spun, lane.seed, slubs, number, metres, blur)
+    near = thickness(R, spun, lane.seed, slubs, np.int32(number + step), metres, blur)
+    border = _moved(R, lane, sign * (mine[0] - near[0]))
+    beyond = y < border if before else y >= R(1) + border
+    # The other border of the thread that is seen, be it this one or its neighbour.
+    further = np.int32(number + 2 * step) if beyond else np.int32(number - step)
+    rest = thickness(R, spun, lane.seed, slubs, further, metres, blur)
+    other = _moved(R, lane, sign * ((near[0] - rest[0]) if beyond else (rest[0] - mine[0])))
+    low = before != beyond
+    left, right = (border if low else other), (other if low else border)
+    e = near[0] if beyond else mine[0]
+    aside = near[1] if beyond else mine[1]
+    shade = near[2] if beyond else mine[2]
+    y = y - sign if beyond else y
+    seen = np.int32(number + step) if beyond else number
+    return Lateral(seen, apart(R, lane, e, aside, left, right, y), shade)
+
+
+@njit(**INLINE)
+def lateral_mixed(R, yarn, which, lane, across, metres, blur):
+    """The `Lateral` of a set with threads of several types."""
+    whole = np.floor(across)
+    number, y = np.int32(whole), R(across - whole)
+    step = np.int32(-1) if y < R(0.5) else np.int32(1)
+    mine, near, rest = (R(0), R(0), R(1)), (R(0), R(0), R(1)), (R(0), R(0), R(1))
+    mine = _of_number(R, yarn, which, lane, number, metres, blur)
+    left, right = R(0), R(0)
+    if lane.shared > R(0):
+        near = _of_number(R, yarn, which, lane, np.int32(number + step), metres, blur)
+        border = _moved(R, lane, R(step) * (mine[0] - near[0]))
+        if y < border if step < 0 else y >= R(1) + border:
+            number, y, mine, near = np.int32(number + step), y - R(step), near, mine
+            step = np.int32(-step)
+        rest = _of_number(R, yarn, which, lane, np.int32(number - step), metres, blur)
+        other = _moved(R, lane, R(step) * (rest[0] - mine[0]))
+        left, right = (border, other) if step < 0 else (other, border)
+    return Lateral(number, apart(R, lane, mine[0], mine[1], left, right, y), mine[2])
+
+
+@njit(**INLINE)
+def _of_number(R, yarn, which, lane, number, metres, blur):
+    spun = spun_of(yarn, which, type_of(yarn, which, number))
+    return thickness(R, spun, lane.seed, lane.slubs, number, metres, blur)
+
+
+ACROSS, METRES = 0, BLOCK
+"""Rows of float64: place across a set [threads], and along its threads [m]."""
+BLUR, IN_CELL, TONE = 0, BLOCK, 3 * BLOCK
+"""Rows of reals: extent of the footprint [m]; of either set, weft first, the place in the cell of
+the even cloth, and the factor of the albedo. The number of the thread is a row of int32."""
+DOUBLE_ROWS, REAL_ROWS, INT_ROWS = 2, 5, 2
+
+
+@njit(**PART)
+def lateral_block(R, yarn, which, size, doubles, reals, ints):
+    """The `Lateral` of a set at `size` places whose coordinates are sound."""
+    lane = lane_of(yarn, which)
+    spun = spun_of(yarn, which, yarn.sequence[which, 0])
+    number, cell, tone = which * BLOCK, IN_CELL + which * BLOCK, TONE + which * BLOCK
+    # The flags are constants of the loops, which LLVM vectorises.
+    if yarn.alike[which] == 0:
+        for k in range(size):
+            ints[number + k], reals[cell + k], reals[tone + k] = lateral_mixed(
+                R, yarn, which, lane, doubles[ACROSS + k], doubles[METRES + k], reals[BLUR + k]
+            )
+    elif lane.shared > R(0):
+        if lane.slubs:
+            for k in range(size):
+                ints[number + k], reals[cell + k], reals[tone + k] = lateral_tight(
+                    R, spun, lane, True, doubles[ACROSS + k], doubles[METRES + k], reals[BLUR + k]
+                )
+        else:
+            for k in range(size):
+                ints[number + k], reals[cell + k], reals[tone + k] = lateral_tight(
+                    R, spun, lane, False, doubles[ACROSS + k], doubles[METRES + k], reals[BLUR + k]
+                )
+    elif lane.slubs:
+        for k in range(size):
+            ints[number + k], reals[cell + k], reals[tone + k] = lateral_loose(
+                R, spun, lane, True, doubles[ACROSS + k], doubles[METRES + k], reals[BLUR + k]
+            )
+    else:
+        for k in range(size):
+            ints[number + k], reals[cell + k], reals[tone + k] = lateral_loose(
+                R, spun, lane, False, doubles[ACROSS + k], doubles[METRES + k], reals[BLUR + k]
+            )
+
+
+@njit(**INLINE)
+def sound(u, v):
+    """Whether weave coordinates are finite, and near enough that an int32 counts the threads."""
+    return (abs(u) <= FARTHEST) & (abs(v) <= FARTHEST)
+
+
+@njit(**PART)
+def lay_block(R, yarn, u, v, blur, size, doubles, reals, ints):
+    """Both sets at `size` places u, v (b,) float64 of the front, into the rows of `reals`, `ints`.
+
+    blur : (b,) real - extent of the footprint [m]
     """
-    warp = lateral(R, yarn, WARP, u, v * yarn.cell[WARP], blur)
-    weft = lateral(R, yarn, WEFT, v, u * yarn.cell[WEFT], blur)
-    return warp, weft
+    for k in range(size):
+        reals[BLUR + k] = blur[k]
+    for which in range(2):
+        cell = yarn.cell[which]
+        for k in range(size):
+            fine = sound(u[k], v[k])
+            across, length = (u[k], v[k]) if which == WARP else (v[k], u[k])
+            doubles[ACROSS + k] = across if fine else 0.0
+            doubles[METRES + k] = length * cell if fine else 0.0
+        lateral_block(R, yarn, which, size, doubles, reals, ints)
 
 
 @njit(**INLINE)
@@ -188,8 +325,8 @@ def crest(R, yarn, which, thread, number, s, cells, place):
     every place is as long as on the even run, on average.
     """
     most = yarn.rows[which, thread, CREST]
-    begun = np.int64(np.rint(place - float(s) * float(cells)))
-    key = _U(key_of(yarn.seed, which, number) ^ _U(0xA511E9B3))
+    begun = np.int32(np.rint(place - float(s) * float(cells)))
+    key = hashed(_U(yarn.seed[which] ^ _U(0xA511E9B3)), np.int32(number))
     q = most * third(R, hashed(key, begun))
     b = R(1) + q
     return R(2) * s / (b + np.sqrt(max(R(0), b * b - R(4) * q * s)))
@@ -205,7 +342,7 @@ def strand(R, yarn, which, thread, number, w, metres):
     strands = row[STRANDS]
     if strands == R(0):
         return w
-    key = hashed(key_of(yarn.seed, which, number), -1)
+    key = hashed(_U(~yarn.seed[which]), np.int32(number))
     turns = metres * float(row[WINDING]) + float(R(np.int32(key & _U(0xFFFF)))) * 2.0**-15
     x = R(turns - 2.0 * np.floor(0.5 * turns)) + strands * w + R(1)
     return x - R(2) * np.floor(R(0.5) * x) - R(1)
@@ -232,68 +369,69 @@ def laid(yarn: Yarn, uv: NDArray[np.float64]) -> Laid:
     return found
 
 
-@njit(**INLINE)
-def sound(u, v):
-    """Whether weave coordinates are finite, and near enough that threads can be counted."""
-    return (abs(u) <= FARTHEST) & (abs(v) <= FARTHEST)
-
-
 @njit(parallel=True, **KERNEL)
 def _lay_all(R, yarn, uv, out, numbers, shades):
-    for k in prange(uv.shape[0]):
-        if not sound(uv[k, 0], uv[k, 1]):
-            out[k, 0], out[k, 1] = uv[k, 0], uv[k, 1]
-            numbers[k, 0] = numbers[k, 1] = 0
+    n = uv.shape[0]
+    for chunk in prange((n + BLOCK - 1) // BLOCK):
+        begin = chunk * BLOCK
+        _lay_chunk(R, yarn, uv, out, numbers, shades, begin, min(BLOCK, n - begin))
+
+
+@njit(**KERNEL)
+def _lay_chunk(R, yarn, uv, out, numbers, shades, begin, size):
+    u, v, blur = np.empty(size), np.empty(size), np.zeros(size, R)
+    doubles, reals = np.empty(DOUBLE_ROWS * BLOCK), np.empty(REAL_ROWS * BLOCK, R)
+    ints = np.empty(INT_ROWS * BLOCK, np.int32)
+    for k in range(size):
+        u[k], v[k] = uv[begin + k, 0], uv[begin + k, 1]
+    lay_block(R, yarn, u, v, blur, size, doubles, reals, ints)
+    for k in range(size):
+        at = begin + k
+        if not sound(u[k], v[k]):
+            out[at, 0], out[at, 1], numbers[at, 0], numbers[at, 1] = u[k], v[k], 0, 0
             continue
-        warp, weft = lay(R, yarn, uv[k, 0], uv[k, 1], R(0))
-        out[k, 0] = float(warp.number) + float(warp.place)
-        out[k, 1] = float(weft.number) + float(weft.place)
-        numbers[k, WEFT], numbers[k, WARP] = weft.number, warp.number
-        shades[k, WEFT], shades[k, WARP] = weft.shade, warp.shade
+        for which in range(2):
+            number = ints[which * BLOCK + k]
+            out[at, 1 - which] = float(number) + float(reals[IN_CELL + which * BLOCK + k])
+            numbers[at, which], shades[at, which] = number, reals[TONE + which * BLOCK + k]
 
 
 @njit(parallel=True, **KERNEL)
 def strands_all(R, yarn, uv, sets, threads, numbers, w, out):
     """`strand` at each of uv (n, 2), of the thread that is seen there; `w` in gaps."""
     for k in prange(uv.shape[0]):
-        out[k] = w[k]
-        which = sets[k]
-        if which == WARP:
+        out[k], which = w[k], int(sets[k])
+        if which == WARP or which == WEFT:
             out[k] = strand(
-                R, yarn, WARP, threads[k], numbers[k, WARP], w[k], uv[k, 1] * yarn.cell[WARP]
-            )
-        elif which == WEFT:
-            out[k] = strand(
-                R, yarn, WEFT, threads[k], numbers[k, WEFT], w[k], uv[k, 0] * yarn.cell[WEFT]
-            )
+                R, yarn, which, threads[k], numbers[k, which], w[k],
+                uv[k, 1 if which == WARP else 0] * yarn.cell[which],
+            )  # fmt: skip
 
 
-def widths(
+def edges(
     yarn: Yarn, which: int, numbers: NDArray[np.int64], metres: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(n, 3): left and right edge of threads in their cells, and the factor of their albedo.
 
     numbers, metres : (n,) - true numbers in the set, places along them; edges are [cells], 0 and 1
-        being the cell's borders
+        being the even cell's borders
     """
     out = np.empty((len(numbers), 3))
     real: Any = np.float64
-    _widths(real, yarn, which, numbers, metres, out)
+    _edges(real, yarn, which, numbers.astype(np.int32), metres, out)
     return out
 
 
 @njit(**KERNEL)
-def _widths(R, yarn, which, numbers, metres, out):
-    columns = yarn.sets[which]
+def _edges(R, yarn, which, numbers, metres, out):
+    lane = lane_of(yarn, which)
     for k in range(numbers.size):
         at, place = numbers[k], metres[k]
-        e, aside, shade = thickness(R, yarn, which, at, place, R(0))
+        e, aside, shade = _of_number(R, yarn, which, lane, at, place, R(0))
         left, right = R(0), R(0)
-        if columns[SHARED] > R(0):
-            before, _, _ = thickness(R, yarn, which, at - 1, place, R(0))
-            after, _, _ = thickness(R, yarn, which, at + 1, place, R(0))
-            left = _moved(columns[SHARED], columns[MOST], before - e)
-            right = _moved(columns[SHARED], columns[MOST], e - after)
-        half = R(0.5) * columns[OF_WIDTH] * (R(1) + columns[OWN] * e)
-        middle = R(0.5) + columns[ASTRAY] * aside
+        if lane.shared > R(0):
+            before, _, _ = _of_number(R, yarn, which, lane, np.int32(at - 1), place, R(0))
+            after, _, _ = _of_number(R, yarn, which, lane, np.int32(at + 1), place, R(0))
+            left, right = _moved(R, lane, before - e), _moved(R, lane, e - after)
+        half, middle = R(0.5) * lane.width * (R(1) + lane.own * e), R(0.5) + lane.astray * aside
         out[k, 0], out[k, 1], out[k, 2] = middle - half + left, middle + half + right, shade

@@ -37,14 +37,8 @@ def mixed(x):
 
 
 @njit(**INLINE)
-def key_of(seed, which, number):
-    """The key of thread `number` (int64) of a set."""
-    return mixed(_U(mixed(_U(_U(number) ^ seed)) + _U(which)))
-
-
-@njit(**INLINE)
 def hashed(key, number):
-    """Hash `number` (int64) under a key."""
+    """Hash `number` (int32) under a key."""
     return mixed(_U(key + _U(_U(number) * _U(0x9E3779B1))))
 
 
@@ -68,24 +62,25 @@ def third(R, h):
 
 @njit(**INLINE)
 def along(R, key, x):
-    """Three independent noises of a thread at x (float64) in lattice distances.
+    """Three independent noises of a thread at x (float64) in lattice distances, |x| below 2^30.
 
-    Their variance is VARIANCE, and they lie within PEAK of 0.
+    Their variance is VARIANCE, and they lie within PEAK of 0. There is no branch, so that LLVM can
+    vectorise the loop around.
     """
-    x += R(np.int32(key & _U(0xFFFF))) * 2.0**-15
+    x += float(R(np.int32(key & _U(0xFFFF)))) * 2.0**-15
     whole = np.floor(x)
-    t = R(x - whole)
-    i = np.int64(whole)
+    t, i = R(x - whole), np.int32(whole)
     s = R(1) - t
     b0, b3 = s * s * s, t * t * t
     b1 = R(4) - t * t * (R(6) - R(3) * t)
     b2 = R(6) - b0 - b1 - b3
-    a = (i - 1) >> 1
-    odd = (i & 1) != 0
-    c0 = b0 - b1 if odd else -b0
-    c1 = b2 - b3 if odd else b1 - b2
-    c2 = R(0) if odd else b3
-    h0, h1, h2 = hashed(key, a), hashed(key, a + 1), hashed(key, a + 2)
+    a = np.int32(np.int32(i - 1) >> 1)
+    odd = R(np.int32(i & 1))
+    even = R(1) - odd
+    c0 = odd * (b0 - b1) - even * b0
+    c1 = odd * (b2 - b3) + even * (b1 - b2)
+    c2 = even * b3
+    h0, h1, h2 = hashed(key, a), hashed(key, np.int32(a + 1)), hashed(key, np.int32(a + 2))
     sixth = R(1.0 / 6.0)
     return (
         sixth * (c0 * first(R, h0) + c1 * first(R, h1) + c2 * first(R, h2)),
@@ -95,10 +90,11 @@ def along(R, key, x):
 
 
 @njit(**INLINE)
-def between(R, seed, which, number):
-    """Three independent numbers in (-1, 1) of a thread; those of 2k and 2k + 1 are opposite."""
-    h = mixed(_U(key_of(seed, which + 2, number >> 1)))
-    sign = R(-1) if number & 1 else R(1)
+def between(R, seed, number):
+    """Three independent numbers in (-1, 1) of a thread (int32); those of 2k and 2k + 1 are
+    opposite."""
+    h = hashed(_U(~seed), np.int32(number >> 1))
+    sign = R(1) - R(2) * R(np.int32(number & 1))
     return sign * first(R, h), sign * second(R, h), sign * third(R, h)
 
 

@@ -31,9 +31,18 @@ from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
 from fabricusd.appearance.weave.lookup import back_of, crest_angle, find
 from fabricusd.appearance.weave.place import Hit, Places, place_at
 from fabricusd.appearance.yarn.compiled import compile_yarn
-from fabricusd.appearance.yarn.lay import NOT_LAID, lay, sound, strand
+from fabricusd.appearance.yarn.lay import (
+    DOUBLE_ROWS,
+    IN_CELL,
+    INT_ROWS,
+    REAL_ROWS,
+    TONE,
+    lay_block,
+    sound,
+    strand,
+)
 from fabricusd.fabric import Fabric
-from fabricusd.kernels.real import INLINE, LEAN
+from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, LEAN
 from fabricusd.reference.rays.embree import aligned_empty
 from fabricusd.reference.rays.wave import (
     CHANCE,
@@ -300,37 +309,55 @@ def look_up(R, cloth, v_sign, hits, first, points):
         psi0[k], length[k] = angle, run
 
 
-@njit(**LEAN)
+@njit(**KERNEL)
 def look_up_uneven(R, cloth, yarn, home, v_sign, triangles, hits, first, points):
     """Look up the uneven thread under each hit; PLACE becomes the place of the even cloth at which
     that thread lies, for the shadows.
 
     home : `TriangleTables.home`; triangles : (n,) of each hit
     """
+    u, v, blur = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, R)
+    doubles, reals = np.empty(DOUBLE_ROWS * BLOCK), np.empty(REAL_ROWS * BLOCK, R)
+    ints = np.empty(INT_ROWS * BLOCK, np.int32)
+    count, metres = points.sets.shape[0], R(yarn.cell[WEFT])
+    for start in range(0, count, BLOCK):
+        size = min(BLOCK, count - start)
+        for x in range(size):
+            h = first + start + x
+            u[x] = float(hits[PLACE, h]) + home[triangles[h], 0]
+            v[x] = float(hits[PLACE + 1, h]) + home[triangles[h], 1]
+            blur[x] = hits[FOOTPRINT, h] * metres
+        lay_block(R, yarn, u, v, blur, size, doubles, reals, ints)
+        for x in range(size):
+            _look_up_laid(
+                R, cloth, yarn, home[triangles[first + start + x]], v_sign, u[x], v[x], x, reals,
+                ints, hits, first + start + x, start + x, points,
+            )  # fmt: skip
+
+
+@njit(**INLINE)
+def _look_up_laid(R, cloth, yarn, home, v_sign, u, v, x, reals, ints, hits, h, k, points):
+    """Look up hit `h`, entry x of what `lay_block` found at (u, v), into entry k of `points`."""
     sets, threads, along, across, psi0, length, strands, shades = points
-    for k in range(sets.shape[0]):
-        h = first + k
-        u, v = float(hits[PLACE, h]), float(hits[PLACE + 1, h])
-        ends, picks = home[triangles[h], 0], home[triangles[h], 1]
-        warp, weft = NOT_LAID, NOT_LAID
-        whole_u, whole_v = u + ends, v + picks
-        if sound(whole_u, whole_v):
-            blur = hits[FOOTPRINT, h] * R(yarn.cell[WEFT])
-            warp, weft = lay(R, yarn, whole_u, whole_v, blur)
-            u = float(warp.number - ends) + float(warp.place)
-            v = float(weft.number - picks) + float(weft.place)
-        which, thread, s, w, angle, run = find(R, cloth, u, v_sign * v)
-        sets[k], threads[k], along[k], across[k] = which, thread, s, w
-        psi0[k], length[k], strands[k], shades[k] = angle, run, w, R(1)
-        if which != GAP:
-            seen = warp if which == WARP else weft
-            shades[k] = seen.shade
-            # Along the thread: on the even cloth in true threads, and as it is.
-            place, at = (v + picks, v_sign * whole_v) if which == WARP else (u + ends, whole_u)
-            strands[k] = strand(R, yarn, which, thread, seen.number, w, at * yarn.cell[which])
-            if run > R(0):
-                psi0[k] = crest_angle(R, cloth, yarn, which, thread, seen.number, s, run, place)
-        hits[PLACE, h], hits[PLACE + 1, h] = R(u), R(v)
+    place_u, place_v = u, v
+    laid = sound(u, v)
+    if laid:
+        place_u = float(ints[WARP * BLOCK + x]) + float(reals[IN_CELL + WARP * BLOCK + x])
+        place_v = float(ints[WEFT * BLOCK + x]) + float(reals[IN_CELL + WEFT * BLOCK + x])
+    near_u, near_v = place_u - home[0], place_v - home[1]
+    hits[PLACE, h], hits[PLACE + 1, h] = R(near_u), R(near_v)
+    which, thread, s, w, angle, run = find(R, cloth, near_u, v_sign * near_v)
+    sets[k], threads[k], along[k], across[k] = which, thread, s, w
+    psi0[k], length[k], strands[k], shades[k] = angle, run, w, R(1)
+    if which != GAP and laid:
+        number = ints[which * BLOCK + x]
+        shades[k] = reals[TONE + which * BLOCK + x]
+        if yarn.plies != 0:
+            at = v_sign * v if which == WARP else u
+            strands[k] = strand(R, yarn, which, thread, number, w, at * yarn.cell[which])
+        if run > R(0):
+            place = place_v if which == WARP else place_u
+            psi0[k] = crest_angle(R, cloth, yarn, which, thread, number, s, run, place)
 
 
 @njit(**LEAN)
