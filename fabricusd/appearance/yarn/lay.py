@@ -49,7 +49,7 @@ from fabricusd.appearance.yarn.noise import (
     second,
     third,
 )
-from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART
+from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, index
 
 FARTHEST = 2.0**29
 """Threads, and distances of a noise's lattice, beyond which cloth is even: an int32 counts them."""
@@ -247,46 +247,49 @@ def _of_number(R, yarn, which, lane, number, metres, blur):
     return thickness(R, spun, lane.seed, lane.slubs, number, metres, blur)
 
 
-ACROSS, METRES = 0, BLOCK
-"""Rows of float64: place across a set [threads], and along its threads [m]."""
-BLUR, IN_CELL, TONE = 0, BLOCK, 3 * BLOCK
-"""Rows of reals: extent of the footprint [m]; of either set, weft first, the place in the cell of
-the even cloth, and the factor of the albedo. The number of the thread is a row of int32."""
-DOUBLE_ROWS, REAL_ROWS, INT_ROWS = 2, 5, 2
+IN_CELL, TONE = 0, 2 * BLOCK
+"""Rows of reals, of either set, weft first: the place in the cell of the even cloth, and the factor
+of the albedo. The numbers of the threads are two rows of int32."""
+DOUBLE_ROWS, REAL_ROWS, INT_ROWS = 2, 4, 2
 
 
 @njit(**PART)
-def lateral_block(R, yarn, which, size, doubles, reals, ints):
-    """The `Lateral` of a set at `size` places whose coordinates are sound."""
+def lateral_block(R, yarn, which, size, across, metres, blur, numbers, cells, tones):
+    """The `Lateral` of a set at `size` places, whose coordinates are sound, into the last three
+    arrays."""
     lane = lane_of(yarn, which)
     spun = spun_of(yarn, which, yarn.sequence[which, 0])
-    number, cell, tone = which * BLOCK, IN_CELL + which * BLOCK, TONE + which * BLOCK
     # The flags are constants of the loops, which LLVM vectorises.
     if yarn.alike[which] == 0:
-        for k in range(size):
-            ints[number + k], reals[cell + k], reals[tone + k] = lateral_mixed(
-                R, yarn, which, lane, doubles[ACROSS + k], doubles[METRES + k], reals[BLUR + k]
+        for x in range(size):
+            k = index(0, x)
+            numbers[k], cells[k], tones[k] = lateral_mixed(
+                R, yarn, which, lane, across[k], metres[k], blur[k]
             )
     elif lane.shared > R(0):
         if lane.slubs:
-            for k in range(size):
-                ints[number + k], reals[cell + k], reals[tone + k] = lateral_tight(
-                    R, spun, lane, True, doubles[ACROSS + k], doubles[METRES + k], reals[BLUR + k]
+            for x in range(size):
+                k = index(0, x)
+                numbers[k], cells[k], tones[k] = lateral_tight(
+                    R, spun, lane, True, across[k], metres[k], blur[k]
                 )
         else:
-            for k in range(size):
-                ints[number + k], reals[cell + k], reals[tone + k] = lateral_tight(
-                    R, spun, lane, False, doubles[ACROSS + k], doubles[METRES + k], reals[BLUR + k]
+            for x in range(size):
+                k = index(0, x)
+                numbers[k], cells[k], tones[k] = lateral_tight(
+                    R, spun, lane, False, across[k], metres[k], blur[k]
                 )
     elif lane.slubs:
-        for k in range(size):
-            ints[number + k], reals[cell + k], reals[tone + k] = lateral_loose(
-                R, spun, lane, True, doubles[ACROSS + k], doubles[METRES + k], reals[BLUR + k]
+        for x in range(size):
+            k = index(0, x)
+            numbers[k], cells[k], tones[k] = lateral_loose(
+                R, spun, lane, True, across[k], metres[k], blur[k]
             )
     else:
-        for k in range(size):
-            ints[number + k], reals[cell + k], reals[tone + k] = lateral_loose(
-                R, spun, lane, False, doubles[ACROSS + k], doubles[METRES + k], reals[BLUR + k]
+        for x in range(size):
+            k = index(0, x)
+            numbers[k], cells[k], tones[k] = lateral_loose(
+                R, spun, lane, False, across[k], metres[k], blur[k]
             )
 
 
@@ -302,16 +305,20 @@ def lay_block(R, yarn, u, v, blur, size, doubles, reals, ints):
 
     blur : (b,) real - extent of the footprint [m]
     """
-    for k in range(size):
-        reals[BLUR + k] = blur[k]
+    across, metres = doubles[:BLOCK], doubles[BLOCK:]
     for which in range(2):
         cell = yarn.cell[which]
-        for k in range(size):
+        for x in range(size):
+            k = index(0, x)
             fine = sound(u[k], v[k])
-            across, length = (u[k], v[k]) if which == WARP else (v[k], u[k])
-            doubles[ACROSS + k] = across if fine else 0.0
-            doubles[METRES + k] = length * cell if fine else 0.0
-        lateral_block(R, yarn, which, size, doubles, reals, ints)
+            length = v[k] if which == WARP else u[k]
+            across[k] = (u[k] if which == WARP else v[k]) if fine else 0.0
+            metres[k] = length * cell if fine else 0.0
+        row = which * BLOCK
+        lateral_block(
+            R, yarn, which, size, across, metres, blur, ints[row:], reals[IN_CELL + row :],
+            reals[TONE + row :],
+        )  # fmt: skip
 
 
 @njit(**INLINE)
