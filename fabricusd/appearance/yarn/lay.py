@@ -247,6 +247,21 @@ def _of_number(R, yarn, which, lane, number, metres, blur):
     return thickness(R, spun, lane.seed, lane.slubs, number, metres, blur)
 
 
+EVENLY = Lateral(np.int32(0), np.float32(0), np.float32(1))
+"""In place of a thread where no yarn is read; in float32."""
+
+
+@njit(**INLINE)
+def lay_at(R, yarn, u, v, blur):
+    """(warp, weft): the `Lateral` of both sets at one place of the front, which is sound.
+
+    blur : extent of the footprint [m]
+    """
+    warp = lateral_mixed(R, yarn, WARP, lane_of(yarn, WARP), u, v * yarn.cell[WARP], blur)
+    weft = lateral_mixed(R, yarn, WEFT, lane_of(yarn, WEFT), v, u * yarn.cell[WEFT], blur)
+    return warp, weft
+
+
 IN_CELL, TONE = 0, 2 * BLOCK
 """Rows of reals, of either set, weft first: the place in the cell of the even cloth, and the factor
 of the albedo. The numbers of the threads are two rows of int32."""
