@@ -32,6 +32,7 @@ class Rings(NamedTuple):
 
     centre : (r, 3) float - middle of each section [m]
     angle, bend : (r,) float - tangent angle [rad] and its change along the thread [rad/m]
+    wider, shade : (r,) float - width of the section over that of its line, factor of the albedo
     line : (r,) int32 - the section's line
     first : (q,) int32 - the section at which each row of SIDES quadrilaterals begins
     """
@@ -39,6 +40,8 @@ class Rings(NamedTuple):
     centre: Floats
     angle: Floats
     bend: Floats
+    wider: Floats
+    shade: Floats
     line: NDArray[np.int32]
     first: NDArray[np.int32]
 
@@ -67,12 +70,13 @@ def sweep(repeat: Repeat, thick: float) -> Mesh:
     begun = 0
     for number, line in enumerate(repeat.lines):
         for shift in range(-int(copies[1 - _along(line)]), int(copies[1 - _along(line)]) + 1):
-            centre, angle, bend = _sections(line, repeat, copies, shift)
-            points.append(outline(line, centre, angle))
+            sections = _sections(line, repeat, copies, shift)
+            centre, angle, _, wider, _ = sections
+            points.append(outline(line, centre, angle, wider))
             count = len(angle)
             triangles.append(faces(count) + begun * SIDES)
             first = np.arange(count - 1, dtype=np.int32) + begun
-            parts.append((centre, angle, bend, np.full(count, number, np.int32), first))
+            parts.append((*sections, np.full(count, number, np.int32), first))
             begun += count
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     return Mesh(
@@ -90,8 +94,9 @@ def _along(line: Line) -> int:
 
 def _sections(
     line: Line, repeat: Repeat, copies: NDArray[np.int64], shift: int
-) -> tuple[Floats, Floats, Floats]:
-    """Centre (r, 3), angle and bend (r,) of one copy of a line, from end to end of the patch."""
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Centre (r, 3), angle, bend, width and shade (r,) of one copy of a line, from end to end of
+    the patch."""
     axis = _along(line)
     length, cells = float(repeat.size[axis]), len(line.angle)
     reach = int(copies[axis])
@@ -105,10 +110,15 @@ def _sections(
     centre[:, axis] = s
     centre[:, 1 - axis] = line.lateral + shift * repeat.size[1 - axis]
     centre[:, 2] = line.height[k % cells]
-    return centre, angle, bend
+    if line.aside is not None:
+        centre[:, 1 - axis] += line.aside[k % cells]
+    even = np.ones(len(k))
+    wider = even if line.wider is None else line.wider[k % cells]
+    shade = even if line.shade is None else line.shade[k % cells]
+    return centre, angle, bend, wider, shade
 
 
-def outline(line: Line, centre: Floats, angle: Floats) -> Floats:
+def outline(line: Line, centre: Floats, angle: Floats, wider: Floats) -> Floats:
     """(r SIDES, 3) corners of the sections."""
     around = 2 * math.pi * np.arange(SIDES) / SIDES
     across = np.zeros(3)
@@ -117,7 +127,7 @@ def outline(line: Line, centre: Floats, angle: Floats) -> Floats:
     normal[:, _along(line)], normal[:, 2] = np.sin(angle), np.cos(angle)
     corners = (
         centre[:, None]
-        + line.half_width * np.cos(around)[:, None] * across
+        + line.half_width * wider[:, None, None] * np.cos(around)[:, None] * across
         + line.half_height * np.sin(around)[:, None] * normal[:, None]
     )
     return np.asarray(corners.reshape(-1, 3))
