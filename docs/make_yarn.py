@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance import surface
 from fabricusd.errors import FabricError
-from fabricusd.fabric import Fabric, even
+from fabricusd.fabric import Binding, Fabric, even
 from fabricusd.geometry import radiance_at, tubes
 from fabricusd.images.files import write_png
+from fabricusd.reference.render import render_scene
 from fabricusd.scene.light_kinds import DISTANT, DOME
 from fabricusd.scene.scene import Camera, FabricSurface, Light, Mesh, Scene
-from fabricusd.reference.render import render_scene
-from fabricusd.fabric import Binding
 from fabricusd.schema import load, preset_names
 from fabricusd.schema.describe import yarn_words
 
@@ -50,6 +49,22 @@ PAIRS = (
 )
 """Light and view of the comparison."""
 
+ATTRIBUTES = (
+    ("`thread:unevenness:cv`", "ratio", "CVm, the coefficient of variation of the mass of pieces "
+     "8 mm long, as evenness testers give it; the width varies by half of it"),
+    ("`thread:unevenness:length`", "mm", "distance along the thread over which thickness and shade "
+     "change; 0 is refused where either varies"),
+    ("`thread:unevenness:count`", "ratio", "coefficient of variation of the mass from thread to "
+     "thread"),
+    ("`thread:unevenness:shade`", "ratio", "standard deviation of the albedo over the albedo, half "
+     "of its variance along the thread and half between threads"),
+    ("`thread:slub:amount`, `length`, `spacing`", "ratio, mm, mm", "how much wider the middle of a "
+     "slub is, how long slubs are, how far apart"),
+    ("`thread:plies`, `thread:twist`", "number, turns/m", "yarns that wind round one another; Z "
+     "above 0, S below"),
+    ("`fabric:unevenness:seed`", "number", "chooses one of many cloths whose threads are alike"),
+)  # fmt: skip
+
 HEAD = """# Yarn as it is spun
 
 Made by `make docs` (`python docs/make_yarn.py`).
@@ -59,26 +74,16 @@ from near. The attributes of a thread say how uneven it is; their fallbacks are 
 
 | attribute | unit | means |
 |---|---|---|
-| `thread:unevenness:cv` | ratio | CVm, the coefficient of variation of the mass of pieces 8 mm long, as \
-evenness testers give it; the width varies by half of it |
-| `thread:unevenness:length` | mm | distance along the thread over which thickness and shade change; \
-0 is refused where either varies |
-| `thread:unevenness:count` | ratio | coefficient of variation of the mass from thread to thread |
-| `thread:unevenness:shade` | ratio | standard deviation of the albedo, half of its variance along the \
-thread and half between threads |
-| `thread:slub:amount`, `length`, `spacing` | ratio, mm, mm | how much wider the middle of a slub is, \
-how long slubs are, how far apart |
-| `thread:plies`, `thread:twist` | number, turns/m | yarns that wind round one another; Z above 0, S \
-below |
-| `fabric:unevenness:seed` | number | chooses one of many cloths whose threads are alike |
+{attributes}
 
 A thread that is thick and thin also lies a little off its place where it has room, and the crest of
 each of its floats a little off the middle.
 
 ![Close-ups of presets](images/yarn.png)
 
-Twenty pixels a thread: even, uneven, and `geometry` of the same uneven threads. Rows: {rows}. The
-tubes do not move the crests of floats and show no plies; velvet's pile has even tubes only.
+Twenty pixels a thread: even, uneven, and `geometry` of the same uneven threads. Presets by rows:
+{rows}. Tubes keep the crests of floats in the middle and show no plies. Velvet has no tubes here:
+`geometry` takes pile for even only.
 
 ![Single yarns](images/yarn_threads.png)
 
@@ -86,48 +91,50 @@ The same for the presets of one yarn: {singles}.
 
 ![From near and from far](images/yarn_distance.png)
 
-{distances} pixels a thread, even above and uneven below, by the path tracer at `--level auto`: linen,
-then rayon shantung; last, linen of two plies with Z and with S twist, {plied}.
+{distances} pixels a thread, even above and uneven below, by the path tracer at `--level auto`:
+linen, then rayon shantung. Last, linen of two plies with Z and with S twist: {plied}.
 
 ## What is kept
 - Level `far` does not see yarn: it has the same bits.
-- Unevenness moves places, not laws: a place of uneven cloth is a place of the even one, elsewhere. All
-  that is known of the even cloth (curves, heights, horizon tables, cell tables of a bake) is looked up
-  there. A thread is 1 + e times as wide, e has the mean 0 and is independent of the threads that cross,
-  so the areas of the sets, of the gap, and of each tangent angle are kept on average.
-- Where threads have room, their edges part. Where they touch, the border between two of them moves, so
-  that no gap opens. No thread falls below {least:.0%} of its width.
-- The numbers behind e are opposite in pairs, along a thread and from thread to thread. The mean over a
-  window therefore differs from the even cloth's by something that falls as 1/length.
+- Unevenness moves places, not laws: a place of uneven cloth is a place of the even one, elsewhere.
+  All that is known of the even cloth (curves, heights, horizon tables, cell tables of a bake) is
+  looked up there, so what law and shadow have in common is kept. A thread is 1 + e times as wide; e
+  has the mean 0 and is independent of the threads that cross, so the areas of the sets, of the gap
+  and of each tangent angle are kept on average.
+- Where threads have room, their edges part. Where they touch, the border between two of them moves,
+  so that no gap opens. No thread falls below {least:.0%} of its width.
+- The numbers behind e are opposite in pairs, along a thread and from thread to thread. The mean
+  over a window therefore differs from the even cloth's by something that falls as 1/length.
 - The pixel's footprint evens the noise out along the thread.
-- The shade has the mean 1. It is limited so that no albedo falls below 0, or of `conserving` threads
-  above 1; light that scatters more than once takes the mean.
-- Plies move the place across the thread at which level `thread` evaluates the law, by a map that shows
-  every place equally often. That keeps the mean of the law. Under a shadow it does not quite: shadows
-  know where light meets a round thread, and the strands of a ply look elsewhere.
+- The shade has the mean 1. It is limited so that no albedo falls below 0, or of `conserving`
+  threads rises above 1; light that scatters more than once takes the mean.
+- Plies move the place across the thread at which level `thread` evaluates the law, by a map that
+  shows every place equally often. That keeps the mean of the law. Under a shadow it does not quite:
+  shadows know where light meets a round thread, and the strands of a ply look elsewhere. With three
+  plies, crêpe de Chine is 6 % brighter.
 
-Differences of the mean over {window:.0f} by {window:.0f} threads from that of the even cloth, the largest \
-of {pairs}
-pairs of light and view and of three channels, in percent:
+Differences of the mean over {window:.0f} by {window:.0f} threads from that of the even cloth, the
+largest of {pairs} pairs of light and view and of three channels, in percent:
 
 | preset | `weave` | `weave`, horizon | `thread`, horizon | yarn |
 |---|---|---|---|---|"""
 
 TAIL = """
-The figures of the presets are derived, not published with their fabrics: spun yarn is given what is usual
-for its kind in tables of evenness testers (CVm .12 to .14 for rayon and polyester, .15 for spun silk,
-.17 to .18 for wool, .20 to .22 for linen), filament .01 to .02, raw silk .06 from thread to thread.
-Shantung has its slubs in the weft.
+The figures of the presets are derived, not published with their fabrics. Spun yarn is given what is
+usual for its kind in tables of evenness testers (Uster statistics): CVm .12 to .13 for polyester
+and rayon, .15 for spun silk, .17 to .18 for wool, .20 to .22 for linen. Filament has .01 to .02,
+raw silk varies by .06 from thread to thread. Shantung has its slubs in the weft.
 
 ## In a bake
-A repeat no longer repeats. Maps are looked up in the cell table all the same: a texel takes the entry of
-the place at which even threads look as they do there, and its colours take the shades of the threads under
-its centre. `thread_id` tells the thread that is there, and `weave_coordinate` the place on the even cloth.
-Crests stay in the middle of floats where a cell table is used. A BTF is made to be repeated, and is even.
+A repeat no longer repeats. Maps are looked up in the cell table all the same: a texel takes the
+entry of the place at which even threads look as they do there, and its colours take the shades of
+the threads under its centre. `thread_id` tells the thread that is there, and `weave_coordinate` the
+place on the even cloth. At coarser levels, texels at the border of a UV shell have the mean shade.
+A BTF is made to be repeated, and is even.
 
 ## What is missing
-Fibres that stand off the yarn, and fibres on its surface: from 40 pixels a thread on, spun yarn looks too
-smooth. Heights and horizons are those of even threads, so a slub is wider but no higher.
+Fibres that stand off the yarn, and fibres on its surface: from 40 pixels a thread on, spun yarn
+looks too smooth. Heights and horizons are those of even threads, so a slub is wider but no higher.
 """
 
 
@@ -231,9 +238,7 @@ def plied(turns: float) -> Fabric:
     """Linen of two plies, more even than single yarn, as doubling makes it."""
     fabric = load("linen_plain")
     changes = {"unevenness_cv": 0.12, "slub_amount": 0.0, "plies": 2, "twist": turns}
-    return replace(
-        fabric, threads={k: replace(t, **changes) for k, t in fabric.threads.items()}
-    )
+    return replace(fabric, threads={k: replace(t, **changes) for k, t in fabric.threads.items()})
 
 
 def distances(target: Path) -> None:
@@ -288,7 +293,7 @@ def row(name: str) -> str:
 
 def main() -> None:
     """Write the page, and the pictures unless `--page` leaves them."""
-    from fabricusd.appearance.yarn.compiled import LEAST
+    from fabricusd.appearance.weave.yarn.compiled import LEAST
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--page", action="store_true")
@@ -300,6 +305,7 @@ def main() -> None:
         close_ups(singles, 2, HERE / "images" / "yarn_threads.png")
         distances(HERE / "images" / "yarn_distance.png")
     words = HEAD.format(
+        attributes="\n".join(f"| {' | '.join(row)} |" for row in ATTRIBUTES),
         rows=", ".join(fabrics), singles=", ".join(singles), least=LEAST, window=WINDOW,
         pairs=len(PAIRS), plied=yarn_words(plied(450.0).thread_list[0]),
         distances=", ".join(f"{x:g}" for x in DISTANCES),

@@ -16,8 +16,8 @@ import numpy as np
 
 from fabricusd.appearance.weave.compiled import compile_fabric
 from fabricusd.appearance.weave.lookup import find_all
-from fabricusd.appearance.yarn.compiled import compile_yarn
-from fabricusd.appearance.yarn.lay import laid
+from fabricusd.appearance.weave.yarn.compiled import compile_yarn
+from fabricusd.appearance.weave.yarn.lay import laid
 from fabricusd.fabric import Binding, Fabric, even
 from fabricusd.reference.render import render_scene
 from fabricusd.scene.light_kinds import DISTANT, DOME

@@ -58,8 +58,7 @@ from fabricusd.appearance.shadow.place_blocks import (
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.lookup import WeaveHit, lookup
 from fabricusd.appearance.weave.place import Places, place_at
-from fabricusd.appearance.yarn.compiled import Yarn, compile_yarn
-from fabricusd.appearance.yarn.lay import laid
+from fabricusd.appearance.weave.yarn.compiled import Yarn, compile_yarn
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import BLOCK, KERNEL, index
@@ -227,9 +226,8 @@ def _places(
     if places.ndim != 2 or places.shape[1] != 2 or len(places) not in (1, count):
         raise FabricError("uv", f"has shape {places.shape}; it must be ({count}, 2) or (2,)")
     places = np.ascontiguousarray(np.broadcast_to(places, (count, 2)))
-    yarn = _yarn(fabric)
-    hit = lookup(_cloth(fabric), places, yarn)
-    return hit, places if yarn is None else laid(yarn, places).uv
+    hit = lookup(_cloth(fabric), places, _yarn(fabric))
+    return hit, hit.even_uv
 
 
 @lru_cache(maxsize=32)

@@ -18,8 +18,8 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.geometry.lines import Repeat, repeat_lines
 from fabricusd.geometry.mesh import Mesh, sweep
-from fabricusd.geometry.uneven import uneven_lines
 from fabricusd.geometry.pile import tuft_repeat
+from fabricusd.geometry.uneven import uneven_lines
 from fabricusd.reference.rays.embree import Accelerator
 
 Floats = NDArray[np.float64]
@@ -96,9 +96,7 @@ class Cloth:
         )
 
 
-def tubes(
-    fabric: Fabric, *, squash: float = 1.0, threads: tuple[int, int] | None = None
-) -> Cloth:
+def tubes(fabric: Fabric, *, squash: float = 1.0, threads: tuple[int, int] | None = None) -> Cloth:
     """`fabric` as tubes that can be traced.
 
     squash : float, above 0 and up to 1 - the sections' greatest height, over the one that just fits
@@ -137,8 +135,8 @@ def tubes(
         mesh=mesh,
         patch=Patch(
             repeat.size,
-            -repeat.size * mesh.copies + widest,
-            repeat.size * (mesh.copies + 1) - widest,
+            -mesh.rim + widest,
+            repeat.size + mesh.rim - widest,
             bottom - spare,
             top + spare,
         ),

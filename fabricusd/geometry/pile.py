@@ -169,5 +169,5 @@ def _mesh(repeat: Repeat, axes: list[Floats], bends: list[Floats], depth: float)
         points=np.concatenate(points),
         triangles=np.concatenate(triangles),
         rings=Rings(*columns),
-        copies=copies,
+        rim=copies * repeat.size,
     )

@@ -14,8 +14,8 @@ import numpy as np
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.coverage import coverage, sets
-from fabricusd.appearance.yarn.compiled import compile_yarn
-from fabricusd.appearance.yarn.lay import edges, laid
+from fabricusd.appearance.weave.yarn.compiled import compile_yarn
+from fabricusd.appearance.weave.yarn.lay import edges, laid
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.geometry.centre import RINGS

@@ -63,9 +63,7 @@ THREAD = (
     Attribute("thread:thickness", "double", Thread, "thickness", MILLIMETRE, "mm"),
     Attribute("thread:color", "color3d", Thread, "color"),
     Attribute("thread:unevenness:cv", "double", Thread, "unevenness_cv"),
-    Attribute(
-        "thread:unevenness:length", "double", Thread, "unevenness_length", MILLIMETRE, "mm"
-    ),
+    Attribute("thread:unevenness:length", "double", Thread, "unevenness_length", MILLIMETRE, "mm"),
     Attribute("thread:unevenness:count", "double", Thread, "unevenness_count"),
     Attribute("thread:unevenness:shade", "double", Thread, "unevenness_shade"),
     Attribute("thread:slub:amount", "double", Thread, "slub_amount"),

@@ -145,8 +145,8 @@ def yarn_words(thread: Thread) -> str:
         words.append(f"count varies by {100 * thread.unevenness_count:.3g} %")
     if thread.slub_amount:
         words.append(
-            f"slubs {100 * thread.slub_amount:.3g} % wider, {1e3 * thread.slub_length:.3g} mm long, "
-            f"{1e3 * thread.slub_spacing:.3g} mm apart"
+            f"slubs {100 * thread.slub_amount:.3g} % wider, "
+            f"{1e3 * thread.slub_length:.3g} mm long, {1e3 * thread.slub_spacing:.3g} mm apart"
         )
     if thread.unevenness_shade:
         words.append(f"shade varies by {100 * thread.unevenness_shade:.3g} %")

@@ -20,8 +20,8 @@ from fabricusd.appearance.weave.bands import band_areas
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, coverage
 from fabricusd.appearance.weave.place import Places
-from fabricusd.appearance.yarn.compiled import Yarn, compile_yarn
-from fabricusd.appearance.yarn.lay import crest, laid, strands_all
+from fabricusd.appearance.weave.yarn.compiled import Yarn, compile_yarn
+from fabricusd.appearance.weave.yarn.lay import crest, laid, strands_all
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave
 from fabricusd.kernels.real import INLINE, KERNEL, PART, index
@@ -50,6 +50,7 @@ class WeaveHit(NamedTuple):
     number : (n,) int64 - of the thread in its set, from the corner of the cloth
     strand : (n,) float - position across the strand that is seen, of a thread of plies; else w
     shade : (n,) float - factor of the thread's albedo; (0,) where that is 1 everywhere
+    even_uv : (n, 2) float64 - the place of the even cloth that looks as this one does [threads]
     """
 
     set: NDArray[np.uint8]
@@ -63,6 +64,7 @@ class WeaveHit(NamedTuple):
     number: NDArray[np.int64]
     strand: NDArray[Any]
     shade: NDArray[Any]
+    even_uv: NDArray[np.float64]
 
     @property
     def places(self) -> Places:
@@ -345,7 +347,8 @@ def heights_all(R, cloth, sets, threads, s, w, length, height, crown):
 
 @njit(parallel=True, **KERNEL)
 def crests_all(R, cloth, yarn, uv, sets, threads, numbers, s, length, angle):
-    """Write the tangent angle at the `crest` of each place to angle (n,).
+    """Move the places along the threads that are seen there by `move_along`; uv, s and angle are
+    written.
 
     uv : (n, 2) - places on the even cloth; numbers : (n, 2) int64 as in `Laid`; the others are what
         `find_all` gives there
@@ -353,21 +356,26 @@ def crests_all(R, cloth, yarn, uv, sets, threads, numbers, s, length, angle):
     for k in prange(uv.shape[0]):
         which = int(sets[k])
         if which != GAP and length[k] > R(0):
-            angle[k] = crest_angle(
-                R, cloth, yarn, which, threads[k], numbers[k, which], s[k], length[k],
-                uv[k, 1] if which == WARP else uv[k, 0],
-            )  # fmt: skip
+            axis = 1 if which == WARP else 0
+            uv[k, axis], s[k], angle[k] = move_along(
+                R, cloth, yarn, which, threads[k], numbers[k, which], s[k], length[k], uv[k, axis]
+            )
 
 
 @njit(**INLINE)
-def crest_angle(R, cloth, yarn, which, thread, number, s, length, place):
-    """Tangent angle [rad] at `s` of a visible run of an uneven thread.
+def move_along(R, cloth, yarn, which, thread, number, s, length, place):
+    """(place, s, angle) at which the even thread is as steep as an uneven one is at `s` of a run.
 
     number : of the thread; length : of the run [m]; place : where s lies along the thread of the
         even cloth [cells], float64
     """
-    moved = crest(R, yarn, which, thread, number, s, length / R(yarn.cell[which]), place)
-    return angle_on(R, cloth, thread, min(moved, cloth.last))
+    cells = length / R(yarn.cell[which])
+    moved = min(crest(R, yarn, which, thread, number, s, cells, place), cloth.last)
+    return (
+        place + float((moved - s) * cells),
+        moved,
+        angle_on(R, cloth, thread, moved),
+    )
 
 
 def lookup(
@@ -404,15 +412,15 @@ def lookup(
     else:
         places, numbers, shades = laid(yarn, uv)
     find_all(real, cloth, places, sets, threads, s, w, angle, length)
-    heights_all(real, cloth, sets, threads, s, w, length, height, crown)
     strand, shade = w, np.empty(0, real)
     on = np.arange(n), (sets == WARP).astype(np.intp)
     if yarn is not None:
         crests_all(real, cloth, yarn, places, sets, threads, numbers, s, length, angle)
         strand, shade = np.empty(n, real), shades[on].astype(real)
         strands_all(real, yarn, uv, sets, threads, numbers, w, strand)
+    heights_all(real, cloth, sets, threads, s, w, length, height, crown)
     return WeaveHit(
-        sets, threads, s, w, angle, height, crown, sets == GAP, numbers[on], strand, shade
+        sets, threads, s, w, angle, height, crown, sets == GAP, numbers[on], strand, shade, places
     )
 
 

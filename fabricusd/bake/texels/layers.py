@@ -14,9 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.appearance.weave.lookup import find
+from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
+from fabricusd.appearance.weave.lookup import find, move_along
 from fabricusd.bake.texels import moment_indices as m
 from fabricusd.bake.texels import moments
 from fabricusd.bake.texels.cell_table import CellLevel, CellTable
@@ -333,10 +333,20 @@ def _centres(  # type: ignore[no-untyped-def]
             v = start[1] + step[1, 0] * (i + 0.5) + step[1, 1] * (j + 0.5)
             u, v, warp, weft = moments.laid_at(made, u, v, blur)
             shades[WEFT, j, i], shades[WARP, j, i] = weft.shade, warp.shade
+            at_u, at_v = u, v
             u -= repeat[0] * np.floor(u / repeat[0])
             v -= repeat[1] * np.floor(v / repeat[1])
+            which, thread, s, _, _, length = find(np.float32, made.cloth, u, v)
+            if made.uneven != 0 and which != GAP and length > np.float32(0):
+                seen, place = (warp, at_v) if which == WARP else (weft, at_u)
+                moved, _, _ = move_along(
+                    np.float32, made.cloth, made.yarn, which, thread, seen.number, s, length, place
+                )
+                u, v = (u, v + (moved - place)) if which == WARP else (u + (moved - place), v)
+                u -= repeat[0] * np.floor(u / repeat[0])
+                v -= repeat[1] * np.floor(v / repeat[1])
             weave[j, i, 0], weave[j, i, 1] = u, v
-            sets[j, i], threads[j, i], _, _, _, _ = find(np.float32, made.cloth, u, v)
+            sets[j, i], threads[j, i] = which, thread
 
 
 @njit(**LEAN)

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.shadow.methods import lit
 from fabricusd.appearance.weave.coverage import GAP, WARP
-from fabricusd.appearance.weave.lookup import crest_angle, crown_on, find, wrap
+from fabricusd.appearance.weave.lookup import crown_on, find, move_along, wrap
 from fabricusd.appearance.weave.place import Hit
-from fabricusd.appearance.yarn.lay import EVENLY, lay_at, sound
+from fabricusd.appearance.weave.yarn.lay import EVENLY, lay_at, sound
 from fabricusd.bake.texels.angle_rows import HEIGHTS, STEPS
 from fabricusd.bake.texels.moment_indices import (
     AZIMUTHS,
@@ -110,10 +110,18 @@ def texels(  # type: ignore[no-untyped-def]
 def threads_under(made, weave, sets, threads):  # type: ignore[no-untyped-def]
     """Write the thread set and type at weave coordinates (n, 2) float64 to sets, threads (n,), and
     into `weave` the places of the even cloth, which uneven threads move."""
+    R = np.float32
     for k in range(weave.shape[0]):
-        u, v, _, _ = laid_at(made, weave[k, 0], weave[k, 1], np.float32(0))
+        u, v, warp, weft = laid_at(made, weave[k, 0], weave[k, 1], R(0))
+        which, thread, s, _, _, length = find(R, made.cloth, u, v)
+        if made.uneven != 0 and which != GAP and length > R(0):
+            seen, place = (warp, v) if which == WARP else (weft, u)
+            moved, _, _ = move_along(
+                R, made.cloth, made.yarn, which, thread, seen.number, s, length, place
+            )
+            u, v = (u, moved) if which == WARP else (moved, v)
         weave[k, 0], weave[k, 1] = u, v
-        sets[k], threads[k], _, _, _, _ = find(np.float32, made.cloth, u, v)
+        sets[k], threads[k] = which, thread
 
 
 @njit(**INLINE)
@@ -152,10 +160,11 @@ def _add(made, u, v, out):  # type: ignore[no-untyped-def]
         return
     seen = warp if which == WARP else weft
     if made.uneven != 0 and length > R(0):
-        place = v if which == WARP else u
-        angle = crest_angle(
-            R, made.cloth, made.yarn, which, thread, seen.number, s, length, place
-        )
+        at, s, angle = move_along(
+            R, made.cloth, made.yarn, which, thread, seen.number, s, length,
+            v if which == WARP else u,
+        )  # fmt: skip
+        u, v = (u, at) if which == WARP else (at, v)
     step = int((angle * R(1.0 / math.pi) + R(0.5)) * R(STEPS - 1) + R(0.5))
     step = min(max(step, 0), STEPS - 1)
     for p in range(LIT):

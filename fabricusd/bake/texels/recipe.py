@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric, true_repeat
-from fabricusd.appearance.yarn.compiled import Yarn, compile_yarn
+from fabricusd.appearance.weave.yarn.compiled import Yarn, compile_yarn
 from fabricusd.bake.texels.angle_rows import angle_rows, height_rows
 from fabricusd.bake.texels.light import unit_light
 from fabricusd.bake.texels.moment_indices import MOMENTS

@@ -20,7 +20,7 @@ from fabricusd.appearance.sampling.fit import no_mixture
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.place import Places
-from fabricusd.appearance.yarn.compiled import compile_yarn
+from fabricusd.appearance.weave.yarn.compiled import compile_yarn
 from fabricusd.fabric import Fabric
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import Film

@@ -28,10 +28,10 @@ from fabricusd.appearance.sampling.blocks import Drawn, sample_points
 from fabricusd.appearance.shadow.methods import NONE, Shadow, compile_shadow, shade
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
-from fabricusd.appearance.weave.lookup import back_of, crest_angle, find
+from fabricusd.appearance.weave.lookup import back_of, find, move_along
 from fabricusd.appearance.weave.place import Hit, Places, place_at
-from fabricusd.appearance.yarn.compiled import compile_yarn
-from fabricusd.appearance.yarn.lay import (
+from fabricusd.appearance.weave.yarn.compiled import compile_yarn
+from fabricusd.appearance.weave.yarn.lay import (
     DOUBLE_ROWS,
     IN_CELL,
     INT_ROWS,
@@ -345,7 +345,6 @@ def _look_up_laid(R, cloth, yarn, home, v_sign, u, v, x, reals, ints, hits, h, k
         place_u = float(ints[WARP * BLOCK + x]) + float(reals[IN_CELL + WARP * BLOCK + x])
         place_v = float(ints[WEFT * BLOCK + x]) + float(reals[IN_CELL + WEFT * BLOCK + x])
     near_u, near_v = place_u - home[0], place_v - home[1]
-    hits[PLACE, h], hits[PLACE + 1, h] = R(near_u), R(near_v)
     which, thread, s, w, angle, run = find(R, cloth, near_u, v_sign * near_v)
     sets[k], threads[k], along[k], across[k] = which, thread, s, w
     psi0[k], length[k], strands[k], shades[k] = angle, run, w, R(1)
@@ -356,8 +355,14 @@ def _look_up_laid(R, cloth, yarn, home, v_sign, u, v, x, reals, ints, hits, h, k
             at = v_sign * v if which == WARP else u
             strands[k] = strand(R, yarn, which, thread, number, w, at * yarn.cell[which])
         if run > R(0):
-            place = place_v if which == WARP else place_u
-            psi0[k] = crest_angle(R, cloth, yarn, which, thread, number, s, run, place)
+            # Along the thread as this side counts it: from the back, V runs the other way.
+            place = v_sign * place_v if which == WARP else place_u
+            moved, along[k], psi0[k] = move_along(
+                R, cloth, yarn, which, thread, number, s, run, place
+            )
+            near_u = near_u if which == WARP else moved - home[0]
+            near_v = v_sign * moved - home[1] if which == WARP else near_v
+    hits[PLACE, h], hits[PLACE + 1, h] = R(near_u), R(near_v)
 
 
 @njit(**LEAN)

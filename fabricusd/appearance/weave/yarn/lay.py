@@ -20,7 +20,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from fabricusd.appearance.weave.coverage import WARP, WEFT
-from fabricusd.appearance.yarn.compiled import (
+from fabricusd.appearance.weave.yarn.compiled import (
     ASTRAY,
     COUNT,
     CREST,
@@ -40,7 +40,7 @@ from fabricusd.appearance.yarn.compiled import (
     WINDING,
     Yarn,
 )
-from fabricusd.appearance.yarn.noise import (
+from fabricusd.appearance.weave.yarn.noise import (
     VARIANCE,
     along,
     between,
@@ -423,7 +423,7 @@ def strands_all(R, yarn, uv, sets, threads, numbers, w, out):
     """`strand` at each of uv (n, 2), of the thread that is seen there; `w` in gaps."""
     for k in prange(uv.shape[0]):
         out[k], which = w[k], int(sets[k])
-        if which == WARP or which == WEFT:
+        if which <= WARP:
             out[k] = strand(
                 R, yarn, which, threads[k], numbers[k, which], w[k],
                 uv[k, 1 if which == WARP else 0] * yarn.cell[which],

@@ -10,8 +10,8 @@ import pytest
 from fabricusd.appearance import surface
 from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage
 from fabricusd.appearance.weave.lookup import lookup
-from fabricusd.appearance.yarn.compiled import CUT, compile_yarn
-from fabricusd.appearance.yarn.lay import edges, laid
+from fabricusd.appearance.weave.yarn.compiled import CUT, compile_yarn
+from fabricusd.appearance.weave.yarn.lay import edges, laid
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, Thread, even
 from fabricusd.schema import load, preset_names
@@ -75,7 +75,6 @@ def test_many_windows_together_are_the_even_cloth(name):
 
 @pytest.mark.parametrize("name", CLOTHS)
 def test_the_mean_over_a_window_is_the_radiance_of_the_even_cloth(name):
-    """With the law alone: shadows know even threads only."""
     cloth = woven(name, **SPUN)
     uv = places(512)
     wi, wo = (0.48, 0.36, 0.8), (-0.1, -0.28, 0.955)
@@ -83,6 +82,21 @@ def test_the_mean_over_a_window_is_the_radiance_of_the_even_cloth(name):
         found = surface.evaluate(cloth, wi, wo, uv, level).mean(axis=0)
         true = surface.evaluate(even(cloth), wi, wo, uv, level).mean(axis=0)
         assert found == pytest.approx(true, rel=0.01), level
+
+
+@pytest.mark.parametrize("name", CLOTHS)
+def test_the_mean_under_a_shadow_is_that_of_the_even_cloth(name):
+    """Law and shadow look at one place of the even cloth, so what they have in common is kept."""
+    cloth = woven(name, **SPUN)
+    uv = places(768)
+    wo = (0.0, 0.0, 1.0)
+    for wi in ((-0.7, 0.5, 0.51), (0.48, 0.36, 0.8)):
+        for level in ("weave", "thread"):
+            found, true = (
+                surface.evaluate(f, wi, wo, uv, level, "horizon").mean(axis=0)
+                for f in (cloth, even(cloth))
+            )
+            assert found == pytest.approx(true, rel=0.01), (level, wi)
 
 
 @pytest.mark.parametrize("name", CLOTHS)
@@ -205,7 +219,7 @@ def test_places_that_cannot_be_counted_are_even_and_nan_stays_nan():
 
 
 @pytest.mark.parametrize(
-    "wrong, where",
+    ("wrong", "where"),
     [
         ({"unevenness_cv": 0.2}, "unevenness_length"),
         ({"unevenness_shade": 0.2}, "unevenness_length"),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.scattering.model import CONSERVING
 from fabricusd.appearance.scattering.models import model_of
 from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage, sets
-from fabricusd.appearance.yarn.noise import PEAK, VARIANCE, variance
+from fabricusd.appearance.weave.yarn.noise import PEAK, VARIANCE, variance
 from fabricusd.fabric import Fabric, Thread
 
 Reals = NDArray[Any]
@@ -121,11 +121,16 @@ def compile_yarn(
         sequence=sequence,
         sequence_length=lengths,
         cell=pitch[::-1].copy(),
-        seed=np.random.SeedSequence((back_of or fabric).unevenness_seed).generate_state(2),
+        seed=_seeds((back_of or fabric).unevenness_seed),
         alike=np.array([len(set(s.sequence)) == 1 for s in sets(fabric)], np.uint8),
-        slubs=(rows[..., SLUB] > 0).any(axis=1).astype(np.uint8),
+        slubs=np.asarray((rows[..., SLUB] > 0).any(axis=1), np.uint8),
         plies=int(any(t.shows_plies for t in fabric.thread_list)),
     )
+
+
+def _seeds(seed: int) -> NDArray[np.uint32]:
+    """(2,) of each set, from that of the fabric."""
+    return np.asarray(np.random.SeedSequence(seed).generate_state(2), np.uint32)
 
 
 def _row(fabric: Fabric, t: Thread) -> NDArray[np.float64]:
@@ -136,7 +141,9 @@ def _row(fabric: Fabric, t: Thread) -> NDArray[np.float64]:
     row[COUNT] = WIDTH_OF_MASS * t.unevenness_count * math.sqrt(3.0)
     # Half of the shade's variance lies along the thread, half between threads.
     deviation = t.unevenness_shade / math.sqrt(2.0)
-    row[SHADE] = min(deviation, _most_shade(fabric, t) / (PEAK / math.sqrt(VARIANCE) + math.sqrt(3)))
+    row[SHADE] = min(
+        deviation, _most_shade(fabric, t) / (PEAK / math.sqrt(VARIANCE) + math.sqrt(3))
+    )
     if t.slub_amount > 0:
         row[SLUB], row[SLUB_RATE] = t.slub_amount, 1.0 / t.slub_spacing
         row[SLUB_HALF] = 0.5 * t.slub_length / t.slub_spacing

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from fabricusd.appearance.yarn.noise import PEAK, VARIANCE, along, between, hashed, variance
+from fabricusd.appearance.weave.yarn.noise import PEAK, VARIANCE, along, between, hashed, variance
 from fabricusd.kernels.real import KERNEL
 
 R = np.float64
@@ -24,10 +24,14 @@ def mixed(x):
 
 def lattice(key, i):
     """(3, n) numbers in (-1, 1) at lattice points i (n,): 2k and 2k + 1 are opposite."""
-    h = mixed(np.uint64(key) + np.uint64(0x9E3779B1) * (np.asarray(i // 2) % 2**32).astype(np.uint64))
+    h = mixed(
+        np.uint64(key) + np.uint64(0x9E3779B1) * (np.asarray(i // 2) % 2**32).astype(np.uint64)
+    )
     bits = (h & np.uint64(0x7FF), (h >> np.uint64(11)) & np.uint64(0x7FF), h >> np.uint64(22))
     sign = np.where(i % 2 == 0, 1.0, -1.0)
-    return [sign * ((b + 0.5) / half - 1.0) for b, half in zip(bits, (1024, 1024, 512), strict=True)]
+    return [
+        sign * ((b + 0.5) / half - 1.0) for b, half in zip(bits, (1024, 1024, 512), strict=True)
+    ]
 
 
 def spline(t):
