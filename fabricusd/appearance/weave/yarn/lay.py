@@ -348,8 +348,10 @@ def crest(R, yarn, which, thread, number, s, cells, place):
     """
     most = yarn.rows[which, thread, CREST]
     begun = np.int32(np.rint(place - float(s) * float(cells)))
-    key = hashed(_U(yarn.seed[which] ^ _U(0xA511E9B3)), np.int32(number))
-    q = most * third(R, hashed(key, begun))
+    # Neighbouring threads move their crests in opposite ways, where both begin a run.
+    key = hashed(_U(yarn.seed[which] ^ _U(0xA511E9B3)), np.int32(number >> 1))
+    sign = R(1) - R(2) * R(np.int32(number & 1))
+    q = sign * most * third(R, hashed(key, np.int32(begun >> 1)))
     b = R(1) + q
     return R(2) * s / (b + np.sqrt(max(R(0), b * b - R(4) * q * s)))
 
