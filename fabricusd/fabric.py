@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -157,6 +157,45 @@ class TangentCurve:
         return self.steepest == 0.0
 
 
+UNEVENNESS = (
+    "unevenness_cv", "unevenness_length", "unevenness_count", "unevenness_shade",
+    "slub_amount", "slub_length", "slub_spacing",
+)  # fmt: skip
+"""Fields of a `Thread` that are 0 where it is as even as a wire."""
+
+
+def yarn_faults(
+    *,
+    unevenness_cv: float,
+    unevenness_length: float,
+    unevenness_shade: float,
+    slub_amount: float,
+    slub_length: float,
+    slub_spacing: float,
+    unevenness_count: float = 0.0,
+    scale: float = 1.0,
+    unit: str = "m",
+) -> list[tuple[str, str]]:
+    """(field, problem) of numbers that are sound one by one but contradict one another.
+
+    scale, unit : in which the lengths are written in the message
+    """
+    faults = []
+    if unevenness_length == 0:
+        for name, value in (("cv", unevenness_cv), ("shade", unevenness_shade)):
+            if value > 0:
+                said = f"is 0; it must be above 0 {unit}, since the {name} is {value:g}"
+                faults.append(("unevenness_length", said))
+                break
+    if slub_amount > 0 and slub_length == 0:
+        said = f"is 0; it must be above 0 {unit}, since the slubs' amount is {slub_amount:g}"
+        faults.append(("slub_length", said))
+    elif slub_amount > 0 and slub_spacing < slub_length:
+        said = f"is {slub_spacing * scale:g}; it must be at least {slub_length * scale:g} {unit}"
+        faults.append(("slub_spacing", f"{said}, the length of a slub"))
+    return faults
+
+
 @dataclass(frozen=True, kw_only=True)
 class Thread:
     """A type of thread: how it scatters, how thick it is, how it bends where it is on top.
@@ -170,6 +209,18 @@ class Thread:
     curve : TangentCurve
     model : str - one of MODELS, or "" for that of the fabric
     color : (3,) float - its colour in a draft, linear Rec. 709; rendering does not use it
+    unevenness_cv : float - CVm, the coefficient of variation of the mass of pieces 8 mm long; the
+        width varies by half of it
+    unevenness_length : float - distance along the thread over which thickness and shade change [m];
+        above 0 where either varies
+    unevenness_count : float - coefficient of variation of the mass from one thread to the next
+    unevenness_shade : float - standard deviation of the albedo along and between threads, over the
+        albedo
+    slub_amount : float - how much wider a thread is in the middle of a slub, on average, over its
+        width; slub_length, slub_spacing : float - length of a slub, and distance from one to the
+        next [m]
+    plies : int - yarns that are twisted together into the thread; 1 for single yarn
+    twist : float - turns of the plies [1/m], Z above 0, S below
     documentation : str - where the numbers come from
     """
 
@@ -183,6 +234,15 @@ class Thread:
     curve: TangentCurve = TangentCurve()
     model: str = ""
     color: tuple[float, float, float] = field(default=(0.5, 0.5, 0.5), metadata=_limits(0.0))
+    unevenness_cv: float = field(default=0.0, metadata=_limits(0.0, 1.0))
+    unevenness_length: float = field(default=0.0, metadata=_limits(0.0))
+    unevenness_count: float = field(default=0.0, metadata=_limits(0.0, 1.0))
+    unevenness_shade: float = field(default=0.0, metadata=_limits(0.0, 1.0))
+    slub_amount: float = field(default=0.0, metadata=_limits(0.0, 4.0))
+    slub_length: float = field(default=0.0, metadata=_limits(0.0))
+    slub_spacing: float = field(default=0.0, metadata=_limits(0.0))
+    plies: int = field(default=1, metadata=_limits(1, 12))
+    twist: float = field(default=0.0, metadata=_limits(-20000.0, 20000.0))
     documentation: str = ""
 
     def __post_init__(self) -> None:
@@ -193,11 +253,31 @@ class Thread:
             object.__setattr__(self, name, value)
         for name in (
             "ior", "isotropic", "gamma_surface", "gamma_volume", "surface_gain", "thickness",
+            *UNEVENNESS, "twist",
         ):  # fmt: skip
             object.__setattr__(self, name, float(getattr(self, name)))
+        if self.plies != int(self.plies):
+            raise FabricError("plies", f"is {self.plies!r}; it must be a whole number")
+        object.__setattr__(self, "plies", int(self.plies))
         _require_limits(self)
+        for name, problem in yarn_faults(**{name: getattr(self, name) for name in UNEVENNESS}):
+            raise FabricError(name, problem)
         if self.model and self.model not in MODELS:
             raise FabricError("model", f"is '{self.model}'; it must be one of {', '.join(MODELS)}")
+
+    @property
+    def is_uneven(self) -> bool:
+        """Whether its width or its shade varies, or its plies show."""
+        return (
+            max(self.unevenness_cv, self.unevenness_count, self.unevenness_shade) > 0
+            or self.slub_amount > 0
+            or self.shows_plies
+        )
+
+    @property
+    def shows_plies(self) -> bool:
+        """Whether it is of several yarns that wind round one another."""
+        return self.plies > 1 and self.twist != 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,6 +383,7 @@ class Fabric:
         `conserving` threads follow "facets" whatever it is, and threads of other models cannot
     opaque : bool - whether it lets no light through: cloth with a backing, or pile
     sides : Sides - where its light goes (`conserving` only)
+    unevenness_seed : int - chooses one of many cloths whose uneven threads are alike
     masking_width : float - standard deviation of `u`, the correlation of shadowing and masking in
         azimuth [rad]; 20 degrees in [Sadeghi2013]
     back : Fabric or None - the other side, if it is a fabric of its own; None mirrors this one
@@ -321,6 +402,7 @@ class Fabric:
     masking_width: float = field(
         default=20 * DEGREE, metadata=_limits(above=0.0, maximum=2 * math.pi)
     )
+    unevenness_seed: int = field(default=0, metadata=_limits(0, 2**31 - 1))
     back: Fabric | None = None
     documentation: str = ""
 
@@ -368,12 +450,27 @@ class Fabric:
         """The threads in index order."""
         return tuple(self.threads.values())
 
+    @property
+    def is_uneven(self) -> bool:
+        """Whether any thread's width or shade varies, or its plies show."""
+        return any(t.is_uneven for t in self.threads.values())
+
     def model_of(self, thread: Thread) -> str:
         """The scattering model that `thread` is evaluated with in this fabric."""
         return thread.model or self.model
 
     def __hash__(self) -> int:
         return hash((self.name, tuple(self.threads.items()), self.weave, self.warp, self.weft))
+
+
+def even(fabric: Fabric) -> Fabric:
+    """`fabric` of threads that are as even as wires, and so is its back."""
+    wires: dict[str, Any] = {**dict.fromkeys(UNEVENNESS, 0.0), "plies": 1, "twist": 0.0}
+    return replace(
+        fabric,
+        threads={name: replace(t, **wires) for name, t in fabric.threads.items()},
+        back=None if fabric.back is None else even(fabric.back),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

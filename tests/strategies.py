@@ -39,7 +39,7 @@ def curves(draw: st.DrawFn) -> TangentCurve:
 
 
 @st.composite
-def threads(draw: st.DrawFn) -> Thread:
+def threads(draw: st.DrawFn, uneven: bool = False) -> Thread:
     return Thread(
         albedo=draw(COLORS),
         ior=draw(numbers(1, 3)),
@@ -51,8 +51,28 @@ def threads(draw: st.DrawFn) -> Thread:
         curve=draw(curves()),
         model=draw(st.sampled_from(("", *MODELS))),
         color=draw(COLORS),
+        **(draw(yarns()) if uneven else {}),
         documentation=draw(TEXT),
     )
+
+
+@st.composite
+def yarns(draw: st.DrawFn) -> dict[str, float | int]:
+    """Fields of a thread that say how even it is; half of all threads are wires."""
+    if draw(st.booleans()):
+        return {}
+    slub, apart = draw(st.integers(1000, 500000)), draw(st.integers(1, 9))
+    return {
+        "unevenness_cv": draw(numbers(0, 0.5)),
+        "unevenness_length": draw(scaled(0.5, 50, 1e-3)),
+        "unevenness_count": draw(numbers(0, 0.3)),
+        "unevenness_shade": draw(numbers(0, 0.5)),
+        "slub_amount": draw(numbers(0, 2)),
+        "slub_length": slub / 1e4 * 1e-3,
+        "slub_spacing": slub * apart / 1e4 * 1e-3,
+        "plies": draw(st.integers(1, 4)),
+        "twist": draw(numbers(-2000, 2000)),
+    }
 
 
 @st.composite
@@ -79,13 +99,14 @@ SIDES = st.just(Sides()) | st.builds(
 
 
 @st.composite
-def fabrics(draw: st.DrawFn, back: bool = True) -> Fabric:
+def fabrics(draw: st.DrawFn, back: bool = True, uneven: bool = False) -> Fabric:
+    """uneven : whether threads may be, so that no repeat of the cloth looks like another."""
     names = draw(st.lists(NAMES, min_size=1, max_size=4, unique=True))
     share = draw(numbers(0, 1))
     coverages = draw(st.sampled_from(((None, None), (share, None), (share, 1 - share))))
     return Fabric(
         name=draw(NAMES),
-        threads={name: draw(threads()) for name in names},
+        threads={name: draw(threads(uneven)) for name in names},
         weave=draw(weaves()),
         warp=draw(thread_sets(len(names), coverages[0])),
         weft=draw(thread_sets(len(names), coverages[1])),
@@ -93,6 +114,7 @@ def fabrics(draw: st.DrawFn, back: bool = True) -> Fabric:
         opaque=draw(st.booleans()),
         sides=draw(SIDES),
         masking_width=draw(degrees(1, 90)),
-        back=draw(st.none() | fabrics(back=False)) if back else None,
+        unevenness_seed=draw(st.integers(0, 2**31 - 1)),
+        back=draw(st.none() | fabrics(False, uneven)) if back else None,
         documentation=draw(TEXT),
     )

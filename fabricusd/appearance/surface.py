@@ -59,6 +59,7 @@ from fabricusd.appearance.shadow.place_blocks import (
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.lookup import WeaveHit, lookup
 from fabricusd.appearance.weave.place import Places, place_at
+from fabricusd.appearance.weave.yarn.compiled import Yarn, compile_yarn
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import BLOCK, KERNEL, index
@@ -221,7 +222,8 @@ def _check_shadow(method: str) -> None:
 def _places(
     fabric: Fabric, uv: ArrayLike | None, level: str, count: int
 ) -> tuple[WeaveHit, Floats]:
-    """The hit at each of `count` places, and the places (count, 2); a single dummy for `far`."""
+    """The hit at each of `count` places, and the places (count, 2) of the even cloth that look as
+    they do; a single dummy for `far`."""
     if level not in LEVELS:
         raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
     if level == "far":
@@ -233,12 +235,18 @@ def _places(
     if places.ndim != 2 or places.shape[1] != 2 or len(places) not in (1, count):
         raise FabricError("uv", f"has shape {places.shape}; it must be ({count}, 2) or (2,)")
     places = np.ascontiguousarray(np.broadcast_to(places, (count, 2)))
-    return lookup(_cloth(fabric), places), places
+    hit = lookup(_cloth(fabric), places, _yarn(fabric))
+    return hit, hit.even_uv
 
 
 @lru_cache(maxsize=32)
 def _cloth(fabric: Fabric) -> CompiledFabric:
     return compile_fabric(fabric, precision=np.float64)
+
+
+@lru_cache(maxsize=32)
+def _yarn(fabric: Fabric) -> Yarn | None:
+    return compile_yarn(fabric, precision=np.float64) if fabric.is_uneven else None
 
 
 def _directions(name: str, w: ArrayLike) -> Floats:
@@ -335,7 +343,7 @@ def _weave_chunk(R, cloth, shadow, tables, uv, wi, wo, out, first, last):
         horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
         mean_block(R, cloth, shadow, wi, begin, size, ints, reals)
         # Level `weave` does not read the position across: any row will do.
-        places = Places(ints[OF_SET:], ints[OF_THREAD:], reals[ANGLE:], reals[S:])
+        places = Places(ints[OF_SET:], ints[OF_THREAD:], reals[ANGLE:], reals[S:], reals[:0])
         point_block(R, tables, False, places, 0, wi, wo, out, begin, size, block)
         for c in range(3):
             for k in range(size):

@@ -1,7 +1,7 @@
 """The repeat of a weave as tubes that light is traced through: what the levels are judged by."""
 
 from fabricusd.geometry.cloth import Cloth, tubes
-from fabricusd.geometry.paths import Reflectance, Shares, albedo, reflectance
+from fabricusd.geometry.paths import Reflectance, Shares, albedo, radiance_at, reflectance
 from fabricusd.geometry.places import Seen, lit_share, seen
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     "Shares",
     "albedo",
     "lit_share",
+    "radiance_at",
     "reflectance",
     "seen",
     "tubes",

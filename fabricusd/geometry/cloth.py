@@ -19,6 +19,7 @@ from fabricusd.fabric import Fabric
 from fabricusd.geometry.lines import Repeat, repeat_lines
 from fabricusd.geometry.mesh import Mesh, sweep
 from fabricusd.geometry.pile import tuft_repeat
+from fabricusd.geometry.uneven import uneven_lines
 from fabricusd.reference.rays.embree import Accelerator
 
 Floats = NDArray[np.float64]
@@ -95,10 +96,13 @@ class Cloth:
         )
 
 
-def tubes(fabric: Fabric, *, squash: float = 1.0) -> Cloth:
+def tubes(fabric: Fabric, *, squash: float = 1.0, threads: tuple[int, int] | None = None) -> Cloth:
     """`fabric` as tubes that can be traced.
 
     squash : float, above 0 and up to 1 - the sections' greatest height, over the one that just fits
+    threads : ends and picks of a patch of true threads, at least, whose tubes are as uneven as they
+        are; the patch is rounded up to whole repeats, and repeated. None for one repeat of even
+        threads
 
     Raises FabricError for cloth that has no such geometry: pile, curves that leave crossing threads
     no room, repeats too large.
@@ -106,17 +110,24 @@ def tubes(fabric: Fabric, *, squash: float = 1.0) -> Cloth:
     if not 0.0 < squash <= 1.0:
         raise FabricError("squash", f"is {squash}; it must be above 0 and at most 1")
     piled = _is_pile(fabric)
+    if piled and threads is not None:
+        raise FabricError("threads", "is asked of pile; geometry takes even pile only")
     if piled:
         repeat, mesh = tuft_repeat(fabric, squash)
     else:
         repeat = repeat_lines(fabric, squash)
+        if threads is not None:
+            repeat = uneven_lines(fabric, repeat, threads)
     if not repeat.lines:
         raise FabricError(f"fabric '{fabric.name}'", "covers nothing; it must show some thread")
     top = max(float((ln.height + ln.half_height).max()) for ln in repeat.lines)
     bottom = min(float((ln.height - ln.half_height).min()) for ln in repeat.lines)
     if not piled:
         mesh = sweep(repeat, top - bottom)
-    spare, widest = 1e-3 * (top - bottom), max(ln.half_width for ln in repeat.lines)
+    spare = 1e-3 * (top - bottom)
+    widest = max(
+        ln.half_width * (1.0 if ln.wider is None else float(ln.wider.max())) for ln in repeat.lines
+    )
     pitch = np.array([s.pitch for s in sets(fabric)])
     return Cloth(
         fabric=fabric,
@@ -124,8 +135,8 @@ def tubes(fabric: Fabric, *, squash: float = 1.0) -> Cloth:
         mesh=mesh,
         patch=Patch(
             repeat.size,
-            -repeat.size * mesh.copies + widest,
-            repeat.size * (mesh.copies + 1) - widest,
+            -mesh.rim + widest,
+            repeat.size + mesh.rim - widest,
             bottom - spare,
             top + spare,
         ),

@@ -30,6 +30,8 @@ class Line:
     half_width, half_height : float - half axes of its section
     height, angle : (n RINGS,) float - of its centre line [m], its tangent angle [rad], in the
         middles of RINGS parts of a cell
+    wider, aside, shade : (n RINGS,) float or None - of an uneven thread there: its width over that
+        of the even one, how far its middle lies off `lateral` [m], the factor of its albedo
     """
 
     which: int
@@ -40,6 +42,9 @@ class Line:
     half_height: float
     height: Floats
     angle: Floats
+    wider: Floats | None = None
+    aside: Floats | None = None
+    shade: Floats | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -32,6 +32,7 @@ class Rings(NamedTuple):
 
     centre : (r, 3) float - middle of each section [m]
     angle, bend : (r,) float - tangent angle [rad] and its change along the thread [rad/m]
+    wider, shade : (r,) float - width of the section over that of its line, factor of the albedo
     line : (r,) int32 - the section's line
     first : (q,) int32 - the section at which each row of SIDES quadrilaterals begins
     """
@@ -39,6 +40,8 @@ class Rings(NamedTuple):
     centre: Floats
     angle: Floats
     bend: Floats
+    wider: Floats
+    shade: Floats
     line: NDArray[np.int32]
     first: NDArray[np.int32]
 
@@ -46,18 +49,26 @@ class Rings(NamedTuple):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mesh:
     """points : (n, 3) float [m]; triangles : (m, 3) int32, two a quadrilateral, seen from outside
-    counterclockwise; copies : (2,) int - repeats beyond the middle one, each way along U and V."""
+    counterclockwise; rim : (2,) float - how far they reach beyond the repeat, each way along U and
+    V [m]."""
 
     points: Floats
     triangles: NDArray[np.int32]
     rings: Rings
-    copies: NDArray[np.int64]
+    rim: Floats
 
 
 def sweep(repeat: Repeat, thick: float) -> Mesh:
     """The tubes of `repeat`, which is `thick` high [m]."""
-    copies = np.maximum(1, np.ceil(REACH * thick / repeat.size)).astype(np.int64)
-    quads = sum(SIDES * len(ln.angle) * int((2 * copies + 1).prod()) for ln in repeat.lines)
+    copies = np.maximum(1, np.ceil(REACH * thick / repeat.size))
+    # Of a repeat that is wide for its height, a rim is enough.
+    rim = np.where(2 * REACH * thick < repeat.size, REACH * thick, copies * repeat.size)
+    laid = [
+        (number, line, shift)
+        for number, line in enumerate(repeat.lines)
+        for shift in _shifts(line, repeat, rim)
+    ]
+    quads = sum(SIDES * len(_places(line, repeat, rim)) for _, line, _ in laid)
     if 2 * quads > MOST_TRIANGLES:
         raise FabricError(
             "weave", f"takes {2 * quads} triangles as tubes; geometry takes {MOST_TRIANGLES}"
@@ -65,22 +76,37 @@ def sweep(repeat: Repeat, thick: float) -> Mesh:
     parts: list[tuple[Any, ...]] = []
     points, triangles = [], []
     begun = 0
-    for number, line in enumerate(repeat.lines):
-        for shift in range(-int(copies[1 - _along(line)]), int(copies[1 - _along(line)]) + 1):
-            centre, angle, bend = _sections(line, repeat, copies, shift)
-            points.append(outline(line, centre, angle))
-            count = len(angle)
-            triangles.append(faces(count) + begun * SIDES)
-            first = np.arange(count - 1, dtype=np.int32) + begun
-            parts.append((centre, angle, bend, np.full(count, number, np.int32), first))
-            begun += count
+    for number, line, shift in laid:
+        sections = _sections(line, repeat, rim, shift)
+        centre, angle, _, wider, _ = sections
+        points.append(outline(line, centre, angle, wider))
+        count = len(angle)
+        triangles.append(faces(count) + begun * SIDES)
+        first = np.arange(count - 1, dtype=np.int32) + begun
+        parts.append((*sections, np.full(count, number, np.int32), first))
+        begun += count
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     return Mesh(
         points=np.concatenate(points),
         triangles=np.concatenate(triangles),
         rings=Rings(*columns),
-        copies=copies,
+        rim=rim,
     )
+
+
+def _shifts(line: Line, repeat: Repeat, rim: Floats) -> range:
+    """Copies of a line to either side of it, in repeats, that lie between the rims."""
+    axis = 1 - _along(line)
+    size = float(repeat.size[axis])
+    low = math.ceil((-rim[axis] - line.lateral) / size)
+    return range(low, math.floor((size + rim[axis] - line.lateral) / size) + 1)
+
+
+def _places(line: Line, repeat: Repeat, rim: Floats) -> NDArray[np.int64]:
+    """Numbers of a line's sections from rim to rim, those of the repeat from 0 on."""
+    axis, cells = _along(line), len(line.angle)
+    reach = math.ceil(float(rim[axis] / repeat.size[axis]) * cells - 1e-6)
+    return np.arange(-reach, cells + reach + 1)
 
 
 def _along(line: Line) -> int:
@@ -89,13 +115,13 @@ def _along(line: Line) -> int:
 
 
 def _sections(
-    line: Line, repeat: Repeat, copies: NDArray[np.int64], shift: int
-) -> tuple[Floats, Floats, Floats]:
-    """Centre (r, 3), angle and bend (r,) of one copy of a line, from end to end of the patch."""
+    line: Line, repeat: Repeat, rim: Floats, shift: int
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Centre (r, 3), angle, bend, width and shade (r,) of one copy of a line, from end to end of
+    the patch."""
     axis = _along(line)
     length, cells = float(repeat.size[axis]), len(line.angle)
-    reach = int(copies[axis])
-    k = np.arange(-reach * cells, (reach + 1) * cells + 1)
+    k = _places(line, repeat, rim)
     s = (k + 0.5) * length / cells
     angle = line.angle[k % cells]
     # Both neighbours across the border of the repeat, so that copies bend alike.
@@ -105,10 +131,15 @@ def _sections(
     centre[:, axis] = s
     centre[:, 1 - axis] = line.lateral + shift * repeat.size[1 - axis]
     centre[:, 2] = line.height[k % cells]
-    return centre, angle, bend
+    if line.aside is not None:
+        centre[:, 1 - axis] += line.aside[k % cells]
+    even = np.ones(len(k))
+    wider = even if line.wider is None else line.wider[k % cells]
+    shade = even if line.shade is None else line.shade[k % cells]
+    return centre, angle, bend, wider, shade
 
 
-def outline(line: Line, centre: Floats, angle: Floats) -> Floats:
+def outline(line: Line, centre: Floats, angle: Floats, wider: Floats) -> Floats:
     """(r SIDES, 3) corners of the sections."""
     around = 2 * math.pi * np.arange(SIDES) / SIDES
     across = np.zeros(3)
@@ -117,7 +148,7 @@ def outline(line: Line, centre: Floats, angle: Floats) -> Floats:
     normal[:, _along(line)], normal[:, 2] = np.sin(angle), np.cos(angle)
     corners = (
         centre[:, None]
-        + line.half_width * np.cos(around)[:, None] * across
+        + line.half_width * wider[:, None, None] * np.cos(around)[:, None] * across
         + line.half_height * np.sin(around)[:, None] * normal[:, None]
     )
     return np.asarray(corners.reshape(-1, 3))

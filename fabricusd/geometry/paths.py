@@ -176,6 +176,37 @@ def albedo(
     )
 
 
+def radiance_at(
+    cloth: Cloth,
+    uv_threads: ArrayLike,
+    wo: ArrayLike,
+    wi: ArrayLike,
+    *,
+    bounces: int | None = None,
+    seed: int = 0,
+    assumptions: Assumptions = USUAL,
+) -> Floats:
+    """(n, 3) radiance towards `wo` per unit `L_i dwi` from `wi` at places of the cloth's top.
+
+    uv_threads : (n, 2) float - in threads; wo, wi : (3,) unit vectors in the surface frame
+    The other arguments and errors are those of `reflectance`; a place is traced once.
+    """
+    viewer, light = _directions("wo", wo), _directions("wi", wi)
+    _check_side(cloth, viewer)
+    uv = np.asarray(uv_threads, np.float64)
+    tracer = _Tracer(cloth, assumptions, _bounces(cloth, bounces), np.random.default_rng(seed))
+    found = []
+    for begin in range(0, len(uv), BLOCK):
+        part = uv[begin : begin + BLOCK] * cloth.pitch / cloth.patch.size
+        towards = np.repeat(viewer, len(part), axis=0)
+        paths = _Paths(
+            from_outside(cloth, part, towards), -towards, np.ones_like(towards),
+            np.arange(len(part)),
+        )  # fmt: skip
+        found.append(tracer.gathered(paths, np.repeat(light, len(part), axis=0)))
+    return np.concatenate(found)
+
+
 _WAYS = (
     "reflected", "transmitted", "reflected_once", "transmitted_once", "lost", "left", "gap",
 )  # fmt: skip
@@ -243,7 +274,11 @@ class _Tracer:
         """(n, BATCHES, 3) radiance towards each viewer from each light."""
         paths = self._start(viewers, count)
         per = len(paths.group) // len(viewers) // BATCHES
-        towards = np.repeat(lights, BATCHES, axis=0)
+        out = self.gathered(paths, np.repeat(lights, BATCHES, axis=0))
+        return out.reshape(len(viewers), BATCHES, 3) / per
+
+    def gathered(self, paths: _Paths, towards: Floats) -> Floats:
+        """(g, 3) sums of what the paths of each group pick up from its light, `towards` (g, 3)."""
         out = np.zeros((len(towards), 3))
         for depth in range(self.bounces):
             hits = self._meet(paths)
@@ -270,7 +305,7 @@ class _Tracer:
             )  # fmt: skip
             if depth + 1 < self.bounces:
                 paths = self._scattered(paths, hits, depth)
-        return out.reshape(len(viewers), BATCHES, 3) / per
+        return out
 
     def escaped(self, viewers: Floats, sky: Sky | None, count: int) -> Floats:
         """(n, BATCHES, ways, 3) light by its way."""

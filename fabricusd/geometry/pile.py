@@ -139,7 +139,7 @@ def _mesh(repeat: Repeat, axes: list[Floats], bends: list[Floats], depth: float)
         axis = 1 if line.which == WARP else 0
         centre = np.zeros((len(along), 3))
         centre[:, axis], centre[:, 1 - axis], centre[:, 2] = along, line.lateral, line.height
-        skin = outline(line, centre, line.angle).reshape(len(along), -1, 3)
+        skin = outline(line, centre, line.angle, np.ones(len(along))).reshape(len(along), -1, 3)
         # Sections of no size close the ends.
         tips = (np.broadcast_to(centre[k], (1, *skin.shape[1:])) for k in (0, -1))
         first_tip, last_tip = tips
@@ -153,6 +153,7 @@ def _mesh(repeat: Repeat, axes: list[Floats], bends: list[Floats], depth: float)
             parts.append(
                 (
                     centre[closed] + move, line.angle[closed], bend[closed],
+                    np.ones(count), np.ones(count),
                     np.full(count, number, np.int32), np.arange(count - 1, dtype=np.int32) + begun,
                 )
             )  # fmt: skip
@@ -169,5 +170,5 @@ def _mesh(repeat: Repeat, axes: list[Floats], bends: list[Floats], depth: float)
         points=np.concatenate(points),
         triangles=np.concatenate(triangles),
         rings=Rings(*columns),
-        copies=copies,
+        rim=copies * repeat.size,
     )

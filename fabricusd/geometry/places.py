@@ -92,7 +92,7 @@ def _note(rings, lines, hits, whole, real):
     for k in range(hits.primitive.size):
         if hits.primitive[k] == NOTHING:
             continue
-        line, _, _, z, psi, _, alpha = tube_point(rings, hits.primitive[k], hits.u[k], hits.v[k])
+        line, _, _, z, psi, _, alpha, _ = tube_point(rings, hits.primitive[k], hits.u[k], hits.v[k])
         whole[0, k], whole[1, k] = lines.which[line], lines.number[line]
         whole[2, k] = lines.kind[line]
         real[0, k], real[1, k], real[2, k] = psi, math.cos(alpha), z
@@ -101,9 +101,9 @@ def _note(rings, lines, hits, whole, real):
 @njit(**KERNEL)
 def _facing(rings, lines, hits, light, offset, origin):
     for k in range(hits.primitive.size):
-        line, x, y, z, psi, _, _ = tube_point(rings, hits.primitive[k], hits.u[k], hits.v[k])
+        line, x, y, z, psi, _, _, wider = tube_point(rings, hits.primitive[k], hits.u[k], hits.v[k])
         which, c, s = lines.which[line], math.cos(psi), math.sin(psi)
-        wide, tall = lines.half_width[line], lines.half_height[line]
+        wide, tall = wider * lines.half_width[line], lines.half_height[line]
         _, b, n = to_thread(float, which, c, s, light[0], light[1], light[2])
         length = max(math.sqrt(b * b + n * n), 1e-30)
         sin_c, cos_c, _ = squeezed(wide, tall, b / length, n / length)

@@ -76,9 +76,9 @@ def arrive(
     """
     n = primitive.size
     for k in range(n):
-        line, x, y, z, psi, bend, alpha = tube_point(rings, primitive[k], u[k], v[k])
+        line, x, y, z, psi, bend, alpha, wider = tube_point(rings, primitive[k], u[k], v[k])
         which, row = lines.which[line], threads[lines.kind[line]]
-        wide, tall = lines.half_width[line], lines.half_height[line]
+        wide, tall = wider * lines.half_width[line], lines.half_height[line]
         c, s = math.cos(psi), math.sin(psi)
         ix, iy, iz = to_thread(float, which, c, s, light[k, 0], light[k, 1], light[k, 2])
         ox, oy, oz = to_thread(
@@ -108,6 +108,12 @@ def arrive(
             value[part, k] = weight * longer * (surface if part == 0 else volume)
 
 
+@njit(**INLINE)
+def shade_at(rings, primitive):
+    """Factor of the albedo at a hit."""
+    return rings.shade[rings.first[primitive // 2 // SIDES]]
+
+
 @njit(**KERNEL)
 def pick_up(lines, rings, threads, primitive, value, shadowed, throughput, group, out):
     """Add what arrives to the groups of paths: out (g, 3)."""
@@ -116,7 +122,7 @@ def pick_up(lines, rings, threads, primitive, value, shadowed, throughput, group
         ring = rings.first[primitive[k] // 2 // SIDES]
         row = threads[lines.kind[rings.line[ring]]]
         surface = 0.0 if shadowed[k] else value[0, k]
-        volume = 0.0 if shadowed[n + k] else value[1, k]
+        volume = 0.0 if shadowed[n + k] else rings.shade[ring] * value[1, k]
         g = group[k]
         out[g, 0] += throughput[k, 0] * (surface + row[ALBEDO_R] * volume)
         out[g, 1] += throughput[k, 1] * (surface + row[ALBEDO_G] * volume)
@@ -155,9 +161,9 @@ def go_on(
     random : (n, RANDOMS); the others as for `arrive`
     """
     for k in range(primitive.size):
-        line, x, y, z, psi, bend, alpha = tube_point(rings, primitive[k], u[k], v[k])
+        line, x, y, z, psi, bend, alpha, wider = tube_point(rings, primitive[k], u[k], v[k])
         which, row = lines.which[line], threads[lines.kind[line]]
-        wide, tall = lines.half_width[line], lines.half_height[line]
+        wide, tall = wider * lines.half_width[line], lines.half_height[line]
         c, s = math.cos(psi), math.sin(psi)
         ox, oy, oz = to_thread(
             float, which, c, s, -direction[k, 0], -direction[k, 1], -direction[k, 2]
@@ -204,7 +210,7 @@ def go_on(
             for channel in range(3):
                 throughput[k, channel] *= weight
         else:
-            weight *= volume
+            weight *= volume * shade_at(rings, primitive[k])
             throughput[k, 0] *= weight * row[ALBEDO_R]
             throughput[k, 1] *= weight * row[ALBEDO_G]
             throughput[k, 2] *= weight * row[ALBEDO_B]

@@ -22,8 +22,9 @@ EXIT = 1.002
 
 @njit(**INLINE)
 def tube_point(rings, primitive, u, v):
-    """(line, x, y, z, psi, bend, alpha) at a hit: axis point [m], tangent angle [rad], its change
-    [rad/m], and the angle round the section [rad] from b towards n_t."""
+    """(line, x, y, z, psi, bend, alpha, wider) at a hit: axis point [m], tangent angle [rad], its
+    change [rad/m], the angle round the section [rad] from b towards n_t, and the section's width
+    over that of its line."""
     quad = primitive // 2
     side, ring = quad % SIDES, rings.first[quad // SIDES]
     if primitive % 2 == 0:
@@ -40,6 +41,7 @@ def tube_point(rings, primitive, u, v):
         back * angle[ring] + along * angle[ring + 1],
         back * bend[ring] + along * bend[ring + 1],
         2.0 * math.pi * (side + around) / SIDES,
+        back * rings.wider[ring] + along * rings.wider[ring + 1],
     )
 
 

@@ -122,6 +122,8 @@ class Tracer:
         self.tables = build_tables(scene)
         self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
         self.shaders = shaders.result()
+        for cloth in filter(None, self.shaders):
+            cloth.home = self.tables.home
         self.triangles = Triangles(self.tables.records, self.tables.material)
         self.lights = build_lights(scene.lights, self.tables.centre)
         self.surfaces = build_surfaces(scene)

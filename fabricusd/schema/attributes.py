@@ -63,10 +63,22 @@ THREAD = (
     Attribute("thread:surfaceGain", "double", Thread, "surface_gain"),
     Attribute("thread:thickness", "double", Thread, "thickness", MILLIMETRE, "mm"),
     Attribute("thread:color", "color3d", Thread, "color"),
+    Attribute("thread:unevenness:cv", "double", Thread, "unevenness_cv"),
+    Attribute("thread:unevenness:length", "double", Thread, "unevenness_length", MILLIMETRE, "mm"),
+    Attribute("thread:unevenness:count", "double", Thread, "unevenness_count"),
+    Attribute("thread:unevenness:shade", "double", Thread, "unevenness_shade"),
+    Attribute("thread:slub:amount", "double", Thread, "slub_amount"),
+    Attribute("thread:slub:length", "double", Thread, "slub_length", MILLIMETRE, "mm"),
+    Attribute("thread:slub:spacing", "double", Thread, "slub_spacing", MILLIMETRE, "mm"),
+    Attribute("thread:plies", "int", Thread, "plies"),
+    Attribute("thread:twist", "double", Thread, "twist", unit="turns/m"),
 )
 """Numbers of a WovenThread; its curve and its model are read apart."""
 
-FABRIC = (Attribute("fabric:maskingWidth", "double", Fabric, "masking_width", DEGREE, "degrees"),)
+FABRIC = (
+    Attribute("fabric:maskingWidth", "double", Fabric, "masking_width", DEGREE, "degrees"),
+    Attribute("fabric:unevenness:seed", "int", Fabric, "unevenness_seed"),
+)
 """Numbers of a WovenFabric; the sets, the weave, tokens and relationships are read apart."""
 
 SIDES = tuple(
@@ -108,6 +120,8 @@ def to_si(value: Any, attribute: Attribute) -> Any:
         return None
     if hasattr(value, "__len__"):
         return tuple(float(x) * attribute.scale for x in value)
+    if attribute.type_name == "int":
+        return int(value)
     return float(value) * attribute.scale
 
 

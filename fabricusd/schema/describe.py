@@ -126,6 +126,8 @@ def _thread_lines(index: int, name: str, thread: Thread, width: int) -> list[str
         f"    lobes: surface {degrees(thread.gamma_surface):.3g}, "
         f"volume {degrees(thread.gamma_volume):.3g} degrees; {curve_words(thread.curve)}",
     ]
+    if thread.is_uneven:
+        lines.append(f"    yarn: {yarn_words(thread)}")
     if thread.documentation:
         lines += textwrap.wrap(
             thread.documentation, width, initial_indent="    ", subsequent_indent="    "
@@ -142,6 +144,28 @@ def curve_words(curve: TangentCurve) -> str:
         jump = k > 0 and curve.positions[k] == curve.positions[k - 1]
         words.append(("| " if jump else "") + f"{math.degrees(angle):.4g}")
     return f"curve {' '.join(words)} degrees"
+
+
+def yarn_words(thread: Thread) -> str:
+    """What is uneven about a thread: `CVm 18 % over 5 mm, 3 plies Z 400/m`."""
+    words = []
+    if thread.unevenness_cv:
+        words.append(
+            f"CVm {100 * thread.unevenness_cv:.3g} % over {1e3 * thread.unevenness_length:.3g} mm"
+        )
+    if thread.unevenness_count:
+        words.append(f"count varies by {100 * thread.unevenness_count:.3g} %")
+    if thread.slub_amount:
+        words.append(
+            f"slubs {100 * thread.slub_amount:.3g} % wider, "
+            f"{1e3 * thread.slub_length:.3g} mm long, {1e3 * thread.slub_spacing:.3g} mm apart"
+        )
+    if thread.unevenness_shade:
+        words.append(f"shade varies by {100 * thread.unevenness_shade:.3g} %")
+    if thread.shows_plies:
+        way = "Z" if thread.twist > 0 else "S"
+        words.append(f"{thread.plies} plies, {way} twist {abs(thread.twist):.4g} turns/m")
+    return ", ".join(words)
 
 
 def as_dict(fabric: Fabric) -> dict[str, Any]:
@@ -174,6 +198,7 @@ def as_dict(fabric: Fabric) -> dict[str, Any]:
         "opaque": fabric.opaque,
         "sides": {f.name: list(getattr(fabric.sides, f.name)) for f in fields(fabric.sides)},
         "masking_width": math.degrees(fabric.masking_width),
+        "unevenness_seed": fabric.unevenness_seed,
         "threads": {name: _thread_dict(thread) for name, thread in fabric.threads.items()},
         "back": as_dict(fabric.back) if fabric.back else None,
     }
@@ -194,5 +219,18 @@ def _thread_dict(thread: Thread) -> dict[str, Any]:
             "angles": [math.degrees(angle) for angle in thread.curve.angles],
         },
         "color": list(thread.color),
+        "unevenness": {
+            "cv": thread.unevenness_cv,
+            "length": thread.unevenness_length,
+            "count": thread.unevenness_count,
+            "shade": thread.unevenness_shade,
+        },
+        "slub": {
+            "amount": thread.slub_amount,
+            "length": thread.slub_length,
+            "spacing": thread.slub_spacing,
+        },
+        "plies": thread.plies,
+        "twist": thread.twist,
         "documentation": thread.documentation,
     }

@@ -96,6 +96,8 @@ def _limits(entry: Attribute) -> dict[str, dict[str, Any]]:
         if end is not None
     }
     width = {"color3d": Gf.Vec3d, "double2": Gf.Vec2d}.get(entry.type_name)
+    if entry.type_name == "int":
+        ends = {name: int(end) for name, end in ends.items()}
     shaped = {name: width(*[end] * width.dimension) if width else end for name, end in ends.items()}
     if not shaped:
         return {}

@@ -9,7 +9,7 @@ from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.coverage import GAP, coverage
 from fabricusd.appearance.weave.lookup import lookup
-from fabricusd.fabric import Fabric
+from fabricusd.fabric import Fabric, even
 from fabricusd.geometry import lit_share, seen, tubes
 from fabricusd.schema import load
 
@@ -34,11 +34,23 @@ def by_lookup(fabric: Fabric, uv: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", WOVEN)
 def test_the_thread_seen_from_above_is_the_one_that_the_lookup_finds(name: str) -> None:
-    fabric = load(name)
+    fabric = even(load(name))
     uv = places(fabric)
     found = seen(tubes(fabric), uv)
     same = (np.stack((found.set, found.number), axis=1) == by_lookup(fabric, uv)).all(axis=1)
     assert same.mean() >= 0.98
+
+
+@pytest.mark.parametrize("name", ["linen_plain", "rayon_shantung", "silk_shot", "wool_flannel"])
+def test_uneven_threads_are_those_that_the_lookup_finds(name: str) -> None:
+    fabric = load(name)
+    cloth = tubes(fabric, threads=(10, 10))
+    uv = np.random.default_rng(6).random((20000, 2)) * 8 + 1
+    found, true = seen(cloth, uv), lookup(fabric, uv)
+    same = (found.set == true.set) & (true.gap | (found.number == true.number))
+    assert same.mean() >= 0.98
+    # That the comparison can fail: even threads lie elsewhere.
+    assert (found.set == lookup(even(fabric), uv).set).mean() < 0.98
 
 
 def test_a_grid_turned_round_shows_other_threads() -> None:

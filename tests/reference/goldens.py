@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from fabricusd.fabric import even
 from fabricusd.images.files import write_exr
 from fabricusd.reference.film import AOVS
 from fabricusd.reference.render import RenderResult
@@ -28,8 +29,8 @@ SIZE = 24
 SAMPLES = 4096
 
 CASES: dict[str, dict[str, Any]] = {
-    # name: fabric, threads to a unit of UV, level, shadowing; the cloth, over a floor, under a
-    # picture and a lamp
+    # name: fabric, of even threads unless told, threads to a unit of UV, level, shadowing; the
+    # cloth, over a floor, under a picture and a lamp
     "satin_far": {"preset": "polyester_satin_charmeuse", "level": "far"},
     "silk_thread": {"preset": "silk_shot", "level": "thread", "threads": 12.0},
     "linen_auto": {"preset": "linen_plain", "level": "auto", "threads": 40.0},
@@ -38,6 +39,8 @@ CASES: dict[str, dict[str, Any]] = {
     "silk_ball": {"preset": "silk_shot", "shadow": "horizon", "threads": 12.0, "cloth": "ball"},
     "linen_skirt": {"preset": "linen_plain", "shadow": "horizon", "threads": 24.0,
                     "cloth": "skirt"},
+    "linen_uneven": {"preset": "linen_plain", "level": "thread", "shadow": "horizon",
+                     "threads": 24.0, "uneven": True},
 }  # fmt: skip
 
 
@@ -93,7 +96,9 @@ def render_case(
         ),
     ]  # fmt: skip
     gloss = PreviewSurface(diffuse=(0.5, 0.3, 0.1), roughness=0.3)
-    material = cloth(load(case["preset"]), case.get("threads", 40.0))
+    fabric = load(case["preset"])
+    fabric = fabric if case.get("uneven") else even(fabric)
+    material = cloth(fabric, case.get("threads", 40.0))
     camera = Camera(frame=looking((0.7, 1.4, 1.0)), aperture=(0.03, 0.03))
     return picture(
         [mesh, floor, plate], [material, lambert(0.6), gloss], lights, camera, size=SIZE, spp=spp,

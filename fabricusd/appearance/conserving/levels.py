@@ -95,7 +95,7 @@ def _across_value(R, tables, place, ix, iy, iz, ox, oy, oz):  # type: ignore[no-
     on_surface, on_volume, lost = between_sides(R, tables, ix, iy, iz, ox, oy, oz)
     scale /= c
     surface *= across_surface * on_surface * scale
-    volume *= across_volume * on_volume * scale
+    volume *= across_volume * on_volume * scale * R(place.shade)
     lost /= tables.covered
     side = 0 if (iz > R(0)) == (oz > R(0)) else 1
     return (

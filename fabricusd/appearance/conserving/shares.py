@@ -67,7 +67,7 @@ def _far_values(R, tables, wi, wo, out):
 def _point_values(R, tables, stretch, wi, wo, out):
     """`conserving_point_value` of all pairs on a stretch: wi, wo, out are (3, n)."""
     for k in range(wi.shape[1]):
-        place = Place(int(stretch[OF_SET]), int(stretch[OF_THREAD]), stretch[PSI0], R(0))
+        place = Place(int(stretch[OF_SET]), int(stretch[OF_THREAD]), stretch[PSI0], R(0), R(1))
         out[0, k], out[1, k], out[2, k] = conserving_point_value(
             R, tables, place, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
         )

@@ -210,6 +210,7 @@ def conserving_point_single(R, tables, place, on_surface, on_volume, ix, iy, iz,
     angle = min(max(place.psi0, R(-PILE_ANGLE)), R(PILE_ANGLE))
     c, s = cos(R, angle), sin(R, angle)
     surface, volume = facet_terms(R, row, place.thread_set, c, s, ix, iy, iz, ox, oy, oz)
+    volume *= R(place.shade)
     scale /= max(c, R(_STEEPEST_COS))
     surface, volume = on_surface * surface, on_volume * volume
     return (

@@ -78,7 +78,7 @@ def point_value(R, tables, across_too, place, ix, iy, iz, ox, oy, oz):
     surface, volume = _segment_at(R, tables, int(row[MODEL]), across_too, row, c, s, place.w, pair)
     p /= q
     surface *= p
-    volume *= p
+    volume *= p * R(place.shade)
     return (
         surface + volume * row[ALBEDO_R],
         surface + volume * row[ALBEDO_G],
@@ -150,6 +150,11 @@ def _copy_threads(R, tables, places, first, size, block):
             block[_THREAD + column * BLOCK + x] = tables.threads[thread, column]
         if which != WEFT and which != WARP:
             block[_THREAD + MODEL * BLOCK + x] = R(_NO_MODEL)
+    if places.shade.size > 0:
+        for x in range(size):
+            shade = R(places.shade[index(first, x)])
+            for column in range(ALBEDO_R, ALBEDO_B + 1):
+                block[_THREAD + column * BLOCK + x] *= shade
     for x in range(size):
         k = index(first, x)
         block[_COS + x], block[_SIN + x] = cos(R, places.psi0[k]), sin(R, places.psi0[k])

@@ -314,7 +314,7 @@ def sample_points(R, table, sampling, across_too, places, wo, wi, numbers, drawn
 @njit(**PART)
 def _find_threads(R, table, sampling, places, start, size, block):
     """Read the thread under each hit and the shares of its lobes, which are 0 in a gap."""
-    sets, threads, psi0, w = places
+    sets, threads, psi0, w = places.sets, places.threads, places.psi0, places.w
     for x in range(size):
         on_thread = sets[start + x] <= WARP and sampling.stretches.shape[0] > 0
         thread_set, thread, angle = 0, 0, R(0)

@@ -20,6 +20,8 @@ from fabricusd.appearance.weave.bands import band_areas
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, coverage
 from fabricusd.appearance.weave.place import Places
+from fabricusd.appearance.weave.yarn.compiled import Yarn, compile_yarn
+from fabricusd.appearance.weave.yarn.lay import crest, laid, strands_all
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, ThreadSet, Weave
 from fabricusd.kernels.real import INLINE, KERNEL, PART, index
@@ -45,6 +47,10 @@ class WeaveHit(NamedTuple):
     height : (n,) float - height of the thread's axis above the ends of the run [m]
     crown : (n,) float - height of the round thread's surface above its axis at `across` [m]
     gap : (n,) bool - whether no thread is seen
+    number : (n,) int64 - of the thread in its set, from the corner of the cloth
+    strand : (n,) float - position across the strand that is seen, of a thread of plies; else w
+    shade : (n,) float - factor of the thread's albedo; (0,) where that is 1 everywhere
+    even_uv : (n, 2) float64 - the place of the even cloth that looks as this one does [threads]
     """
 
     set: NDArray[np.uint8]
@@ -55,11 +61,15 @@ class WeaveHit(NamedTuple):
     height: NDArray[Any]
     crown: NDArray[Any]
     gap: NDArray[np.bool_]
+    number: NDArray[np.int64]
+    strand: NDArray[Any]
+    shade: NDArray[Any]
+    even_uv: NDArray[np.float64]
 
     @property
     def places(self) -> Places:
         """The hits as the kernels of the surface laws take them, in the precision of the lookup."""
-        return Places(self.set, self.thread, self.angle, self.across)
+        return Places(self.set, self.thread, self.angle, self.strand, self.shade)
 
 
 @njit(**INLINE)
@@ -335,15 +345,52 @@ def heights_all(R, cloth, sets, threads, s, w, length, height, crown):
             crown[k] = crown_on(R, cloth, sets[k], threads[k], w[k])
 
 
-def lookup(cloth: Fabric | CompiledFabric, uv_threads: ArrayLike) -> WeaveHit:
+@njit(parallel=True, **KERNEL)
+def crests_all(R, cloth, yarn, uv, sets, threads, numbers, s, length, angle):
+    """Move the places along the threads that are seen there by `move_along`; uv, s and angle are
+    written.
+
+    uv : (n, 2) - places on the even cloth; numbers : (n, 2) int64 as in `Laid`; the others are what
+        `find_all` gives there
+    """
+    for k in prange(uv.shape[0]):
+        which = int(sets[k])
+        if which != GAP and length[k] > R(0):
+            axis = 1 if which == WARP else 0
+            uv[k, axis], s[k], angle[k] = move_along(
+                R, cloth, yarn, which, threads[k], numbers[k, which], s[k], length[k], uv[k, axis]
+            )
+
+
+@njit(**INLINE)
+def move_along(R, cloth, yarn, which, thread, number, s, length, place):
+    """(place, s, angle) at which the even thread is as steep as an uneven one is at `s` of a run.
+
+    number : of the thread; length : of the run [m]; place : where s lies along the thread of the
+        even cloth [cells], float64
+    """
+    cells = length / R(yarn.cell[which])
+    moved = min(crest(R, yarn, which, thread, number, s, cells, place), cloth.last)
+    return (
+        place + float((moved - s) * cells),
+        moved,
+        angle_on(R, cloth, thread, moved),
+    )
+
+
+def lookup(
+    cloth: Fabric | CompiledFabric, uv_threads: ArrayLike, yarn: Yarn | None = None
+) -> WeaveHit:
     """The thread under each of (n, 2) weave coordinates, in threads.
 
-    A `Fabric` is compiled for float64; with a `CompiledFabric` the result has its precision. The
+    A `Fabric` is compiled for float64, its yarn included; with a `CompiledFabric` the result has
+    its precision, and its threads are even unless `yarn` says how they are not. The
     coordinates must already include the rotation of the grain: `Binding.weave_coordinates`. Raises
     `FabricError` for coordinates that are not finite or lie beyond 2^52 threads, where float64 has
     no fractional part.
     """
     if isinstance(cloth, Fabric):
+        yarn = compile_yarn(cloth, precision=np.float64) if cloth.is_uneven else None
         cloth = compile_fabric(cloth, precision=np.float64)
     uv = np.ascontiguousarray(uv_threads, np.float64)
     if uv.ndim != 2 or uv.shape[1] != 2:
@@ -360,9 +407,21 @@ def lookup(cloth: Fabric | CompiledFabric, uv_threads: ArrayLike) -> WeaveHit:
     n = len(uv)
     sets, threads = np.empty(n, np.uint8), np.empty(n, np.int32)
     s, w, angle, length, height, crown = (np.empty(n, real) for _ in range(6))
-    find_all(real, cloth, uv, sets, threads, s, w, angle, length)
+    if yarn is None:
+        places, numbers = uv, np.floor(uv[:, ::-1]).astype(np.int64)
+    else:
+        places, numbers, shades = laid(yarn, uv)
+    find_all(real, cloth, places, sets, threads, s, w, angle, length)
+    strand, shade = w, np.empty(0, real)
+    on = np.arange(n), (sets == WARP).astype(np.intp)
+    if yarn is not None:
+        crests_all(real, cloth, yarn, places, sets, threads, numbers, s, length, angle)
+        strand, shade = np.empty(n, real), shades[on].astype(real)
+        strands_all(real, yarn, uv, sets, threads, numbers, w, strand)
     heights_all(real, cloth, sets, threads, s, w, length, height, crown)
-    return WeaveHit(sets, threads, s, w, angle, height, crown, sets == GAP)
+    return WeaveHit(
+        sets, threads, s, w, angle, height, crown, sets == GAP, numbers[on], strand, shade, places
+    )
 
 
 NO_THREAD = -1
@@ -414,5 +473,6 @@ def back_of(fabric: Fabric) -> Fabric:
         sides=fabric.sides,
         opaque=fabric.opaque,
         masking_width=fabric.masking_width,
+        unevenness_seed=fabric.unevenness_seed,
         documentation=fabric.documentation,
     )

@@ -24,34 +24,43 @@ class Place(NamedTuple):
     thread : int - index into `Fabric.threads`
     psi0 : real - tangent angle [rad]
     w : real - position across the visible width, in [-1, 1]; read at level `thread` only
+    shade : real - factor of the thread's albedo
     """
 
     thread_set: int
     thread: int
     psi0: Any
     w: Any
+    shade: Any = 1.0
 
 
-NOWHERE = Place(WEFT, 0, 0.0, 0.0)
+NOWHERE = Place(WEFT, 0, 0.0, 0.0, 1.0)
 """In place of a point at level `far`, which reads none; in float64."""
+
+
+EVEN: Reals = np.empty(0)
+"""In place of the shades of threads that have one shade everywhere."""
 
 
 class Places(NamedTuple):
     """The `Place` under each of n points.
 
-    sets : (n,) uint8 or int32; threads : (n,) int32; psi0, w : (n,) real
+    sets : (n,) uint8 or int32; threads : (n,) int32; psi0, w : (n,) real; shade : (n,) real, or
+        (0,) for 1 everywhere
     """
 
     sets: NDArray[Any]
     threads: NDArray[np.int32]
     psi0: Reals
     w: Reals
+    shade: Reals = EVEN
 
 
 @njit(**INLINE)
 def place_at(places, k):
     """The `Place` of entry k."""
-    return Place(places.sets[k], places.threads[k], places.psi0[k], places.w[k])
+    shade = float(places.shade[k]) if places.shade.size > 0 else 1.0
+    return Place(places.sets[k], places.threads[k], places.psi0[k], places.w[k], shade)
 
 
 class Hit(NamedTuple):

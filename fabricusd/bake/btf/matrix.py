@@ -24,7 +24,7 @@ from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.appearance.weave.place import Places
 from fabricusd.bake.texels.reflectance import refuse_conserving
 from fabricusd.errors import FabricError
-from fabricusd.fabric import Fabric
+from fabricusd.fabric import Fabric, even
 
 Floats = NDArray[np.float64]
 
@@ -83,9 +83,11 @@ def ring_directions(rings: tuple[tuple[float, int], ...] = RINGS) -> Floats:
 def btf_of(fabric: Fabric, *, per_thread: int = 16, directions: Floats | None = None) -> Btf:
     """Compute the table of one repeat of `fabric` with `per_thread` texels along a thread's pitch.
 
+    The table is to be repeated, so its threads are even.
     Raises FabricError if the repeat has too many texels or the fabric's model cannot be baked.
     """
     refuse_conserving(fabric)
+    fabric = even(fabric)
     ends, picks = true_repeat(fabric)
     size = (picks * per_thread, ends * per_thread)
     if size[0] * size[1] > LARGEST:

@@ -64,7 +64,8 @@ def exact(
         texels(made, step, step, start, (k, 0), owner, 0, samples if size else 1, sums, out)
         moments[:, k] = out[:, 0, 0]
     sets, threads = np.empty(len(x), np.uint8), np.empty(len(x), np.int32)
-    threads_under(made.cloth, weave, sets, threads)
+    threads_under(made, weave, sets, threads)
+    weave = np.mod(weave, true_repeat(one.fabric))
     return Texels(
         moments=moments,
         usual=made.mean,

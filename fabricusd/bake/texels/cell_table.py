@@ -5,6 +5,9 @@ differ only in where their centre lies in the repeat: their phase. A table holds
 phase of a raster with FINEST (or at least COARSEST) steps per texel and PER_THREAD steps per
 thread. A texel of the sheet takes the entry whose phase is nearest. A texel of a coarser level is
 the mean of four texels of the next finer level, interpolated between its phases.
+
+Uneven threads have no phase. A texel on them takes the entry of the place at which even threads
+look as they do there: threads change over many texels, or not visibly.
 """
 
 from __future__ import annotations
@@ -151,7 +154,8 @@ def cell_table(
 def _finest(
     recipe: Recipe, step: NDArray[np.float64], repeat: tuple[int, int], raster: Raster
 ) -> NDArray[np.float32]:
-    """(MOMENTS, phases) moments of the finest level, from samples of the weave."""
+    """(MOMENTS, phases) moments of the finest level, from samples of the weave of even threads."""
+    recipe = recipe._replace(uneven=0)
     counts = raster.counts
     moments = np.empty((MOMENTS, counts[1], counts[0]), np.float32)
     apart = np.diag(np.array(repeat) / np.array(counts))

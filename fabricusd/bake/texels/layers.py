@@ -15,11 +15,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.appearance.weave.lookup import find
-from fabricusd.bake.texels import moments as m
+from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
+from fabricusd.appearance.weave.lookup import find, move_along
+from fabricusd.bake.texels import moment_indices as m
+from fabricusd.bake.texels import moments
 from fabricusd.bake.texels.cell_table import CellLevel, CellTable
 from fabricusd.bake.texels.maps import Texels, TextureMap
 from fabricusd.bake.texels.moment_indices import MOMENTS
+from fabricusd.bake.texels.recipe import Recipe
 from fabricusd.bake.texels.sheet import Sheet, Window, texel_start, texel_step
 from fabricusd.kernels.real import LEAN
 
@@ -53,13 +56,16 @@ class Layer(Protocol):
 class Centres:
     """The weave at the texels' centres.
 
-    weave : (h, w, 2) weave coordinates, modulo the repeat
+    weave : (h, w, 2) weave coordinates, modulo the repeat: places of the even cloth that look as
+        the centres do
     sets, threads : (h, w) thread set and thread type
+    shades : (2, h, w) factor of the albedo of the weft and the warp there, whichever is seen
     """
 
     weave: NDArray[np.float64]
     sets: NDArray[np.uint8]
     threads: NDArray[np.int32]
+    shades: NDArray[np.float32]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,16 +98,35 @@ class Place:
             weave=np.empty((n, n, 2)),
             sets=np.empty((n, n), np.uint8),
             threads=np.empty((n, n), np.int32),
+            shades=np.ones((2, n, n), np.float32),
         )
         _centres(
-            self.sheet.recipes[self.lay].cloth, *self._raster(), found.weave, found.sets,
-            found.threads,
+            self.recipe, self.blur, *self._raster(), found.weave, found.sets, found.threads,
+            found.shades,
         )  # fmt: skip
         return found
+
+    @property
+    def recipe(self) -> Recipe:
+        """Of the lay's fabric."""
+        return self.sheet.recipes[self.lay]
+
+    @property
+    def blur(self) -> np.float32:
+        """Extent of a texel on the cloth [m]; 0 at the finest level, whose maps are sharp."""
+        if self.level == 0:
+            return np.float32(0)
+        step = texel_step(self.sheet, self.lay, 1 << self.level)
+        pitch = self.recipe.cloth.pitch.astype(np.float64)
+        return np.float32(np.sqrt(abs(np.linalg.det(step)) * pitch.prod()))
 
     def phases(self, counts: tuple[int, int]) -> NDArray[np.int32]:
         """(h, w) entries of a cell table with `counts` phases along U and V."""
         found = np.empty((self.size, self.size), np.int32)
+        if self.recipe.uneven:
+            places = self.centres.weave / np.array(self._raster()[2])
+            steps = np.minimum((places * counts).astype(np.int32), np.array(counts) - 1)
+            return np.asarray(steps[..., 1] * counts[0] + steps[..., 0], np.int32)
         _phases(*self._raster(), *counts, found)
         return found
 
@@ -141,15 +166,15 @@ class ComputedLayer:
     def finest(cls, place: Place, owned: NDArray[np.float32]) -> ComputedLayer:
         """Compute the moments from samples of the weave wherever `owned` is not 0."""
         sheet, lay = place.sheet, place.lay
-        moments = np.zeros((MOMENTS, *owned.shape), np.float32)
+        found = np.zeros((MOMENTS, *owned.shape), np.float32)
         step = texel_step(sheet, lay)
-        side = m.samples_for(step, true_repeat(sheet.garment.lays[lay].fabric))
+        side = moments.samples_for(step, true_repeat(sheet.garment.lays[lay].fabric))
         start = texel_start(sheet, lay, *place.window[:2])
-        m.texels(
+        moments.texels(
             sheet.recipes[lay], step, step, start, place.window[:2], owned.astype(np.int32), 1,
-            side, np.empty(MOMENTS, np.float32), moments,
+            side, np.empty(MOMENTS, np.float32), found,
         )  # fmt: skip
-        return cls(place, moments, owned)
+        return cls(place, found, owned)
 
     def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
         """(n, channels) of a map."""
@@ -158,7 +183,7 @@ class ComputedLayer:
 
     def halved(self) -> ComputedLayer:
         """The next coarser level."""
-        return ComputedLayer(self.place.halved(), *m.halve(self.moments, self.owned))
+        return ComputedLayer(self.place.halved(), *moments.halve(self.moments, self.owned))
 
     def moments_at(self, j: int, i: int) -> Moments:
         """(MOMENTS,) of one texel."""
@@ -197,8 +222,11 @@ class TableLayer:
             return one.function(self.place.texels(self.own, mine))
         lay, sheet = self.place.lay, self.place.sheet
         chosen: Any = slice(None) if mine is None else mine
-        known = self.cell.values(one, sheet.recipes[lay], sheet.garment.lays[lay])
-        found = _gathered(known, self.phases[chosen].ravel())
+        if one.shaded and self.place.recipe.uneven:
+            found = np.ascontiguousarray(one.function(self._shaded(chosen)), one.kind)
+        else:
+            known = self.cell.values(one, sheet.recipes[lay], sheet.garment.lays[lay])
+            found = _gathered(known, self.phases[chosen].ravel())
         if self.own.shape[1]:
             rows = self.rows[chosen].ravel()
             cut = rows != LOOKED_UP
@@ -207,6 +235,19 @@ class TableLayer:
             )
             found[cut] = one.function(texels)
         return found
+
+    def _shaded(self, chosen: Any) -> Texels:
+        """Texels of the table whose threads have their own shades at the texels' centres."""
+        place = self.place
+        found = self.cell.moments[:, self.phases[chosen].ravel()]
+        shades = place.centres.shades[:, chosen].reshape(2, -1)
+        parts = [found[m.SHARE + m.PARTS * k : m.SHARE + m.PARTS * (k + 1)] for k in range(2)]
+        seen = np.stack([part.sum(axis=0) for part in parts])
+        both = (seen * shades).sum(axis=0) / np.maximum(seen.sum(axis=0), np.float32(1e-6))
+        found[m.VOLUME : m.VOLUME + 3] *= both
+        for k in range(2):
+            found[m.TINT + 3 * k : m.TINT + 3 * k + 3] *= shades[k]
+        return Texels.of_moments(found, place.recipe, place.sheet.garment.lays[place.lay])
 
     def halved(self) -> TableLayer:
         """The next coarser level."""
@@ -279,19 +320,33 @@ def _phases(start, step, repeat, along, down, out):  # type: ignore[no-untyped-d
 
 
 @njit(**LEAN)
-def _centres(cloth, start, step, repeat, weave, sets, threads):  # type: ignore[no-untyped-def]
+def _centres(  # type: ignore[no-untyped-def]
+    made, blur, start, step, repeat, weave, sets, threads, shades
+):
     """Fill the arrays of `Centres`.
 
-    start, step : as for `moments.texels`; repeat : (2,) float64
+    start, step : as for `moments.texels`; repeat : (2,) float64; blur : `Place.blur`
     """
     for j in range(sets.shape[0]):
         for i in range(sets.shape[1]):
             u = start[0] + step[0, 0] * (i + 0.5) + step[0, 1] * (j + 0.5)
             v = start[1] + step[1, 0] * (i + 0.5) + step[1, 1] * (j + 0.5)
+            u, v, warp, weft = moments.laid_at(made, u, v, blur)
+            shades[WEFT, j, i], shades[WARP, j, i] = weft.shade, warp.shade
+            at_u, at_v = u, v
             u -= repeat[0] * np.floor(u / repeat[0])
             v -= repeat[1] * np.floor(v / repeat[1])
+            which, thread, s, _, _, length = find(np.float32, made.cloth, u, v)
+            if made.uneven != 0 and which != GAP and length > np.float32(0):
+                seen, place = (warp, at_v) if which == WARP else (weft, at_u)
+                moved, _, _ = move_along(
+                    np.float32, made.cloth, made.yarn, which, thread, seen.number, s, length, place
+                )
+                u, v = (u, v + (moved - place)) if which == WARP else (u + (moved - place), v)
+                u -= repeat[0] * np.floor(u / repeat[0])
+                v -= repeat[1] * np.floor(v / repeat[1])
             weave[j, i, 0], weave[j, i, 1] = u, v
-            sets[j, i], threads[j, i], _, _, _, _ = find(np.float32, cloth, u, v)
+            sets[j, i], threads[j, i] = which, thread
 
 
 @njit(**LEAN)

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.shadow.methods import lit
 from fabricusd.appearance.weave.coverage import GAP, WARP
-from fabricusd.appearance.weave.lookup import crown_on, find, wrap
+from fabricusd.appearance.weave.lookup import crown_on, find, move_along, wrap
 from fabricusd.appearance.weave.place import Hit
+from fabricusd.appearance.weave.yarn.lay import EVENLY, lay_at, sound
 from fabricusd.bake.texels.angle_rows import HEIGHTS, STEPS
 from fabricusd.bake.texels.moment_indices import (
     AZIMUTHS,
@@ -28,6 +29,8 @@ from fabricusd.bake.texels.moment_indices import (
     MOMENTS,
     SLOPE,
     SLOPE_2,
+    TINT,
+    VOLUME,
 )
 from fabricusd.kernels.real import INLINE, LEAN
 
@@ -104,10 +107,37 @@ def texels(  # type: ignore[no-untyped-def]
 
 
 @njit(**LEAN)
-def threads_under(cloth, weave, sets, threads):  # type: ignore[no-untyped-def]
-    """Write the thread set and type at weave coordinates (n, 2) float64 to sets, threads (n,)."""
+def threads_under(made, weave, sets, threads):  # type: ignore[no-untyped-def]
+    """Write the thread set and type at weave coordinates (n, 2) float64 to sets, threads (n,), and
+    into `weave` the places of the even cloth, which uneven threads move."""
+    R = np.float32
     for k in range(weave.shape[0]):
-        sets[k], threads[k], _, _, _, _ = find(np.float32, cloth, weave[k, 0], weave[k, 1])
+        u, v, warp, weft = laid_at(made, weave[k, 0], weave[k, 1], R(0))
+        which, thread, s, _, _, length = find(R, made.cloth, u, v)
+        if made.uneven != 0 and which != GAP and length > R(0):
+            seen, place = (warp, v) if which == WARP else (weft, u)
+            moved, _, _ = move_along(
+                R, made.cloth, made.yarn, which, thread, seen.number, s, length, place
+            )
+            u, v = (u, moved) if which == WARP else (moved, v)
+        weave[k, 0], weave[k, 1] = u, v
+        sets[k], threads[k] = which, thread
+
+
+@njit(**INLINE)
+def laid_at(made, u, v, blur):  # type: ignore[no-untyped-def]
+    """(u, v, warp, weft): the place of the even cloth that looks as (u, v) does, and the `Lateral`
+    of both sets there; blur : extent of the footprint [m]."""
+    R = np.float32
+    if made.uneven == 0 or not sound(u, v):
+        return u, v, EVENLY, EVENLY
+    warp, weft = lay_at(R, made.yarn, u, v, blur)
+    return (
+        float(warp.number) + float(warp.place),
+        float(weft.number) + float(weft.place),
+        warp,
+        weft,
+    )
 
 
 @njit(**INLINE)
@@ -122,15 +152,28 @@ def _mixed(x):  # type: ignore[no-untyped-def]
 def _add(made, u, v, out):  # type: ignore[no-untyped-def]
     """Add the sample at weave coordinates (u, v) to a texel's sums."""
     R = np.float32
+    u, v, warp, weft = laid_at(made, u, v, R(0))
     which, thread, s, w, angle, length = find(R, made.cloth, u, v)
     if which == GAP:
         if made.light[2] > R(0):
             out[LIT] += R(1)
         return
+    seen = warp if which == WARP else weft
+    if made.uneven != 0 and length > R(0):
+        at, s, angle = move_along(
+            R, made.cloth, made.yarn, which, thread, seen.number, s, length,
+            v if which == WARP else u,
+        )  # fmt: skip
+        u, v = (u, at) if which == WARP else (at, v)
     step = int((angle * R(1.0 / math.pi) + R(0.5)) * R(STEPS - 1) + R(0.5))
     step = min(max(step, 0), STEPS - 1)
     for p in range(LIT):
         out[p] += made.rows[which, thread, step, p]
+    if made.uneven != 0:
+        tint, more = TINT + 3 * which, seen.shade - R(1)
+        for c in range(3):
+            out[tint + c] += more * made.rows[which, thread, step, tint + c]
+            out[VOLUME + c] += more * made.rows[which, thread, step, VOLUME + c]
     place = s * R(HEIGHTS - 1)
     low = min(int(place), HEIGHTS - 2)
     rise = made.heights[thread, low]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric, true_repeat
+from fabricusd.appearance.weave.yarn.compiled import Yarn, compile_yarn
 from fabricusd.bake.texels.angle_rows import angle_rows, height_rows
 from fabricusd.bake.texels.light import unit_light
 from fabricusd.bake.texels.moment_indices import MOMENTS
@@ -20,6 +21,7 @@ class Recipe(NamedTuple):
     """The tables of a fabric.
 
     cloth, shadow : compiled for float32; `shadow` is evaluated for the direction `light`
+    yarn : of the threads; uneven : int - 1 if they vary, and the yarn is to be read
     table : horizon table of `compile_shadow(..., "horizon")`
     rows, heights : see `angle_rows`
     rounded : int - 1 if threads are round across their width
@@ -28,6 +30,8 @@ class Recipe(NamedTuple):
     """
 
     cloth: CompiledFabric
+    yarn: Yarn
+    uneven: int
     shadow: Shadow
     table: NDArray[np.uint8]
     rows: NDArray[np.float32]
@@ -56,6 +60,8 @@ def recipe(
     towards = np.array((0.0, 0.0, 0.0) if light is None else unit_light(light))
     made = Recipe(
         cloth=cloth,
+        yarn=compile_yarn(fabric),
+        uneven=0,
         shadow=shadow,
         table=horizon.table,
         rows=angle_rows(fabric),
@@ -64,7 +70,8 @@ def recipe(
         light=towards.astype(np.float32),
         mean=np.zeros(MOMENTS, np.float32),
     )
-    return made._replace(mean=repeat_mean(fabric, made))
+    # The mean over the repeat is that of even threads, which uneven ones keep.
+    return made._replace(mean=repeat_mean(fabric, made), uneven=int(fabric.is_uneven))
 
 
 def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:

@@ -95,9 +95,13 @@ def texel_step(sheet: Sheet, lay: int, scale: int = 1) -> NDArray[np.float64]:
 
 
 def texel_start(sheet: Sheet, lay: int, x: float, y: float) -> NDArray[np.float64]:
-    """(2,) weave coordinates of the texel corner (x, y), reduced modulo the repeat in float64."""
+    """(2,) weave coordinates of the texel corner (x, y) in float64, reduced modulo the repeat
+    unless the threads are uneven: no repeat repeats those."""
     one = sheet.garment.lays[lay]
     uv = np.array(
         [sheet.tile[0] + x / sheet.resolution, sheet.tile[1] + 1.0 - y / sheet.resolution]
     )
-    return np.asarray(np.mod(one.matrix @ uv + one.offset, true_repeat(one.fabric)))
+    place = one.matrix @ uv + one.offset
+    return np.asarray(
+        place if one.fabric.is_uneven else np.mod(place, true_repeat(one.fabric)), np.float64
+    )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance import surface
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.lookup import NO_THREAD, lookup, thread_number
-from fabricusd.fabric import Fabric
+from fabricusd.fabric import Fabric, even
 from fabricusd.materials.fit.judge import direction_pairs
 
 Floats = NDArray[np.float64]
@@ -99,7 +99,11 @@ def target_of(fabric: Fabric, texels: TexelSample) -> Target:
 
 
 def of_thread(fabric: Fabric, number: int, wi: Floats, wo: Floats) -> Floats:
-    """(n, 3) mean of level `weave` over the area of the thread `number` of map `thread_id`."""
+    """(n, 3) mean of level `weave` over the area of the thread `number` of map `thread_id`.
+
+    The mean is that of even threads, which uneven ones keep.
+    """
+    fabric = even(fabric)
     rng = np.random.default_rng(0)
     places = rng.random((8192, 2)) * np.array(true_repeat(fabric))
     hit = lookup(fabric, places)

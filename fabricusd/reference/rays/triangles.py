@@ -50,6 +50,8 @@ class TriangleTables:
     records : (m, RECORD) float32
     uv : (m, 6) float32 - the mesh's own UV at the corners
     material : (m,) int32
+    home : (m, 2) int64 - ends and picks between the corner of the cloth and the repeat in which a
+        triangle's weave coordinates begin; (0, 2) if no fabric of the scene has uneven threads
     radius : float [m] - of the scene around `centre`
     """
 
@@ -59,6 +61,7 @@ class TriangleTables:
     records: NDArray[np.float32]
     uv: NDArray[np.float32]
     material: NDArray[np.int32]
+    home: NDArray[np.int64]
     radius: float
 
 
@@ -83,6 +86,7 @@ def build_tables(scene: Scene) -> TriangleTables:
         records=_stack([p[2] for p in parts], (0, RECORD), np.float32),
         uv=_stack([p[3] for p in parts], (0, 6), np.float32),
         material=_stack([p[4] for p in parts], (0,), np.int32),
+        home=_stack([p[5] for p in parts if p[5] is not None], (0, 2), np.int64),
         radius=float(np.linalg.norm(high - low) / 2),
     )
 
@@ -124,7 +128,9 @@ def _mesh_tables(
     tangents, records[:, HAND] = _grain(points, tri, e1, e2, st, normals)
     records[:, T : T + 9] = tangents.reshape(-1, 9)
     del normals, tangents
-    records[:, ST : ST + 2] = _inside_repeat(scene, st[:, 0], material)
+    inside = _inside_repeat(scene, st[:, 0], material)
+    records[:, ST : ST + 2] = inside
+    home = np.rint(st[:, 0] - inside).astype(np.int64) if _any_uneven(scene) else None
     records[:, D1 : D1 + 2] = d1 = st[:, 1] - st[:, 0]
     records[:, D2 : D2 + 2] = d2 = st[:, 2] - st[:, 0]
     # Gradients of both coordinates over the surface [1/m].
@@ -133,7 +139,7 @@ def _mesh_tables(
     for axis in range(2):
         gradient = d1[:, axis, None] * along + d2[:, axis, None] * up
         records[:, RATE + axis] = _length(gradient)
-    return points, tri, records, uv.astype(np.float32).reshape(-1, 6), material
+    return points, tri, records, uv.astype(np.float32).reshape(-1, 6), material, home
 
 
 def _sound_triangles(scene: Scene, mesh: Mesh) -> NDArray[np.bool_]:
@@ -196,6 +202,12 @@ def _inside_repeat(
             mine = material == index
             base[mine] = np.mod(st[mine], np.array(true_repeat(surface.binding.fabric), np.float64))
     return base
+
+
+def _any_uneven(scene: Scene) -> bool:
+    """Whether a fabric of the scene has threads that no repeat repeats, on either side."""
+    fabrics = [m.binding.fabric for m in scene.materials if isinstance(m, FabricSurface)]
+    return any(f.is_uneven or (f.back is not None and f.back.is_uneven) for f in fabrics)
 
 
 def _grain(

@@ -20,6 +20,7 @@ from fabricusd.appearance.sampling.fit import no_mixture
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.place import Places
+from fabricusd.appearance.weave.yarn.compiled import compile_yarn
 from fabricusd.fabric import Fabric
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import Film
@@ -28,16 +29,26 @@ from fabricusd.reference.rays.camera import Lens, build_lens, camera_rays
 from fabricusd.reference.rays.embree import Accelerator
 from fabricusd.reference.rays.sobol import new_numbers
 from fabricusd.reference.rays.triangles import Triangles, build_tables
-from fabricusd.reference.rays.wave import CHANCE, F_PDF, GO_PDF, LANE_SPREAD, LANE_WIDTH, Wave
+from fabricusd.reference.rays.wave import (
+    CHANCE,
+    F_PDF,
+    GO_PDF,
+    LANE_SPREAD,
+    LANE_WIDTH,
+    PRIMITIVE,
+    Wave,
+)
 from fabricusd.reference.stages.arrivals import Settings, arrive, sort_lanes
 from fabricusd.reference.stages.departures import depart
 from fabricusd.reference.stages.hits import prepare
 from fabricusd.reference.stages.shadow_rays import settle, thin_out
 from fabricusd.reference.surfaces.fabric import (
+    NOWHERE_ELSE,
     Points,
     Scattering,
     finish_point,
     look_up,
+    look_up_uneven,
     places_of,
 )
 from fabricusd.reference.surfaces.fabric_far import shade_far
@@ -144,7 +155,7 @@ def _trace_and_settle() -> None:
 def _points() -> Points:
     """The arrays of hits at levels `weave` and `thread`, each of length 0."""
     real = np.zeros(0, np.float32)
-    return Points(np.zeros(0, np.uint8), np.zeros(0, np.int32), real, real, real, real)
+    return Points(np.zeros(0, np.uint8), np.zeros(0, np.int32), *[real] * 6)
 
 
 def _places() -> Places:
@@ -163,6 +174,14 @@ def _shadow_table() -> None:
 
 def _look_up() -> None:
     look_up(R, _woven()[0], R(1), _sample().wave.hits.rows, 0, _points())
+
+
+def _look_up_uneven() -> None:
+    wave = _sample().wave
+    look_up_uneven(
+        R, _woven()[0], compile_yarn(Fabric()), NOWHERE_ELSE, R(1), wave.hits.tags[PRIMITIVE],
+        wave.hits.rows, 0, _points(),
+    )  # fmt: skip
 
 
 def _sample_points() -> None:
@@ -192,7 +211,9 @@ TASKS: dict[str, tuple[Callable[[], None], ...]] = {
         _shade_far, _share_lobes, _shade_preview, _depart, _trace_and_settle, _camera_rays,
         _arrive, _prepare,
     ),
-    CLOSE_UPS: (_finish_point, _look_up, _sample_points, _point_values, _shadow_table),
+    CLOSE_UPS: (
+        _finish_point, _look_up_uneven, _look_up, _sample_points, _point_values, _shadow_table,
+    ),
 }  # fmt: skip
 """The tasks of each list. Tasks that take longest stand at both ends, next to those with which they
 share parts. Every picture needs the first list; levels `weave` and `thread` also need the second.

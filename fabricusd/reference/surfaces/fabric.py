@@ -28,20 +28,33 @@ from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.sampling.blocks import Drawn, sample_points
 from fabricusd.appearance.shadow.methods import NONE, Shadow, compile_shadow, shade
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.weave.coverage import GAP, WARP
-from fabricusd.appearance.weave.lookup import back_of, find
+from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
+from fabricusd.appearance.weave.lookup import back_of, find, move_along
 from fabricusd.appearance.weave.place import Hit, Places, place_at
+from fabricusd.appearance.weave.yarn.compiled import compile_yarn
+from fabricusd.appearance.weave.yarn.lay import (
+    DOUBLE_ROWS,
+    IN_CELL,
+    INT_ROWS,
+    REAL_ROWS,
+    TONE,
+    lay_block,
+    sound,
+    strand,
+)
 from fabricusd.fabric import Fabric
-from fabricusd.kernels.real import INLINE, LEAN
+from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, LEAN
 from fabricusd.reference.rays.embree import aligned_empty
 from fabricusd.reference.rays.wave import (
     CHANCE,
     F_PDF,
     FAR_LEVEL,
+    FOOTPRINT,
     GO,
     GO_PDF,
     KEEP,
     PLACE,
+    PRIMITIVE,
     THREAD,
     THREAD_LEVEL,
     WEIGHT,
@@ -53,12 +66,16 @@ from fabricusd.reference.surfaces.fabric_gap import gap_table, pass_far, pass_ga
 
 R = np.float32
 _ONE_AT_A_TIME = threading.Lock()
+NOWHERE_ELSE = np.zeros((0, 2), np.int64)
+"""`TriangleTables.home` of a scene without uneven threads."""
 
 
 class Points(NamedTuple):
     """The thread under each of n hits, as `weave.lookup.find` gives it.
 
     sets : (n,) uint8; threads : (n,) int32; along, across, psi0, length : (n,) float32
+    strand : (n,) float32 - position across the strand of plies; `across` itself where none shows
+    shade : (n,) float32 - factor of the albedo; (0,) for even threads
     """
 
     sets: NDArray[np.uint8]
@@ -67,11 +84,13 @@ class Points(NamedTuple):
     across: NDArray[np.float32]
     psi0: NDArray[np.float32]
     length: NDArray[np.float32]
+    strand: NDArray[np.float32]
+    shade: NDArray[np.float32]
 
 
 def places_of(points: Points) -> Places:
     """What the surface laws read of `points`."""
-    return Places(points.sets, points.threads, points.psi0, points.across)
+    return Places(points.sets, points.threads, points.psi0, points.strand, points.shade)
 
 
 class Scattering(NamedTuple):
@@ -100,24 +119,31 @@ class _Scratch:
         self.passes = aligned_empty((capacity,))
         self.along = aligned_empty((capacity,))
         self.length = aligned_empty((capacity,))
+        self.strand = aligned_empty((capacity,))
+        self.shade = aligned_empty((capacity,))
 
     def scattering(self, count: int) -> Scattering:
         """C-contiguous arrays for `count` hits."""
         return Scattering(*(v[: 3 * count].reshape(3, count) for v in self.vectors))
 
-    def points(self, count: int) -> Points:
+    def points(self, count: int, *, uneven: bool) -> Points:
         """Arrays for `count` hits."""
+        across = self.across[:count]
         return Points(
-            self.sets[:count], self.threads[:count], self.along[:count], self.across[:count],
+            self.sets[:count], self.threads[:count], self.along[:count], across,
             self.psi0[:count], self.length[:count],
+            self.strand[:count] if uneven else across, self.shade[: count if uneven else 0],
         )  # fmt: skip
 
 
 class _Side:
     """The tables of one side of a cloth, made on demand."""
 
-    def __init__(self, fabric: Fabric, shadow: str, make_ready: Callable[[], None]) -> None:
+    def __init__(
+        self, fabric: Fabric, front: Fabric | None, shadow: str, make_ready: Callable[[], None]
+    ) -> None:
         self.fabric, self.method, self.make_ready = fabric, shadow, make_ready
+        self.yarn = compile_yarn(fabric, back_of=front) if fabric.is_uneven else None
         self.types = len(fabric.threads)
         self._law: SurfaceLaw | None = None
         self._near: tuple[CompiledFabric, Shadow] | None = None
@@ -156,13 +182,17 @@ class FabricShader:
     gap : share of the light that passes between the threads, seen from above; gaps : table of the
         same by direction, None where the direction does not matter. Those of the front hold for
         both sides.
+    home : `TriangleTables.home` of the scene, read if the threads are uneven
     """
 
     def __init__(
         self, fabric: Fabric, shadow: str, make_ready: Callable[[], None] = lambda: None
     ) -> None:
-        self.fabric = fabric
-        self.sides = tuple(_Side(f, shadow, make_ready) for f in (fabric, back_of(fabric)))
+        self.fabric, self.home = fabric, NOWHERE_ELSE
+        self.sides = (
+            _Side(fabric, None, shadow, make_ready),
+            _Side(back_of(fabric), fabric, shadow, make_ready),
+        )
         law = self.sides[0].law
         self.gap = 0.0 if fabric.opaque else float(law.published.gap)
         self.gaps = gap_table(law, fabric.opaque)
@@ -182,8 +212,8 @@ class FabricShader:
         if level == FAR_LEVEL:
             self._shade_by_law(side, hits, first, scattering, passes)
         else:
-            points = scratch.points(last - first)
-            self._shade_near(side, level, back, hits, first, scattering, points, passes)
+            points = scratch.points(last - first, uneven=side.yarn is not None)
+            self._shade_near(side, level, back, wave, first, scattering, points, passes)
 
     def _shade_by_law(
         self,
@@ -196,7 +226,7 @@ class FabricShader:
         """Shade hits at level `far` on cloth with `conserving` threads."""
         count = len(passes)
         none, real = np.zeros(count, np.uint8), np.zeros(count, np.float32)
-        points = Points(none, none.astype(np.int32), real, real, real, real)
+        points = Points(none, none.astype(np.int32), real, real, real, real, real, real[:0])
         _by_law(R, side.law, FAR_LEVEL, hits, first, scattering, places_of(points))
         pass_far(R, self.sides[0].law.conserving, self.is_open, scattering.wo, passes)
         finish_by_law(R, hits, first, passes, scattering)
@@ -206,18 +236,25 @@ class FabricShader:
         side: _Side,
         level: int,
         back: int,
-        hits: NDArray[np.float32],
+        wave: Wave,
         first: int,
         scattering: Scattering,
         points: Points,
         passes: NDArray[np.float32],
     ) -> None:
         wo, wi, go, towards, onwards = scattering
+        hits = wave.hits.rows
         law, (cloth, shadow) = side.law, side.near
         count = wo.shape[1]
         places = places_of(points)
         v_sign = R(-1) if back else R(1)
-        look_up(R, cloth, v_sign, hits, first, points)
+        if side.yarn is None:
+            look_up(R, cloth, v_sign, hits, first, points)
+        else:
+            look_up_uneven(
+                R, cloth, side.yarn, self.home, v_sign, wave.hits.tags[PRIMITIVE], hits, first,
+                points,
+            )  # fmt: skip
         if law.kind == PUBLISHED_ONLY:
             sample_points(
                 R, law.published.threads, law.lobes, level == THREAD_LEVEL, places, wo, wi,
@@ -296,7 +333,7 @@ def finish_by_law(R, hits, first, passes, scattering):
 @njit(**LEAN)
 def look_up(R, cloth, v_sign, hits, first, points):
     """Look up the thread under each hit."""
-    sets, threads, along, across, psi0, length = points
+    sets, threads, along, across, psi0, length, _, _ = points
     for k in range(sets.shape[0]):
         h = first + k
         which, thread, s, w, angle, run = find(
@@ -304,6 +341,62 @@ def look_up(R, cloth, v_sign, hits, first, points):
         )
         sets[k], threads[k], along[k], across[k] = which, thread, s, w
         psi0[k], length[k] = angle, run
+
+
+@njit(**KERNEL)
+def look_up_uneven(R, cloth, yarn, home, v_sign, triangles, hits, first, points):
+    """Look up the uneven thread under each hit; PLACE becomes the place of the even cloth at which
+    that thread lies, for the shadows.
+
+    home : `TriangleTables.home`; triangles : (n,) of each hit
+    """
+    u, v, blur = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, R)
+    doubles, reals = np.empty(DOUBLE_ROWS * BLOCK), np.empty(REAL_ROWS * BLOCK, R)
+    ints = np.empty(INT_ROWS * BLOCK, np.int32)
+    count, metres = points.sets.shape[0], R(yarn.cell[WEFT])
+    for start in range(0, count, BLOCK):
+        size = min(BLOCK, count - start)
+        for x in range(size):
+            h = first + start + x
+            u[x] = float(hits[PLACE, h]) + home[triangles[h], 0]
+            v[x] = float(hits[PLACE + 1, h]) + home[triangles[h], 1]
+            blur[x] = hits[FOOTPRINT, h] * metres
+        lay_block(R, yarn, u, v, blur, size, doubles, reals, ints)
+        for x in range(size):
+            _look_up_laid(
+                R, cloth, yarn, home[triangles[first + start + x]], v_sign, u[x], v[x], x, reals,
+                ints, hits, first + start + x, start + x, points,
+            )  # fmt: skip
+
+
+@njit(**INLINE)
+def _look_up_laid(R, cloth, yarn, home, v_sign, u, v, x, reals, ints, hits, h, k, points):
+    """Look up hit `h`, entry x of what `lay_block` found at (u, v), into entry k of `points`."""
+    sets, threads, along, across, psi0, length, strands, shades = points
+    place_u, place_v = u, v
+    laid = sound(u, v)
+    if laid:
+        place_u = float(ints[WARP * BLOCK + x]) + float(reals[IN_CELL + WARP * BLOCK + x])
+        place_v = float(ints[WEFT * BLOCK + x]) + float(reals[IN_CELL + WEFT * BLOCK + x])
+    near_u, near_v = place_u - home[0], place_v - home[1]
+    which, thread, s, w, angle, run = find(R, cloth, near_u, v_sign * near_v)
+    sets[k], threads[k], along[k], across[k] = which, thread, s, w
+    psi0[k], length[k], strands[k], shades[k] = angle, run, w, R(1)
+    if which != GAP and laid:
+        number = ints[which * BLOCK + x]
+        shades[k] = reals[TONE + which * BLOCK + x]
+        if yarn.plies != 0:
+            at = v_sign * v if which == WARP else u
+            strands[k] = strand(R, yarn, which, thread, number, w, at * yarn.cell[which])
+        if run > R(0):
+            # Along the thread as this side counts it: from the back, V runs the other way.
+            place = v_sign * place_v if which == WARP else place_u
+            moved, along[k], psi0[k] = move_along(
+                R, cloth, yarn, which, thread, number, s, run, place
+            )
+            near_u = near_u if which == WARP else moved - home[0]
+            near_v = v_sign * moved - home[1] if which == WARP else near_v
+    hits[PLACE, h], hits[PLACE + 1, h] = R(near_u), R(near_v)
 
 
 @njit(**LEAN)
@@ -316,7 +409,7 @@ def finish_point(
         in gaps alone, where what does not pass ends
     """
     _, wi, go, towards, onwards = scattering
-    sets, threads, along, across, _, length = points
+    sets, threads, along, across, _, length, _, _ = points
     for k in range(wi.shape[1]):
         h = first + k
         keep = R(1) if published else R(1) - passes[k]

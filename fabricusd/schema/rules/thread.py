@@ -7,7 +7,10 @@ from collections.abc import Iterator
 
 from pxr import Usd
 
+from fabricusd.fabric import UNEVENNESS, yarn_faults
+from fabricusd.schema import attributes
 from fabricusd.schema.access import value
+from fabricusd.schema.attributes import MILLIMETRE, to_si
 from fabricusd.schema.rules.table import THREAD, Fault, rule
 
 
@@ -50,3 +53,12 @@ def curve_angles_in_range(prim: Usd.Prim) -> Iterator[Fault]:
         if not (math.isfinite(x) and -90.0 <= x <= 90.0):
             yield name, f"[{k}] is {x:g}; it must be from -90 to 90 degrees"
             return
+
+
+@rule(THREAD)
+def yarn_is_whole(prim: Usd.Prim) -> Iterator[Fault]:
+    """Uneven yarn has a length over which it changes, and slubs a length and a distance."""
+    mine = {entry.field: entry for entry in attributes.THREAD if entry.field in UNEVENNESS}
+    held = {name: to_si(value(prim, entry.name), entry) for name, entry in mine.items()}
+    for name, problem in yarn_faults(**held, scale=1.0 / MILLIMETRE, unit="mm"):
+        yield mine[name].name, problem
