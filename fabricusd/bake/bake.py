@@ -12,7 +12,9 @@ from functools import partial
 from pathlib import Path
 
 from fabricusd import __version__
-from fabricusd.bake.btf.write import MAX_ERROR, write_btf
+from fabricusd.appearance.scattering.models import translucent
+from fabricusd.bake.btf.matrix import table_size
+from fabricusd.bake.btf.write import MAX_ERROR, PER_THREAD, write_btf
 from fabricusd.bake.error.accuracy import swatch_errors
 from fabricusd.bake.error.choose import Tried, cheapest, maps_with
 from fabricusd.bake.error.map_error import map_errors
@@ -98,6 +100,7 @@ class _Job:
     """A checked request: the garments, maps and resolution to bake.
 
     notes : from the scene's reader
+    through : whether light comes through a fabric of the bake
     tiles : UDIM tiles of each garment, in the order of `found`
     """
 
@@ -106,6 +109,7 @@ class _Job:
     up_axis: str
     found: list[Garment]
     maps: list[TextureMap]
+    through: bool
     resolution: int
     tiles: list[dict[int, tuple[int, int]]]
 
@@ -120,12 +124,18 @@ def _job(
     check_settings(settings)
     read = read_scene(scene, fabric=fabric, units=units)
     found = _garments(read, settings, mesh, fabric)
+    through = any(translucent(lay.fabric) for one in found for lay in one.lays)
+    if settings.btf:
+        for one in found:
+            for lay in one.lays:
+                table_size(lay.fabric, PER_THREAD)
     return _Job(
         settings=settings,
         notes=read.notes,
         up_axis=read.up_axis,
         found=found,
-        maps=chosen_maps(settings.maps, light=settings.light is not None),
+        maps=chosen_maps(settings.maps, light=settings.light is not None, through=through),
+        through=through,
         resolution=_resolution(settings, found),
         tiles=[tiles_of(one, settings.udim) for one in found],
     )
@@ -138,7 +148,7 @@ def _bake(
     settings, found = job.settings, job.found
     for one, places in zip(found, job.tiles, strict=True):
         refuse_overlaps(one, places, min(job.resolution, 2048), folder)
-    recipes = _recipes(found, settings)
+    recipes = _recipes(job)
     resolution, maps, tried = _chosen(job, recipes)
     sheets = [
         sheet
@@ -197,7 +207,8 @@ def _chosen(job: _Job, recipes: dict[Fabric, Recipe]) -> tuple[int, list[Texture
     )
     if settings.maps is not None:
         return best.resolution, job.maps, tried
-    return best.resolution, maps_with(best.maps, light=settings.light is not None), tried
+    lit = settings.light is not None
+    return best.resolution, maps_with(best.maps, light=lit, through=job.through), tried
 
 
 def _measure(result: Baked, sheets: Sequence[Sheet], settings: Settings) -> None:
@@ -344,14 +355,16 @@ def _coarse(found: Sequence[Garment], resolution: int) -> list[str]:
     return notes
 
 
-def _recipes(found: Sequence[Garment], settings: Settings) -> dict[Fabric, Recipe]:
+def _recipes(job: _Job) -> dict[Fabric, Recipe]:
     made: dict[Fabric, Recipe] = {}
-    for one in found:
+    settings, back = job.settings, any(one.name == "back_base_color" for one in job.maps)
+    for one in job.found:
         for lay in one.lays:
             if lay.fabric not in made:
                 made[lay.fabric] = recipe(
-                    lay.fabric, level=settings.level, light=settings.light, method=settings.shadow
-                )
+                    lay.fabric, level=settings.level, light=settings.light, method=settings.shadow,
+                    back=back,
+                )  # fmt: skip
     return made
 
 

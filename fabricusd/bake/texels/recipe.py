@@ -7,9 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.scattering.models import translucent
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric, true_repeat
-from fabricusd.bake.texels.angle_rows import angle_rows, height_rows
+from fabricusd.appearance.weave.lookup import back_of
+from fabricusd.bake.texels.angle_rows import STEPS, angle_rows, back_rows, height_rows
 from fabricusd.bake.texels.light import unit_light
 from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.moments import texels
@@ -24,6 +26,8 @@ class Recipe(NamedTuple):
     rows, heights : see `angle_rows`
     rounded : int - 1 if threads are round across their width
     light : (3,) float32 - unit vector to the light in the weave's frame; zero for none
+    two_sided : int - 1 if the moments of the back are computed
+    back, back_rows : the cloth seen from behind at (u, -v), and what it adds, see `back_rows`
     mean : (MOMENTS,) float32 - moments of the whole repeat
     """
 
@@ -34,6 +38,9 @@ class Recipe(NamedTuple):
     heights: NDArray[np.float32]
     rounded: int
     light: NDArray[np.float32]
+    two_sided: int
+    back: CompiledFabric
+    back_rows: NDArray[np.float32]
     mean: NDArray[np.float32]
 
 
@@ -43,13 +50,17 @@ def recipe(
     level: str = "weave",
     light: tuple[float, float, float] | None = None,
     method: str = "peak",
+    back: bool | None = None,
 ) -> Recipe:
     """Compile the tables of `fabric`.
 
     level : "weave" for threads that are flat across their width, "thread" for round ones
     light : direction to the light in the surface frame, for the shadow mask
     method : method of the shadow mask
+    back : whether the back is baked; None bakes it where threads scatter light to the other side
     """
+    two_sided = translucent(fabric) if back is None else back
+    behind = back_of(fabric) if two_sided else fabric
     cloth = compile_fabric(fabric, precision=np.float32)
     horizon = compile_shadow(fabric, "horizon", level=level)
     shadow = compile_shadow(fabric, method, level=level) if light is not None else horizon
@@ -62,6 +73,9 @@ def recipe(
         heights=height_rows(fabric),
         rounded=int(level == "thread"),
         light=towards.astype(np.float32),
+        two_sided=int(two_sided),
+        back=compile_fabric(behind, precision=np.float32) if two_sided else cloth,
+        back_rows=back_rows(behind) if two_sided else np.zeros((2, 1, STEPS, 4), np.float32),
         mean=np.zeros(MOMENTS, np.float32),
     )
     return made._replace(mean=repeat_mean(fabric, made))

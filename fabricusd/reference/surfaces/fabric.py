@@ -25,7 +25,7 @@ from fabricusd.appearance.law import (
 )
 from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.sampling.blocks import Drawn, sample_points
-from fabricusd.appearance.scattering.models import any_conserving
+from fabricusd.appearance.scattering.models import translucent
 from fabricusd.appearance.shadow.methods import NONE, Shadow, compile_shadow, shade
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, WARP
@@ -156,7 +156,7 @@ class FabricShader:
         self.fabric = fabric
         self.sides = tuple(_Side(f, shadow, make_ready) for f in (fabric, back_of(fabric)))
         self.gap = 0.0 if fabric.opaque else float(self.sides[0].law.published.gap)
-        self.translucent = not fabric.opaque and any_conserving(fabric)
+        self.translucent = translucent(fabric)
 
     def __call__(self, level: int, back: int, wave: Wave, first: int, last: int) -> None:
         """Shade the hits from `first` to before `last`, all on one side and at one level."""
