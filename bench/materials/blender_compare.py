@@ -23,8 +23,8 @@ import numpy as np
 from pxr import Usd, UsdGeom, UsdLux
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent / "samples"))
-sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(HERE.parents[1] / "samples"))
+sys.path.insert(0, str(HERE))
 
 from make_samples import Grid, camera, define_grid, dress, look_at, make_drape  # noqa: E402
 
