@@ -40,8 +40,8 @@ from fabricusd.bake.texels.maps import TextureMap, chosen_maps
 from fabricusd.bake.texels.recipe import Recipe, recipe
 from fabricusd.bake.texels.sheet import LARGEST, SMALLEST, Sheet, sheets_of
 from fabricusd.bake.work.assemble import Files, Progress, Work, assemble, compute
-from fabricusd.bake.work.checkpoint import checkpoint_of
-from fabricusd.bake.work.lock import locked
+from fabricusd.bake.work.checkpoint import space_needed
+from fabricusd.bake.work.lock import locked, refuse_locked
 from fabricusd.bake.work.scratch import Scratch
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
@@ -165,7 +165,7 @@ def _bake(
         notes=[*job.notes, *(n for g in found for n in g.notes), *_coarse(found, resolution)],
     )
     scratch = Scratch(folder, _key(found, settings, resolution, maps), resume=resume)
-    _check_space(folder, sum(checkpoint_of(sheet, maps).bytes_needed for sheet in sheets))
+    _check_space(folder, job, resolution, maps)
     files = Files(folder=folder, udim=settings.udim, file_format=settings.file_format)
     work = Work(
         scratch=scratch, sheets=sheets, maps=maps, files=files, workers=workers, progress=progress
@@ -259,11 +259,19 @@ def plan(
     units: str | None = None,
     workers: int | None = None,
 ) -> Plan:
-    """Describe what `bake` would write, without writing it; raises the same errors."""
+    """Describe what `bake` would write, without writing it.
+
+    Raises the same errors. Those of the folder need `out`, and with `max_error` the space on its
+    disk is not compared.
+    """
     worker_count(workers)
     job = _job(scene, settings, fabric, mesh, units)
     if out is not None:
         _check_folder(Path(out))
+        refuse_locked(Path(out))
+        # A search takes the least resolution that does, which is not known yet.
+        if not settings.max_error:
+            _check_space(Path(out), job, job.resolution, job.maps)
     for one, places in zip(job.found, job.tiles, strict=True):
         refuse_overlaps(one, places, min(job.resolution, 2048), None)
     return Plan(
@@ -322,12 +330,17 @@ def _check_folder(folder: Path) -> None:
     # os.path returns False where pathlib raises: for overlong names and unreadable parents.
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise FabricError(str(folder), "is a file; the output must be a folder")
-    there = next((one for one in (folder, *folder.parents) if os.path.exists(one)), Path("."))
+    there = _nearest(folder)
     if not os.path.isdir(there):
         raise FabricError(str(folder), f"cannot be created: {there} is a file, not a folder")
     if not os.access(there, os.W_OK):
         verb = "written" if there == folder else "created"
         raise FabricError(str(folder), f"cannot be {verb}: you may not write to {there}")
+
+
+def _nearest(folder: Path) -> Path:
+    """The folder, or the nearest of its parents that exists."""
+    return next((one for one in (folder, *folder.parents) if os.path.exists(one)), Path("."))
 
 
 def _resolution(settings: Settings, found: Sequence[Garment]) -> int:
@@ -376,8 +389,16 @@ def _key(
     return hashlib.sha256("\n".join(words).encode()).hexdigest()
 
 
-def _check_space(folder: Path, need: int) -> None:
-    free = shutil.disk_usage(folder).free
+def _check_space(folder: Path, job: _Job, resolution: int, maps: Sequence[TextureMap]) -> None:
+    """Raise FabricError if the disk has less than the bake's working space.
+
+    folder : may be missing
+    """
+    need = sum(
+        len(places) * space_needed(one, resolution, maps)
+        for one, places in zip(job.found, job.tiles, strict=True)
+    )
+    free = shutil.disk_usage(_nearest(folder)).free
     if need > free:
         raise FabricError(
             str(folder),

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import os
-import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-import fabricusd
 from fabricusd.appearance.shadow.methods import METHODS
 from fabricusd.appearance.weave.footprint import DEFAULT, Limits
 from fabricusd.errors import FabricError
@@ -25,10 +22,10 @@ from fabricusd.ranges import RANGES, require_picture, require_ranges
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import AOVS, Film, require_aovs
 from fabricusd.reference.integrator import Tracer
-from fabricusd.reference.nothing_seen import reason_for_nothing
-from fabricusd.reference.rays.camera import Lens, build_lens, default_camera
+from fabricusd.reference.rays.camera import build_lens, default_camera
 from fabricusd.reference.rays.wave import ALPHA, Wave
 from fabricusd.reference.start.compile_ahead import EVERY_PICTURE, compile_ahead
+from fabricusd.reference.told import asked_for, note_losses, versions
 from fabricusd.reference.view_transform import view
 from fabricusd.run.workers import Batches, pixels_along_z_curve, worker_count
 from fabricusd.scene.read import read_scene
@@ -44,9 +41,6 @@ MOST_TRIED = 100
 
 PASS = 16
 """Samples per pixel in one pass over the picture; no pixel gets more before all have had these."""
-
-TOLD_CUT = 0.01
-"""Share of the light above which a note says that bounds on bounces cut it off."""
 
 MOST_SAMPLES = 4096
 """Most samples per pixel of adaptive sampling if no number is given."""
@@ -164,7 +158,7 @@ def render(
                 progress=progress and _of_frame(progress, number, len(targets), begun),
             )  # fmt: skip
             stops = exposure + (loaded.camera.exposure if loaded.camera else 0.0)
-            result.metadata.update(_asked_for(scene, time_code, stops))
+            result.metadata.update(asked_for(scene, time_code, stops))
             if target is not None:
                 paths += _write(target, result, stops)
             # Keep only the last frame's layers: those of all frames would fill the memory.
@@ -255,16 +249,6 @@ def written_files(target: Path) -> list[Path]:
     return list(dict.fromkeys([target, target.with_suffix(".png")]))
 
 
-def _asked_for(source: Any, time_code: float | None, stops: float) -> dict[str, Any]:
-    """The metadata that tell a picture's source and how its PNG was made."""
-    known: dict[str, Any] = {"fabricusd:exposure": stops}
-    if not isinstance(source, Scene):
-        known["fabricusd:scene"] = os.fspath(source)
-    if time_code is not None:
-        known["fabricusd:timeCode"] = float(time_code)
-    return known
-
-
 def _write(target: Path, result: RenderResult, exposure: float) -> tuple[str, ...]:
     """Write the picture's files and return their names."""
     picture = view(result.layers["beauty"][..., :3], exposure)
@@ -325,14 +309,14 @@ def render_scene(
     rays, shadow_rays, not_finite = (int(x) for x in counters.sum(axis=0))
     begun_at = float(film.sums[ALPHA].sum(dtype=np.float64))
     met, cut = begun_at > 0 or not complete, float(lost.sum()) / max(begun_at, 1.0)
-    _note_losses(scene, tracer, lens, not_finite, cut, met, (width, height))
+    note_losses(scene, tracer, lens, not_finite, cut, met, (width, height))
     max_translucent = tracer.max_translucent
     embree, triangles = tracer.accelerator.version, len(tracer.tables.triangles)
     # Free the triangles and their acceleration structure before the layers are made.
     del tracer
     error = film.relative_error()
     metadata = {
-        **_versions(), "fabricusd:embree": embree,
+        **versions(), "fabricusd:embree": embree,
         "fabricusd:estimator": estimator, "fabricusd:sampler": sampler,
         "fabricusd:limits": str(limits),
         "fabricusd:samples": most, "fabricusd:noise": noise or 0.0,
@@ -361,31 +345,6 @@ def render_scene(
     )
 
 
-def _note_losses(
-    scene: Scene,
-    tracer: Tracer,
-    lens: Lens,
-    not_finite: int,
-    cut: float,
-    met: bool,
-    size: tuple[int, int],
-) -> None:
-    """Note values that were not finite, light that was cut off, and why a picture shows nothing."""
-    if not_finite:
-        scene.note("the picture", f"lost {not_finite} values that were not finite")
-    if cut > TOLD_CUT:
-        bounds = f"max bounces {tracer.max_bounces}"
-        if tracer.translucent.any():
-            bounds += f" and max translucent {tracer.max_translucent}"
-        scene.note(
-            "the picture",
-            f"lost up to {100 * cut:.2g} % of its light: {bounds} ended paths that still carried "
-            "as much",
-        )
-    if not met and len(tracer.tables.triangles):
-        scene.note("the picture", reason_for_nothing(tracer, lens, *size))
-
-
 def _furnished(scene: Scene, width: int, height: int) -> Camera:
     """The scene's camera, or one that sees the whole scene. Adds lights to a scene without any."""
     if not scene.lights:
@@ -394,16 +353,6 @@ def _furnished(scene: Scene, width: int, height: int) -> Camera:
     if scene.camera is None:
         scene.note("the scene", "has no camera; one that sees all of it from the front is used")
     return scene.camera or default_camera(scene, width, height)
-
-
-def _versions() -> dict[str, Any]:
-    """The metadata that name the programs and versions that made a picture."""
-    return {
-        "Software": f"fabricusd {fabricusd.__version__}",
-        "fabricusd:python": platform.python_version(),
-        "fabricusd:numpy": np.__version__,
-        "fabricusd:numba": numba.__version__,
-    }
 
 
 def _typical_worst(error: NDArray[np.float32]) -> float:
