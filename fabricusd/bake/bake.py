@@ -95,6 +95,10 @@ def bake(
     return result
 
 
+BACK = "back_base_color"
+"""The map of the cloth's back, which other maps do not need."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Job:
     """A checked request: the garments, maps and resolution to bake.
@@ -125,6 +129,12 @@ def _job(
     read = read_scene(scene, fabric=fabric, units=units)
     found = _garments(read, settings, mesh, fabric)
     through = any(translucent(lay.fabric) for one in found for lay in one.lays)
+    if not through and settings.maps and BACK in settings.maps:
+        raise FabricError(
+            f"map '{BACK}'",
+            "needs a fabric that light comes through: threads of the model 'conserving', and not "
+            "opaque",
+        )
     if settings.btf:
         for one in found:
             for lay in one.lays:
@@ -370,7 +380,7 @@ def _coarse(found: Sequence[Garment], resolution: int) -> list[str]:
 
 def _recipes(job: _Job) -> dict[Fabric, Recipe]:
     made: dict[Fabric, Recipe] = {}
-    settings, back = job.settings, any(one.name == "back_base_color" for one in job.maps)
+    settings, back = job.settings, any(one.name == BACK for one in job.maps)
     for one in job.found:
         for lay in one.lays:
             if lay.fabric not in made:

@@ -15,9 +15,11 @@ from fabricusd.bake.error.relight import BakedSet
 from fabricusd.bake.job import Settings
 from fabricusd.bake.layout.garment import garments
 from fabricusd.bake.texels import moment_indices as m
+from fabricusd.bake.texels.blocks import bake_block
 from fabricusd.bake.texels.maps import chosen_maps
 from fabricusd.bake.texels.recipe import recipe
 from fabricusd.bake.texels.sheet import sheets_of
+from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.schema import load, save_all
 from tests.bake.meshes import quad_scene, write_quad
@@ -120,6 +122,28 @@ def test_a_bake_of_conserving_cloth_is_whole_and_can_be_resumed(tmp_path):
     assert "transmission_color" in said["garments"]["quad_obj"]["map_error"]
     report = (tmp_path / "once" / "report.html").read_text()
     assert "lit from behind" in report
+
+
+def test_the_back_of_each_texel_is_that_of_its_own_weave():
+    """A satin repeats after 5 threads, its back after 3: together after 15."""
+    fabric = conserving("polyester_satin_charmeuse")
+    fabric = replace(fabric, back=replace(fabric.back, model="conserving"))
+    one = garments(quad_scene(fabric, 16.0))[0]
+    looked_up = sheets_of(one, (recipe(fabric),), {1001: (0, 0)}, 64, 4)[0]
+    assert looked_up.tables[0] is not None
+    computed = replace(looked_up, tables=(None,))
+    maps = chosen_maps(("back_base_color",), light=False)
+    a, c = (bake_block(sheet, maps, 0, 0)[0][0][0] for sheet in (looked_up, computed))
+    scale = float(np.std(np.float64(c)))
+    assert scale > 1e-3
+    assert np.sqrt(np.mean((np.float64(a) - c) ** 2)) < 0.3 * scale
+
+
+def test_a_map_of_the_back_needs_cloth_that_light_comes_through(tmp_path):
+    source = write_quad(tmp_path / "quad.obj")
+    settings = Settings(resolution=64, maps=("back_base_color",))
+    with pytest.raises(FabricError, match="needs a fabric that light comes through"):
+        plan(source, settings, fabric="linen_plain")
 
 
 def test_a_back_that_is_changed_changes_the_garment():

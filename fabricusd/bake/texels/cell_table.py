@@ -18,12 +18,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.bake.layout.garment import Garment, Lay
 from fabricusd.bake.texels.maps import Texels, TextureMap
 from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.moments import samples_for, spans_repeats, texels
 from fabricusd.bake.texels.recipe import Recipe
+from fabricusd.bake.texels.repeat import baked_repeat
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import LEAN
 
@@ -88,7 +88,7 @@ def tables_of(
         if key not in made:
             made[key] = None
             if raster is not None:
-                step, repeat = _step(lay, resolution), true_repeat(lay.fabric)
+                step, repeat = _step(lay, resolution), baked_repeat(lay.fabric)
                 made[key] = cell_table(recipe, step, repeat, raster, levels)
     return tuple(made[lay.fabric, lay.matrix.tobytes()] for lay in garment.lays)
 
@@ -101,7 +101,7 @@ def rasters_of(garment: Garment, resolution: int) -> tuple[Raster | None, ...]:
         key = (lay.fabric, lay.matrix.tobytes())
         if key not in found:
             step = _step(lay, resolution)
-            raster = affordable_raster(step, true_repeat(lay.fabric), resolution**2, left)
+            raster = affordable_raster(step, baked_repeat(lay.fabric), resolution**2, left)
             left -= 0 if raster is None else math.prod(raster.counts)
             found[key] = raster
     return tuple(found[lay.fabric, lay.matrix.tobytes()] for lay in garment.lays)

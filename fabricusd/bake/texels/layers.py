@@ -20,6 +20,7 @@ from fabricusd.bake.texels import moments as m
 from fabricusd.bake.texels.cell_table import CellLevel, CellTable
 from fabricusd.bake.texels.maps import Texels, TextureMap
 from fabricusd.bake.texels.moment_indices import MOMENTS
+from fabricusd.bake.texels.repeat import baked_repeat
 from fabricusd.bake.texels.sheet import Sheet, Window, texel_start, texel_step
 from fabricusd.kernels.real import LEAN
 
@@ -93,24 +94,25 @@ class Place:
             sets=np.empty((n, n), np.uint8),
             threads=np.empty((n, n), np.int32),
         )
+        repeat = true_repeat(self.sheet.garment.lays[self.lay].fabric)
         _centres(
-            self.sheet.recipes[self.lay].cloth, *self._raster(), found.weave, found.sets,
-            found.threads,
+            self.sheet.recipes[self.lay].cloth, *self._raster(), np.array(repeat, np.float64),
+            found.weave, found.sets, found.threads,
         )  # fmt: skip
         return found
 
     def phases(self, counts: tuple[int, int]) -> NDArray[np.int32]:
         """(h, w) entries of a cell table with `counts` phases along U and V."""
         found = np.empty((self.size, self.size), np.int32)
-        _phases(*self._raster(), *counts, found)
+        repeat = baked_repeat(self.sheet.garment.lays[self.lay].fabric)
+        _phases(*self._raster(), np.array(repeat, np.float64), *counts, found)
         return found
 
     def _raster(self) -> tuple[NDArray[np.float64], ...]:
-        """(2,) weave coordinates of the first texel's corner, (2, 2) step, (2,) repeat."""
+        """(2,) weave coordinates of the first texel's corner, (2, 2) step."""
         return (
             texel_start(self.sheet, self.lay, *self.window[:2]),
             texel_step(self.sheet, self.lay, 1 << self.level),
-            np.array(true_repeat(self.sheet.garment.lays[self.lay].fabric), np.float64),
         )
 
     def texels(self, moments: Moments, mine: NDArray[np.bool_] | None) -> Texels:
@@ -143,7 +145,7 @@ class ComputedLayer:
         sheet, lay = place.sheet, place.lay
         moments = np.zeros((MOMENTS, *owned.shape), np.float32)
         step = texel_step(sheet, lay)
-        side = m.samples_for(step, true_repeat(sheet.garment.lays[lay].fabric))
+        side = m.samples_for(step, baked_repeat(sheet.garment.lays[lay].fabric))
         start = texel_start(sheet, lay, *place.window[:2])
         m.texels(
             sheet.recipes[lay], step, step, start, place.window[:2], owned.astype(np.int32), 1,

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.scattering.models import translucent
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
-from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric, true_repeat
+from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.lookup import back_of
 from fabricusd.bake.texels.angle_rows import STEPS, angle_rows, back_rows, height_rows
 from fabricusd.bake.texels.light import unit_light
 from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.moments import texels
+from fabricusd.bake.texels.repeat import baked_repeat
 from fabricusd.fabric import Fabric
 
 
@@ -50,16 +51,16 @@ def recipe(
     level: str = "weave",
     light: tuple[float, float, float] | None = None,
     method: str = "peak",
-    back: bool | None = None,
+    back: bool = True,
 ) -> Recipe:
     """Compile the tables of `fabric`.
 
     level : "weave" for threads that are flat across their width, "thread" for round ones
     light : direction to the light in the surface frame, for the shadow mask
     method : method of the shadow mask
-    back : whether the back is baked; None bakes it where threads scatter light to the other side
+    back : whether the back is baked, where threads scatter light to the other side
     """
-    two_sided = translucent(fabric) if back is None else back
+    two_sided = back and translucent(fabric)
     behind = back_of(fabric) if two_sided else fabric
     cloth = compile_fabric(fabric, precision=np.float32)
     horizon = compile_shadow(fabric, "horizon", level=level)
@@ -83,7 +84,7 @@ def recipe(
 
 def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:
     """(MOMENTS,) means over one repeat, from about 16 samples per thread along each axis."""
-    repeat = true_repeat(fabric)
+    repeat = baked_repeat(fabric)
     count = [min(max(16 * n, 256), 2048) for n in repeat]
     moments = np.empty((MOMENTS, count[1], 1), np.float32)
     sums = np.empty(MOMENTS, np.float32)

@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.bake.layout.garment import Garment
 from fabricusd.bake.layout.raster import texel_triangles
 from fabricusd.bake.texels.cell_table import CellTable, tables_of
 from fabricusd.bake.texels.recipe import Recipe
+from fabricusd.bake.texels.repeat import baked_repeat
 
 SMALLEST, LARGEST = 64, 32768
 """Texels along a side of a texture. Most tools cannot open larger ones; use more UDIM tiles."""
 
 BLOCK_SIDE = 256
-"""Texels along the side of a block, whose moments take 12 MB."""
+"""Texels along the side of a block, whose moments take 18 MB."""
 
 Window = tuple[int, int, int, int]
 """(x0, y0, x1, y1): texels of the finest level in the half-open ranges [x0, x1) and [y0, y1)."""
@@ -100,4 +100,4 @@ def texel_start(sheet: Sheet, lay: int, x: float, y: float) -> NDArray[np.float6
     uv = np.array(
         [sheet.tile[0] + x / sheet.resolution, sheet.tile[1] + 1.0 - y / sheet.resolution]
     )
-    return np.asarray(np.mod(one.matrix @ uv + one.offset, true_repeat(one.fabric)))
+    return np.asarray(np.mod(one.matrix @ uv + one.offset, baked_repeat(one.fabric)))
