@@ -18,7 +18,7 @@ sys.path.insert(0, str(HERE.parent / "samples"))
 
 SIZES = {
     "cylinders": (432, 240), "skirt": (288, 384), "drape": (432, 324),
-    "curtain": (288, 216), "lit_skirt": (192, 256), "lit_drape": (240, 180),
+    "curtain": (288, 216), "lit_skirt": (180, 240), "lit_drape": (240, 180),
 }  # fmt: skip
 
 

@@ -63,12 +63,18 @@ def write_fabric_material(
 def fitted_looks(fabric: Fabric, surfaces: Sequence[str] = ("openpbr",)) -> Looks:
     """The look of each surface with which the fabric's mean is nearest to the fabric, in about a
     second each."""
+    sample = mean_sample(fabric)
+    return {kind: fit(kind, sample, fabric).look for kind in ("preview", "principled", *surfaces)}
+
+
+def mean_sample(fabric: Fabric) -> TexelSample:
+    """The one texel that spans a repeat of the fabric."""
     lay = lay_of(Binding(fabric=fabric, threads_per_uv=(1.0, 1.0)), metres_per_uv=1.0)
     texel = {
         name: np.atleast_2d(row) for name, row in _texel(fabric, lay, (*NEEDED, *OPTIONAL)).items()
     }
     smooth = texel["tangent"]
-    sample = TexelSample(
+    return TexelSample(
         base=texel["base_color"],
         smooth=texel["roughness_along"][:, 0],
         rough=texel["roughness_across"][:, 0],
@@ -78,7 +84,6 @@ def fitted_looks(fabric: Fabric, surfaces: Sequence[str] = ("openpbr",)) -> Look
         through=texel["transmission_color"],
         weight=np.ones(1),
     )
-    return {kind: fit(kind, sample, fabric).look for kind in ("preview", "principled", *surfaces)}
 
 
 def mean_values(fabric: Fabric, lay: Lay) -> dict[str, Value]:
