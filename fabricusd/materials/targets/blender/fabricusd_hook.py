@@ -18,7 +18,7 @@ bl_info = {
     "version": (1, 0, 0),
     "blender": (4, 4, 0),
     "category": "Import-Export",
-    "description": "Restores anisotropy, tangents and sheen of baked fabrics on USD import",
+    "description": "Restores anisotropy, tangents, sheen and light through baked fabrics on USD import",
 }
 
 SURFACE = "ND_open_pbr_surface_surfaceshader"
@@ -261,7 +261,7 @@ class FabricLooks(bpy.types.USDHook):  # type: ignore[misc]
 
     bl_idname = "fabricusd_looks"
     bl_label = "fabricusd looks"
-    bl_description = "Restores anisotropy, tangents and sheen of baked fabrics"
+    bl_description = "Restores anisotropy, tangents, sheen and light through baked fabrics"
 
     @staticmethod
     def on_import(import_context: Any) -> bool:
