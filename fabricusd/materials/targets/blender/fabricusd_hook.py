@@ -18,7 +18,7 @@ bl_info = {
     "version": (1, 0, 0),
     "blender": (4, 4, 0),
     "category": "Import-Export",
-    "description": "Restores anisotropy, tangents, sheen and light through baked fabrics on USD import",
+    "description": "Restores anisotropy, tangents, sheen and light through on USD import",
 }
 
 SURFACE = "ND_open_pbr_surface_surfaceshader"
