@@ -16,7 +16,10 @@ from fabricusd.reference.view_transform import view
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "samples"))
 
-SIZES = {"cylinders": (432, 240), "skirt": (288, 384), "drape": (432, 324)}
+SIZES = {
+    "cylinders": (432, 240), "skirt": (288, 384), "drape": (432, 324),
+    "curtain": (288, 216), "lit_skirt": (180, 240), "lit_drape": (240, 180),
+}  # fmt: skip
 
 
 def main() -> None:
@@ -25,9 +28,13 @@ def main() -> None:
     parser.add_argument("names", nargs="*", default=list(SIZES))
     parser.add_argument("--spp", type=int, default=96)
     options = parser.parse_args()
+    from lit_from_behind import make_curtain, make_lit_drape, make_lit_skirt
     from make_samples import make_cylinders, make_drape, make_skirt
 
-    made = {"cylinders": make_cylinders, "skirt": make_skirt, "drape": make_drape}
+    made = {
+        "cylinders": make_cylinders, "skirt": make_skirt, "drape": make_drape,
+        "curtain": make_curtain, "lit_skirt": make_lit_skirt, "lit_drape": make_lit_drape,
+    }  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
         for name in options.names:
             width, height = SIZES[name]

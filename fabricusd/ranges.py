@@ -55,6 +55,7 @@ RANGES = {
     "spp": Range(low=1, high=65536, whole=True, unit="samples a pixel"),
     "noise": Range(low=0, high=10, above=True),
     "max_bounces": Range(low=0, high=1024, whole=True),
+    "max_translucent": Range(low=0, high=1024, whole=True),
     "exposure": Range(low=-100, high=100, unit="stops"),
     "seed": Range(low=-(2**63), high=2**63 - 1, whole=True),
     "workers": Range(low=1, high=1024, whole=True),

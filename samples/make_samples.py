@@ -2,8 +2,8 @@
 
     python samples/make_samples.py [FOLDER]
 
-Writes `cylinders.usda`, `drape.usda` and `skirt.usda`, with their geometry in `.usdc` files beside
-them. Lengths are in metres, +y is up. Everything is computed here; no file is read.
+Writes `cylinders.usda`, `drape.usda` and `skirt.usda`, and the scenes of `lit_from_behind`. Lengths
+are in metres, +y is up. Everything is computed here; no file is read.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 from scipy.ndimage import gaussian_filter, zoom
 
-from fabricusd.fabric import Binding
+from fabricusd.fabric import Binding, Fabric
 from fabricusd.materials.uniform import Looks, fitted_looks, write_fabric_material
 from fabricusd.schema import load, write_fabric
 
@@ -88,8 +88,11 @@ def finer(points: Points, factor: int, *, around: bool = False) -> Points:
     return fine[pad * factor : (pad + m) * factor] if around else fine
 
 
-def new_scene(path: Path) -> Usd.Stage:
-    """A stage in metres with a floor, a soft sky, a key light and a rim light for look-dev."""
+def new_scene(path: Path, *, sky: float = 0.55, lamps: bool = True) -> Usd.Stage:
+    """A stage in metres with a floor, a soft sky, a key light and a rim light for look-dev.
+
+    sky : intensity of the dome; lamps : whether there are a key and a rim light
+    """
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
@@ -97,11 +100,12 @@ def new_scene(path: Path) -> Usd.Stage:
     grey(stage, "/World/Looks/Floor", (0.32, 0.31, 0.30), 0.9)
     floor = define_grid(stage, "/World/Floor", Grid(*_backdrop()))
     bind(stage, floor, "/World/Looks/Floor")
-    sky = UsdLux.DomeLight.Define(stage, "/World/Lights/Sky")
-    sky.CreateIntensityAttr(0.55)
-    sky.CreateColorAttr((0.92, 0.97, 1.0))
-    rect_light(stage, "Key", (-1.6, 2.4, 1.8), 1.0, 34.0, 5200.0)
-    rect_light(stage, "Rim", (1.9, 1.9, -1.5), 0.8, 26.0, 6500.0)
+    dome = UsdLux.DomeLight.Define(stage, "/World/Lights/Sky")
+    dome.CreateIntensityAttr(sky)
+    dome.CreateColorAttr((0.92, 0.97, 1.0))
+    if lamps:
+        rect_light(stage, "Key", (-1.6, 2.4, 1.8), 1.0, 34.0, 5200.0)
+        rect_light(stage, "Rim", (1.9, 1.9, -1.5), 0.8, 26.0, 6500.0)
     return stage
 
 
@@ -174,23 +178,24 @@ def bind(stage: Usd.Stage, mesh: Any, path: str) -> None:
     )
 
 
-def dress(stage: Usd.Stage, mesh: UsdGeom.Mesh, preset: str, **binding: Any) -> None:
-    """Make a mesh of a preset's fabric, by a material of the mesh's name; UVs are in metres.
+def dress(stage: Usd.Stage, mesh: UsdGeom.Mesh, cloth: str | Fabric, **binding: Any) -> None:
+    """Make a mesh of a fabric or a preset's, by a material of the mesh's name; UVs are in metres.
 
     The material carries the fabric, and for other viewers a UsdPreviewSurface and OpenPBR.
     """
-    where, fabric = f"/World/Looks/{preset}", load(preset)
+    fabric = load(cloth) if isinstance(cloth, str) else cloth
+    where = f"/World/Looks/{fabric.name}"
     if not stage.GetPrimAtPath(where):
         write_fabric(stage, where, fabric)
     material = f"/World/Looks/{mesh.GetPrim().GetName()}"
     laid = Binding(fabric=fabric, metres_per_uv=1.0, **binding)
-    write_fabric_material(stage, material, where, laid, looks=_looks(preset))
+    write_fabric_material(stage, material, where, laid, looks=_looks(fabric))
     bind(stage, mesh, material)
 
 
 @cache
-def _looks(preset: str) -> Looks:
-    return fitted_looks(load(preset))
+def _looks(fabric: Fabric) -> Looks:
+    return fitted_looks(fabric)
 
 
 def make_cylinders(folder: Path) -> Path:
@@ -212,7 +217,7 @@ def make_cylinders(folder: Path) -> Path:
     return path
 
 
-def _drum(stage: Usd.Stage, radius: float, height: float, edge: float) -> None:
+def drum(stage: Usd.Stage, radius: float, height: float, edge: float) -> None:
     """Define the drum on which the cloth lies, 4 mm below the cloth."""
     gap = 0.004
     phi = np.linspace(0, 2 * math.pi, 65)[:-1, None]
@@ -223,15 +228,25 @@ def _drum(stage: Usd.Stage, radius: float, height: float, edge: float) -> None:
     points = np.stack([r * np.sin(phi), np.broadcast_to(y, (64, len(y))), r * np.cos(phi)], axis=-1)
     u, v = np.meshgrid(np.linspace(0, 1, 65), np.linspace(0, 1, len(y)), indexing="ij")
     grey(stage, "/World/Looks/Drum", (0.32, 0.31, 0.30), 0.9)
-    drum = define_grid(stage, "/World/Drum", Grid(points, np.stack([u, v], axis=-1), around=True))
-    bind(stage, drum, "/World/Looks/Drum")
+    mesh = define_grid(stage, "/World/Drum", Grid(points, np.stack([u, v], axis=-1), around=True))
+    bind(stage, mesh, "/World/Looks/Drum")
 
 
 def make_drape(folder: Path, *, cells: int = 74, factor: int = 3, steps: int = 420) -> Path:
     """A cloth that hangs over a drum; 98 568 triangles at the usual size."""
     path = folder / "drape.usda"
     stage = new_scene(path)
-    size, radius, height = 0.78, 0.25, 0.42
+    cloth = hung_square(radius=0.25, cells=cells, factor=factor, steps=steps)
+    dress(stage, define_grid(stage, "/World/Cloth", cloth), "silk_shot")
+    drum(stage, 0.25, 0.42, 0.03)
+    camera(stage, (0.55, 0.95, 1.75), (0.0, 0.24, 0.0), 60.0)
+    stage.GetRootLayer().Save()
+    return path
+
+
+def hung_square(*, radius: float, cells: int, factor: int, steps: int, size: float = 0.78) -> Grid:
+    """A square of cloth that hangs over a drum 0.42 m high."""
+    height = 0.42
     line = np.linspace(-size / 2, size / 2, cells + 1)
     x, z = np.meshgrid(line, line[::-1], indexing="ij")
     turn = math.radians(20)
@@ -249,13 +264,7 @@ def make_drape(folder: Path, *, cells: int = 74, factor: int = 3, steps: int = 4
     )
     hung[..., 1] += 0.003
     fine = finer(hung, factor)
-    uv = finer(np.stack([x, -z], axis=-1), factor)
-    mesh = define_grid(stage, "/World/Cloth", Grid(fine, uv))
-    dress(stage, mesh, "silk_shot")
-    _drum(stage, radius, height, 0.03)
-    camera(stage, (0.55, 0.95, 1.75), (0.0, 0.24, 0.0), 60.0)
-    stage.GetRootLayer().Save()
-    return path
+    return Grid(fine, finer(np.stack([x, -z], axis=-1), factor))
 
 
 BODY_HEIGHTS = np.array([0.0, 0.10, 0.45, 0.52, 0.80, 0.90, 1.05, 1.22, 1.38, 1.44, 1.50])
@@ -273,6 +282,17 @@ def make_skirt(folder: Path, *, around: int = 120, down: int = 44, steps: int = 
     """A flared skirt of two panels on a dressmaker's figure; warp runs down the centre front."""
     path = folder / "skirt.usda"
     stage = new_scene(path)
+    mesh = define_grid(stage, "/World/Skirt", hung_skirt(around=around, down=down, steps=steps))
+    dress(stage, mesh, "polyester_satin_charmeuse")
+    figure(stage)
+    camera(stage, (0.75, 1.15, 3.3), (0.0, 0.78, 0.0), 115.0)
+    stage.GetRootLayer().Save()
+    return path
+
+
+@cache
+def hung_skirt(*, around: int, down: int, steps: int) -> Grid:
+    """The skirt as it hangs, from the hem upwards, so that the outside is the front."""
     waist, length, sweep = 1.05, 0.58, math.radians(105)
     # Each panel is a sector of a ring; at the waist it is as long as half the girth of the figure.
     t = np.linspace(0, 2 * math.pi, around, endpoint=False)
@@ -308,14 +328,8 @@ def make_skirt(folder: Path, *, around: int = 120, down: int = 44, steps: int = 
     body = turned_body(BODY_HEIGHTS, BODY_RADII, 0.006)
     hung = simulate(start, flat, body, pinned=pinned, around=True, steps=steps, bending=0.06)
     fine = finer(hung, 3, around=True)
-    # From the hem upwards, so that the outside is the front.
     uv, cuts = _skirt_uv(fine.shape, inner, length, sweep)
-    mesh = define_grid(stage, "/World/Skirt", Grid(fine[:, ::-1], uv[:, ::-1], True, cuts))
-    dress(stage, mesh, "polyester_satin_charmeuse")
-    _figure(stage)
-    camera(stage, (0.75, 1.15, 3.3), (0.0, 0.78, 0.0), 115.0)
-    stage.GetRootLayer().Save()
-    return path
+    return Grid(fine[:, ::-1], uv[:, ::-1], True, cuts)
 
 
 def _skirt_uv(
@@ -339,7 +353,8 @@ def _skirt_uv(
     return np.stack([u, outer - (inner + ss) * np.cos(aa)], axis=-1), cuts
 
 
-def _figure(stage: Usd.Stage) -> None:
+def figure(stage: Usd.Stage) -> None:
+    """Define a dressmaker's figure on its stand."""
     grey(stage, "/World/Looks/Figure", (0.55, 0.50, 0.45), 0.6)
     y = np.linspace(0.30, 1.50, 121)
     a = gaussian_filter(np.interp(y, BODY_HEIGHTS, BODY_RADII[:, 0]), 3) - 0.004
@@ -350,8 +365,8 @@ def _figure(stage: Usd.Stage) -> None:
     tt, yy = np.meshgrid(t, y, indexing="ij")
     points = np.stack([a * np.sin(tt), yy, b * np.cos(tt)], axis=-1)
     uv = np.zeros((97, len(y), 2))
-    figure = define_grid(stage, "/World/Figure", Grid(points, uv, around=True))
-    bind(stage, figure, "/World/Looks/Figure")
+    body = define_grid(stage, "/World/Figure", Grid(points, uv, around=True))
+    bind(stage, body, "/World/Looks/Figure")
     pole = np.stack(
         [
             0.015 * np.sin(tt[:, :2]),
@@ -369,7 +384,11 @@ def main() -> None:
     parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).resolve().parent)
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
-    for make in (make_cylinders, make_drape, make_skirt):
+    from lit_from_behind import make_curtain, make_lit_drape, make_lit_skirt
+
+    for make in (
+        make_cylinders, make_drape, make_skirt, make_lit_drape, make_lit_skirt, make_curtain,
+    ):  # fmt: skip
         print(make(folder))
 
 

@@ -26,7 +26,7 @@ from fabricusd.bake.texels.angle_rows import steepness
 from fabricusd.bake.texels.blocks import composed, layers_of
 from fabricusd.bake.texels.maps import Texels, chosen_maps
 from fabricusd.bake.texels.recipe import Recipe, recipe
-from fabricusd.bake.texels.reflectance import reflectance_table
+from fabricusd.bake.texels.reflectance import FUZZ, SURFACE, VOLUME, reflectance_table
 from fabricusd.bake.texels.sheet import sheets_of, texel_step
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.scene.scene import FabricSurface, Mesh, Scene
@@ -95,15 +95,16 @@ def plain_moments(made: Recipe, fabric: Fabric, step: np.ndarray, size: int) -> 
             at = np.degrees(angle) + 90.0
             low = np.clip(at.astype(int), 0, 179)
             values = reflected[top.astype(int), 0, low] * seen[..., None]
-            total[m.SURFACE] += values[..., 0]
-            total[m.FUZZ] += values[..., 2]
+            total[m.SURFACE] += values[..., SURFACE]
+            total[m.FUZZ] += values[..., FUZZ]
             for channel in range(3):
-                total[m.VOLUME + channel] += values[..., 1] * thread.albedo[channel]
+                total[m.VOLUME + channel] += values[..., VOLUME + channel]
             rows = np.clip((along * table.shape[3]).astype(int), 0, table.shape[3] - 1)
             columns = np.clip(((over - 0.5) / width + 0.5) * table.shape[4], 0, table.shape[4] - 1)
             found = table[i, j, 0, rows, columns.astype(int)] * seen[..., None]
             horizon += np.moveaxis(found, -1, 0)
-    return np.concatenate((total, horizon)) / SIDE**2
+    back = np.zeros((m.MOMENTS - m.BACK_COVER, size, size))
+    return np.concatenate((total, horizon, back)) / SIDE**2
 
 
 def _angles(fabric: Fabric):  # type: ignore[no-untyped-def]

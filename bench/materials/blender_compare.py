@@ -8,6 +8,9 @@ are rendered by fabricusd at level far and, from the baked look, by Cycles in th
 UsdPreviewSurface, which is what Blender imports; through the hook of
 `fabricusd/materials/targets/blender`; and with the OSL shader. The script prints a table of delta E
 2000 and writes the pictures side by side.
+
+With `--behind`, the fabrics' threads conserve energy and the light stands behind the cloth, which
+shows what comes through. There is no OSL shader of such threads.
 """
 
 from __future__ import annotations
@@ -17,14 +20,15 @@ import json
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from pxr import Usd, UsdGeom, UsdLux
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent / "samples"))
-sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(HERE.parents[1] / "samples"))
+sys.path.insert(0, str(HERE))
 
 from make_samples import Grid, camera, define_grid, dress, look_at, make_drape  # noqa: E402
 
@@ -47,10 +51,11 @@ PRESETS = (
     "wool_flannel",
 )
 TOWARDS = np.array([0.45, 0.5, 0.74]) / np.linalg.norm([0.45, 0.5, 0.74])
+BEHIND = TOWARDS * (1.0, 1.0, -1.0)
 IRRADIANCE = math.pi
 SIZE = (300, 200)
 KINDS = ("preview", "hook", "osl")
-ROW = ("reference", *KINDS)
+KINDS_BEHIND = ("preview", "hook")
 
 
 class Subject:
@@ -64,7 +69,12 @@ CYLINDER = Subject("cylinder", (0.0, 0.14, 1.0), (0.0, 0.14, 0.0), 90.0)
 GARMENT = Subject("garment", (0.55, 0.95, 1.75), (0.0, 0.24, 0.0), 60.0)
 
 
-def make_scene(subject, preset, folder):
+def cloth_of(preset, behind):
+    fabric = load(preset)
+    return replace(fabric, model="conserving", back=None) if behind else fabric
+
+
+def make_scene(subject, preset, folder, behind):
     """The scene that fabricusd renders; its mesh is the one that is baked."""
     path = folder / f"{subject.name}.{preset}.usda"
     stage = Usd.Stage.CreateNew(str(path))
@@ -72,11 +82,13 @@ def make_scene(subject, preset, folder):
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/World").GetPrim())
     mesh = cylinder(stage) if subject is CYLINDER else drape(stage, folder)
-    dress(stage, mesh, preset)
+    dress(stage, mesh, cloth_of(preset, behind))
     light = UsdLux.DistantLight.Define(stage, "/World/Light")
     light.CreateIntensityAttr(IRRADIANCE)
     light.CreateAngleAttr(0.0)
-    light.AddTransformOp().Set(look_at(tuple(TOWARDS.tolist()), (0.0, 0.0, 0.0)))
+    light.AddTransformOp().Set(
+        look_at(tuple((BEHIND if behind else TOWARDS).tolist()), (0.0, 0.0, 0.0))
+    )
     camera(stage, subject.eye, subject.at, subject.focal_length)
     stage.GetRootLayer().Save()
     return path
@@ -122,15 +134,16 @@ def reference(scene, folder, spp):
     return picture
 
 
-def jobs_of(subject, preset, scene, folder, spp):
+def jobs_of(subject, preset, scene, folder, behind):
     baked = folder / f"{scene.stem}.bake"
     if not (baked / "manifest.json").exists():
         bake(scene, baked, BakeSettings(resolution=512, fit=True))
     written = write_materials(baked)
     shader = folder / f"{preset}.osl"
-    write_osl(load(preset), shader)
+    if not behind:
+        write_osl(load(preset), shader)
     made = []
-    for kind in KINDS:
+    for kind in KINDS_BEHIND if behind else KINDS:
         made.append(
             {
                 "material": kind,
@@ -139,7 +152,7 @@ def jobs_of(subject, preset, scene, folder, spp):
                 "size": SIZE,
                 "spp": 64 if kind != "osl" else 16,
                 "irradiance": IRRADIANCE,
-                "towards_light": TOWARDS.tolist(),
+                "towards_light": (BEHIND if behind else TOWARDS).tolist(),
                 "focal_length": subject.focal_length,
                 "camera": [list(row) for row in look_at(subject.eye, subject.at)],
                 "shader": str(shader),
@@ -159,11 +172,14 @@ def compare(picture, truth):
     return found, relative
 
 
-def stack(folder, names):
+def stack(folder, names, kinds):
     """Write all rows of pictures below one another, at half size, to `side_by_side.png`."""
     rows = [
         np.concatenate(
-            [read_exr_layers(folder / f"{name}.{kind}.exr")[0]["beauty"][..., :3] for kind in ROW],
+            [
+                read_exr_layers(folder / f"{name}.{kind}.exr")[0]["beauty"][..., :3]
+                for kind in ("reference", *kinds)
+            ],
             axis=1,
         )
         for name in names
@@ -182,6 +198,7 @@ def main() -> None:
     parser.add_argument("--presets", nargs="+", default=list(PRESETS))
     parser.add_argument("--subjects", nargs="+", default=["cylinder", "garment"])
     parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--behind", action="store_true", help="light through the cloth")
     options = parser.parse_args()
     folder = options.out.resolve()
     folder.mkdir(parents=True, exist_ok=True)
@@ -190,9 +207,9 @@ def main() -> None:
     done: list[str] = []
     for subject in (s for s in (CYLINDER, GARMENT) if s.name in options.subjects):
         for preset in options.presets:
-            scene = make_scene(subject, preset, folder)
+            scene = make_scene(subject, preset, folder, options.behind)
             truth = reference(scene, folder, options.spp)
-            jobs, _ = jobs_of(subject, preset, scene, folder, options.spp)
+            jobs, _ = jobs_of(subject, preset, scene, folder, options.behind)
             job = folder / f"{scene.stem}.json"
             job.write_text(json.dumps(jobs))
             log = folder / f"{scene.stem}.log"
@@ -207,7 +224,7 @@ def main() -> None:
                     flush=True,
                 )
             done.append(scene.stem)
-    stack(folder, done)
+    stack(folder, done, KINDS_BEHIND if options.behind else KINDS)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,9 @@ from functools import partial
 from pathlib import Path
 
 from fabricusd import __version__
-from fabricusd.bake.btf.write import MAX_ERROR, write_btf
+from fabricusd.appearance.scattering.models import translucent
+from fabricusd.bake.btf.matrix import table_size
+from fabricusd.bake.btf.write import MAX_ERROR, PER_THREAD, write_btf
 from fabricusd.bake.error.accuracy import swatch_errors
 from fabricusd.bake.error.choose import Tried, cheapest, maps_with
 from fabricusd.bake.error.map_error import map_errors
@@ -38,8 +40,8 @@ from fabricusd.bake.texels.maps import TextureMap, chosen_maps
 from fabricusd.bake.texels.recipe import Recipe, recipe
 from fabricusd.bake.texels.sheet import LARGEST, SMALLEST, Sheet, sheets_of
 from fabricusd.bake.work.assemble import Files, Progress, Work, assemble, compute
-from fabricusd.bake.work.checkpoint import checkpoint_of
-from fabricusd.bake.work.lock import locked
+from fabricusd.bake.work.checkpoint import space_needed
+from fabricusd.bake.work.lock import locked, refuse_locked
 from fabricusd.bake.work.scratch import Scratch
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
@@ -93,11 +95,16 @@ def bake(
     return result
 
 
+BACK = "back_base_color"
+"""The map of the cloth's back, which other maps do not need."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Job:
     """A checked request: the garments, maps and resolution to bake.
 
     notes : from the scene's reader
+    through : whether light comes through a fabric of the bake
     tiles : UDIM tiles of each garment, in the order of `found`
     """
 
@@ -106,6 +113,7 @@ class _Job:
     up_axis: str
     found: list[Garment]
     maps: list[TextureMap]
+    through: bool
     resolution: int
     tiles: list[dict[int, tuple[int, int]]]
 
@@ -120,12 +128,24 @@ def _job(
     check_settings(settings)
     read = read_scene(scene, fabric=fabric, units=units)
     found = _garments(read, settings, mesh, fabric)
+    through = any(translucent(lay.fabric) for one in found for lay in one.lays)
+    if not through and settings.maps and BACK in settings.maps:
+        raise FabricError(
+            f"map '{BACK}'",
+            "needs a fabric that light comes through: threads of the model 'conserving', and not "
+            "opaque",
+        )
+    if settings.btf:
+        for one in found:
+            for lay in one.lays:
+                table_size(lay.fabric, PER_THREAD)
     return _Job(
         settings=settings,
         notes=read.notes,
         up_axis=read.up_axis,
         found=found,
-        maps=chosen_maps(settings.maps, light=settings.light is not None),
+        maps=chosen_maps(settings.maps, light=settings.light is not None, through=through),
+        through=through,
         resolution=_resolution(settings, found),
         tiles=[tiles_of(one, settings.udim) for one in found],
     )
@@ -138,7 +158,7 @@ def _bake(
     settings, found = job.settings, job.found
     for one, places in zip(found, job.tiles, strict=True):
         refuse_overlaps(one, places, min(job.resolution, 2048), folder)
-    recipes = _recipes(found, settings)
+    recipes = _recipes(job)
     resolution, maps, tried = _chosen(job, recipes)
     sheets = [
         sheet
@@ -155,7 +175,7 @@ def _bake(
         notes=[*job.notes, *(n for g in found for n in g.notes), *_coarse(found, resolution)],
     )
     scratch = Scratch(folder, _key(found, settings, resolution, maps), resume=resume)
-    _check_space(folder, sum(checkpoint_of(sheet, maps).bytes_needed for sheet in sheets))
+    _check_space(folder, job, resolution, maps)
     files = Files(folder=folder, udim=settings.udim, file_format=settings.file_format)
     work = Work(
         scratch=scratch, sheets=sheets, maps=maps, files=files, workers=workers, progress=progress
@@ -197,7 +217,8 @@ def _chosen(job: _Job, recipes: dict[Fabric, Recipe]) -> tuple[int, list[Texture
     )
     if settings.maps is not None:
         return best.resolution, job.maps, tried
-    return best.resolution, maps_with(best.maps, light=settings.light is not None), tried
+    lit = settings.light is not None
+    return best.resolution, maps_with(best.maps, light=lit, through=job.through), tried
 
 
 def _measure(result: Baked, sheets: Sequence[Sheet], settings: Settings) -> None:
@@ -248,11 +269,19 @@ def plan(
     units: str | None = None,
     workers: int | None = None,
 ) -> Plan:
-    """Describe what `bake` would write, without writing it; raises the same errors."""
+    """Describe what `bake` would write, without writing it.
+
+    Raises the same errors. Those of the folder need `out`, and with `max_error` the space on its
+    disk is not compared.
+    """
     worker_count(workers)
     job = _job(scene, settings, fabric, mesh, units)
     if out is not None:
         _check_folder(Path(out))
+        refuse_locked(Path(out))
+        # A search takes the least resolution that does, which is not known yet.
+        if not settings.max_error:
+            _check_space(Path(out), job, job.resolution, job.maps)
     for one, places in zip(job.found, job.tiles, strict=True):
         refuse_overlaps(one, places, min(job.resolution, 2048), None)
     return Plan(
@@ -311,12 +340,17 @@ def _check_folder(folder: Path) -> None:
     # os.path returns False where pathlib raises: for overlong names and unreadable parents.
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise FabricError(str(folder), "is a file; the output must be a folder")
-    there = next((one for one in (folder, *folder.parents) if os.path.exists(one)), Path("."))
+    there = _nearest(folder)
     if not os.path.isdir(there):
         raise FabricError(str(folder), f"cannot be created: {there} is a file, not a folder")
     if not os.access(there, os.W_OK):
         verb = "written" if there == folder else "created"
         raise FabricError(str(folder), f"cannot be {verb}: you may not write to {there}")
+
+
+def _nearest(folder: Path) -> Path:
+    """The folder, or the nearest of its parents that exists."""
+    return next((one for one in (folder, *folder.parents) if os.path.exists(one)), Path("."))
 
 
 def _resolution(settings: Settings, found: Sequence[Garment]) -> int:
@@ -344,14 +378,16 @@ def _coarse(found: Sequence[Garment], resolution: int) -> list[str]:
     return notes
 
 
-def _recipes(found: Sequence[Garment], settings: Settings) -> dict[Fabric, Recipe]:
+def _recipes(job: _Job) -> dict[Fabric, Recipe]:
     made: dict[Fabric, Recipe] = {}
-    for one in found:
+    settings, back = job.settings, any(one.name == BACK for one in job.maps)
+    for one in job.found:
         for lay in one.lays:
             if lay.fabric not in made:
                 made[lay.fabric] = recipe(
-                    lay.fabric, level=settings.level, light=settings.light, method=settings.shadow
-                )
+                    lay.fabric, level=settings.level, light=settings.light, method=settings.shadow,
+                    back=back,
+                )  # fmt: skip
     return made
 
 
@@ -363,8 +399,16 @@ def _key(
     return hashlib.sha256("\n".join(words).encode()).hexdigest()
 
 
-def _check_space(folder: Path, need: int) -> None:
-    free = shutil.disk_usage(folder).free
+def _check_space(folder: Path, job: _Job, resolution: int, maps: Sequence[TextureMap]) -> None:
+    """Raise FabricError if the disk has less than the bake's working space.
+
+    folder : may be missing
+    """
+    need = sum(
+        len(places) * space_needed(one, resolution, maps)
+        for one, places in zip(job.found, job.tiles, strict=True)
+    )
+    free = shutil.disk_usage(_nearest(folder)).free
     if need > free:
         raise FabricError(
             str(folder),

@@ -75,7 +75,8 @@ def _page(said: dict[str, Any], figures: list[str]) -> str:
     asked = said["asked"]["max_error"]
     rows = "".join(
         f"<tr><td>{escape(name)}</td><td>{e['point']:.2f}</td><td>{e['texel']:.2f}</td>"
-        f"<td>{e['bound']:.2f}</td></tr>"
+        f"<td>{e['bound']:.2f}</td>"
+        f"<td>{'' if e['behind'] is None else format(e['behind'], '.2f')}</td></tr>"
         for name, e in said["reached"].items()
     )
     forms = "".join(
@@ -104,7 +105,8 @@ def _page(said: dict[str, Any], figures: list[str]) -> str:
         f"<p>Requested bound: {'none' if asked is None else f'delta E {asked:g}'}. "
         f"Result: {cost['resolution']} texels along a side, {cost['bytes'] / 1e6:.1f} MB, "
         f"baked in {cost['seconds']:.1f} s.</p>"
-        "<table><tr><th>garment<th>delta E 2000 at points<th>over texels<th>stated bound</tr>"
+        "<table><tr><th>garment<th>delta E 2000 at points<th>over texels<th>stated bound"
+        "<th>lit from behind</tr>"
         f"{rows}</table>"
         + (
             "<h2>BTF</h2><table><tr><th>fabric<th>form<th>MB<th>rank<th>delta E<th>between"

@@ -85,7 +85,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=number("workers"), metavar="N", help="CPU threads (default: all)"
     )
-    parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
+    parser.add_argument("-n", "--dry-run", action="store_true",
+        help="check, but write nothing; without -o, the folder is not checked",
+    )  # fmt: skip
     parser.add_argument(
         "--no-clobber", action="store_true", help="refuse a folder that holds a bake already"
     )
@@ -104,10 +106,10 @@ def run(options: argparse.Namespace) -> int:
         for one in REGISTRY.values():
             print(f"{one.name:18} {one.meaning}")
         return 0
-    if not options.scene or not options.output:
+    if not options.scene or not (options.output or options.dry_run):
         raise FabricError("bake", "needs a SCENE and -o DIR; see 'fabricusd bake --help'")
-    out = Path(options.output)
-    if options.no_clobber and (out / "manifest.json").exists():
+    out = Path(options.output) if options.output else None
+    if options.no_clobber and out is not None and (out / "manifest.json").exists():
         raise FabricError(str(out), "holds a bake; it must be a new folder with --no-clobber")
     # In Settings, 0 means that nothing was asked for; on the command line it is out of range.
     per_thread, max_error = options.texels_per_thread, options.max_error
@@ -142,6 +144,7 @@ def run(options: argparse.Namespace) -> int:
         for note in () if options.quiet else planned.notes:
             print(f"fabricusd: {note}", file=sys.stderr)
         return 0
+    assert out is not None
     result = bake(
         options.scene, out, settings, fabric=options.fabric, mesh=options.mesh,
         units=options.units, resume=options.resume, workers=options.workers,

@@ -58,11 +58,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the figures, draw the map, and judge the difference by the bounds."""
-    from fabricusd.images.files import read_image, write_png
+    from fabricusd.images.files import parts_of, read_image, write_png
     from fabricusd.quality.pictures import difference, flip_map, heat
 
     high_range = options.a.lower().endswith(".exr") and options.b.lower().endswith(".exr")
     a, b = read_image(options.a), read_image(options.b)
+    for name in (options.a, options.b):
+        parts = parts_of(name)
+        if len(parts) > 1:
+            _say(f"{name}: has {len(parts)} parts; the first, '{parts[0]}', is compared", options)
     found = difference(a, b, high_range=high_range)
     tested = _noise(options) if high_range else None
     if options.significance is not None and tested is None:

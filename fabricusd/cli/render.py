@@ -109,7 +109,14 @@ def _add_quality(parser: argparse.ArgumentParser) -> None:
         type=number("max_bounces"),
         default=4,
         metavar="N",
-        help="maximum number of bounces (default: 4)",
+        help="most bounces at all surfaces but translucent cloth (default: 4)",
+    )
+    parser.add_argument(
+        "--max-translucent",
+        type=number("max_translucent"),
+        metavar="N",
+        help="most bounces at translucent cloth, which Russian roulette mostly ends before "
+        "(default: 64; 0 with --max-bounces 0)",
     )
     parser.add_argument(
         "--level",
@@ -174,9 +181,9 @@ def run(options: argparse.Namespace) -> int:
         result = render(
             options.scene, options.output, fabric=fabric, camera=options.camera,
             width=options.width, height=options.height, spp=options.spp, noise=options.noise,
-            max_bounces=options.max_bounces, level=options.level, shadow=options.shadow,
-            limits=options.limits, aovs=layers, frames=frames, seed=options.seed,
-            workers=options.workers, exposure=options.exposure,
+            max_bounces=options.max_bounces, max_translucent=options.max_translucent,
+            level=options.level, shadow=options.shadow, limits=options.limits, aovs=layers,
+            frames=frames, seed=options.seed, workers=options.workers, exposure=options.exposure,
             complexity=options.complexity, units=options.units, progress=progress,
         )  # fmt: skip
     finally:

@@ -174,16 +174,16 @@ def _stored_pixels(path: str | os.PathLike[str]) -> tuple[NDArray[np.float32], A
 
 
 def _buffer_pixels(
-    path: str | os.PathLike[str], level: int = 0, config: Any = None
+    path: str | os.PathLike[str], level: int = 0, config: Any = None, part: int = 0
 ) -> tuple[NDArray[np.float32], Any]:
-    """((h, w, c) float32 values of one mip level, the buffer that holds them).
+    """((h, w, c) float32 values of one mip level of one part, the buffer that holds them).
 
     Raises FabricError for a file that is not a picture, is damaged, or cannot be as large as it
     claims.
     """
     where = str(readable_file(path))
     with quietly():
-        buffer: Any = oiio.ImageBuf(where, 0, level, config or oiio.ImageSpec())
+        buffer: Any = oiio.ImageBuf(where, part, level, config or oiio.ImageSpec())
         if buffer.has_error or level >= max(buffer.nmiplevels, 1):
             reason = reason_of(buffer)
             if level:
@@ -194,7 +194,7 @@ def _buffer_pixels(
             raise FabricError(where, "is a deep or volumetric picture; it must be flat")
         require_plausible(where, spec)
         pixels = None
-        if buffer.read(0, level, True, oiio.FLOAT):
+        if buffer.read(part, level, True, oiio.FLOAT):
             pixels = buffer.get_pixels(oiio.FLOAT)
         reason = reason_of(buffer)
     if pixels is None or pixels.size == 0:
@@ -217,14 +217,45 @@ def _shrunk(pixels: NDArray[np.float32], most: int) -> NDArray[np.float32]:
 def read_exr_layers(
     path: str | os.PathLike[str],
 ) -> tuple[dict[str, NDArray[np.float32]], dict[str, Any]]:
-    """(name -> layer (h, w, c), metadata) of an EXR that `write_exr` wrote."""
+    """(name -> layer (h, w, c), metadata of the first part) of an EXR, of all of its parts.
+
+    A layer is named by its channels, or by its part where they have no name of their own; the first
+    part's is the beauty. A part of another size than the first is left out, as is a layer that an
+    earlier part has already.
+    """
     pixels, buffer = _buffer_pixels(path)
+    first = buffer.spec()
+    metadata = {a.name: a.value for a in first.extra_attribs}
+    found = _layers(pixels, first, "beauty")
+    for part in range(1, buffer.nsubimages):
+        pixels, buffer = _buffer_pixels(path, part=part)
+        if pixels.shape[:2] == (first.height, first.width):
+            own = _part_name(buffer.spec(), part)
+            found = _layers(pixels, buffer.spec(), own) | found
+    return found, metadata
+
+
+def _layers(pixels: NDArray[np.float32], spec: Any, own: str) -> dict[str, NDArray[np.float32]]:
+    """Name -> layer (h, w, c); own : name of the channels that name no layer."""
     planes: dict[str, list[NDArray[np.float32]]] = {}
-    for k, name in enumerate(buffer.spec().channelnames):
+    for k, name in enumerate(spec.channelnames):
         layer, _, _ = name.rpartition(".")
-        planes.setdefault(layer or "beauty", []).append(pixels[..., k])
-    metadata = {a.name: a.value for a in buffer.spec().extra_attribs}
-    return {layer: np.stack(p, axis=-1) for layer, p in planes.items()}, metadata
+        planes.setdefault(layer or own, []).append(pixels[..., k])
+    return {layer: np.stack(p, axis=-1) for layer, p in planes.items()}
+
+
+def _part_name(spec: Any, part: int) -> str:
+    return str(spec.getattribute("oiio:subimagename") or f"part {part}")
+
+
+@reads("a picture")
+def parts_of(path: str | os.PathLike[str]) -> tuple[str, ...]:
+    """Names of the parts of a picture file. Most have one; `read_image` reads the first."""
+    where = str(readable_file(path))
+    with quietly():
+        buffer: Any = oiio.ImageBuf(where)
+        count = max(buffer.nsubimages, 1)
+        return tuple(_part_name(oiio.ImageBuf(where, k, 0).spec(), k) for k in range(count))
 
 
 def write_mip_exr(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +20,14 @@ from fabricusd.materials.networks.hair import hair
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import (
     GRAPHS,
+    LIT_THROUGH,
     MAPS,
     NO_TINT,
+    NO_TRANSMISSION,
     Inputs,
     parameter_values,
     preview,
+    transmits,
 )
 from fabricusd.materials.targets import Wanted
 from fabricusd.materials.targets.layer import MaterialRecipe, Recipes
@@ -46,6 +49,7 @@ NEUTRAL = {
     "normal": Value("vector3", (0.5, 0.5, 1.0)),
     "tangent": Value("vector3", (1.0, 0.0, 0.0)),
     "specular_tint": NO_TINT,
+    "transmission_color": NO_TRANSMISSION,
 }
 """Constants that replace missing maps."""
 
@@ -96,9 +100,14 @@ def recipes(
             cover = means["opacity"].value
             assert isinstance(cover, float)
             opaque = cover > OPAQUE
+            dark = {} if transmits(means) else {"transmission_color": NO_TRANSMISSION}
+            if not dark:
+                _note_no_light_through(lay.name, settings, made)
+                found_looks[number] = {k: lit_through(one) for k, one in looks.items()}
+                looks = found_looks[number]
             for variant, plain, inputs in (
-                ("baked", textures, of_threads),
-                ("procedural", means, of_means),
+                ("baked", textures, {**of_threads, **dark}),
+                ("procedural", means, {**of_means, **dark}),
             ):
                 title = name if variant == "baked" else f"{name}_plain"
                 graphs = {
@@ -112,6 +121,20 @@ def recipes(
                     tail = "" if len(graphs) == 1 else f"_{surface}"
                     documents.append((title + tail, graph, parameter_values(looks[surface])))
     return found, documents
+
+
+def lit_through(look: Look) -> Look:
+    """A look of cloth that light comes through; without a fit the map stays as it is."""
+    return replace(look, transmission_scale=look.transmission_scale or (1.0, 1.0, 1.0))
+
+
+def _note_no_light_through(fabric: str, settings: Settings, made: Written) -> None:
+    for surface in settings.surfaces:
+        if surface in GRAPHS and surface not in LIT_THROUGH:
+            made.notes.append(
+                f"surface '{surface}' cannot carry the light that comes through fabric '{fabric}'; "
+                f"it is left out there: use {' or '.join(LIT_THROUGH)}"
+            )
 
 
 def material_recipe(

@@ -18,11 +18,11 @@ from fabricusd.bake.texels.recipe import recipe
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.materials.fit.fit import fit
 from fabricusd.materials.fit.target import TexelSample
-from fabricusd.materials.fit.texels import NEEDED
+from fabricusd.materials.fit.texels import NEEDED, OPTIONAL
 from fabricusd.materials.networks.graph import Value
 from fabricusd.materials.networks.look import Look
-from fabricusd.materials.networks.surfaces import GRAPHS, MAPS
-from fabricusd.materials.recipes import NEUTRAL, OPAQUE, material_recipe
+from fabricusd.materials.networks.surfaces import GRAPHS, MAPS, transmits
+from fabricusd.materials.recipes import NEUTRAL, OPAQUE, lit_through, material_recipe
 from fabricusd.materials.targets.write_usd import write_material
 from fabricusd.schema import write_binding
 
@@ -49,9 +49,10 @@ def write_fabric_material(
     assert isinstance(cover, float)
     graphs = {name: GRAPHS[name](values, cover > OPAQUE) for name in surfaces}
     kinds = ("preview", "principled", *surfaces)
-    made = material_recipe(
-        Sdf.Path(path).name, graphs, values, looks or dict.fromkeys(kinds, Look()), cover > OPAQUE
-    )
+    known = looks or dict.fromkeys(kinds, Look())
+    if transmits(values):
+        known = {kind: lit_through(look) for kind, look in known.items()}
+    made = material_recipe(Sdf.Path(path).name, graphs, values, known, cover > OPAQUE)
     material = write_material(
         stage, Sdf.Path(path), list(made.graphs), dict(made.parameters), Path()
     )
@@ -62,19 +63,27 @@ def write_fabric_material(
 def fitted_looks(fabric: Fabric, surfaces: Sequence[str] = ("openpbr",)) -> Looks:
     """The look of each surface with which the fabric's mean is nearest to the fabric, in about a
     second each."""
+    sample = mean_sample(fabric)
+    return {kind: fit(kind, sample, fabric).look for kind in ("preview", "principled", *surfaces)}
+
+
+def mean_sample(fabric: Fabric) -> TexelSample:
+    """The one texel that spans a repeat of the fabric."""
     lay = lay_of(Binding(fabric=fabric, threads_per_uv=(1.0, 1.0)), metres_per_uv=1.0)
-    texel = {name: np.atleast_2d(row) for name, row in _texel(fabric, lay, NEEDED).items()}
+    texel = {
+        name: np.atleast_2d(row) for name, row in _texel(fabric, lay, (*NEEDED, *OPTIONAL)).items()
+    }
     smooth = texel["tangent"]
-    sample = TexelSample(
+    return TexelSample(
         base=texel["base_color"],
         smooth=texel["roughness_along"][:, 0],
         rough=texel["roughness_across"][:, 0],
         opacity=texel["opacity"][:, 0],
         normal=texel["normal"],
         tangent=np.stack((-smooth[:, 1], smooth[:, 0], smooth[:, 2]), axis=1),
+        through=texel["transmission_color"],
         weight=np.ones(1),
     )
-    return {kind: fit(kind, sample, fabric).look for kind in ("preview", "principled", *surfaces)}
 
 
 def mean_values(fabric: Fabric, lay: Lay) -> dict[str, Value]:

@@ -57,6 +57,7 @@ from fabricusd.reference.surfaces.preview import (
     build_surfaces,
     shade_preview,
 )
+from fabricusd.reference.surfaces.thin import is_thin, shade_thin, shade_thin_mapped
 from fabricusd.scene.scene import FabricSurface, Material, Scene
 
 LEVELS = {
@@ -70,8 +71,16 @@ ESTIMATORS = {
 }
 AIMED = 16
 """Number of rays along each side of the picture that find the places to be lit."""
+_PLAIN = {
+    (False, False): shade_preview, (False, True): shade_mapped,
+    (True, False): shade_thin, (True, True): shade_thin_mapped,
+}  # fmt: skip
+"""The shader of a plain surface: (lets scattered light through, has a normal map)."""
 MOST_LAYERS = 32
 """Number of see-through surfaces that a ray may pass before it counts as blocked."""
+MOST_TRANSLUCENT = 64
+"""Bounces at translucent cloth that a path may have by default. Russian roulette ends nearly all
+paths before: light that cloth of albedo .9 scattered 64 times is a thousandth of what it was."""
 
 
 def _shaders(scene: Scene, shadow: str) -> list[FabricShader | None]:
@@ -90,11 +99,14 @@ def _shader(surface: Material, shadow: str) -> FabricShader | None:
 class Tracer:
     """A scene prepared for path tracing.
 
+    max_bounces : most bounces of a path at all surfaces but translucent cloth
+    max_translucent : most bounces of a path at translucent cloth; None for MOST_TRANSLUCENT, or for
+        0 if `max_bounces` is 0
     limits : where level "auto" changes from one level to the next
     estimator : "mis", or for tests "light", "surface" or "uniform"; all have the same mean
     sampler : "sobol", or for tests "random"
 
-    Raises `FabricError` for an unknown level and for a negative `max_bounces`.
+    Raises `FabricError` for an unknown level and for a negative bound on bounces.
     """
 
     def __init__(
@@ -102,6 +114,7 @@ class Tracer:
         scene: Scene,
         *,
         max_bounces: int = 4,
+        max_translucent: int | None = None,
         level: str = "auto",
         shadow: str = "horizon",
         limits: Limits = DEFAULT,
@@ -111,8 +124,11 @@ class Tracer:
     ) -> None:
         if level not in LEVELS:
             raise FabricError("level", f"is '{level}'; it must be one of {', '.join(LEVELS)}")
-        if max_bounces < 0:
-            raise FabricError("max bounces", f"is {max_bounces}; it must be at least 0")
+        if max_translucent is None:
+            max_translucent = MOST_TRANSLUCENT if max_bounces else 0
+        for noun, bound in (("bounces", max_bounces), ("translucent", max_translucent)):
+            if bound < 0:
+                raise FabricError(f"max {noun}", f"is {bound}; it must be at least 0")
         # Load the kernels and build the cloths' laws on a worker thread while the triangles are
         # built. Build the triangles on the main thread: temporary memory that is freed on a worker
         # thread's heap is not returned to the system.
@@ -130,8 +146,15 @@ class Tracer:
         shining = self.surfaces.table[:, [EMISSIVE, EMISSIVE + 1, EMISSIVE + 2]].any(axis=1)
         self.shines = bool((shining | (self.surfaces.table[:, EMISSIVE_MAP] >= 0)).any())
         self.mapped = self.surfaces.table[:, NORMAL_MAP] >= 0
-        self.max_bounces = max_bounces
-        self.settings = Settings(ESTIMATORS[estimator], LEVELS[level], max_bounces)
+        self.thin = is_thin(self.surfaces.table)
+        self.translucent = np.array(
+            [thin if s is None else s.translucent
+             for s, thin in zip(self.shaders, self.thin, strict=True)], np.uint8
+        )  # fmt: skip
+        through = max_translucent if self.translucent.any() else 0
+        self.max_bounces, self.max_translucent = max_bounces, max_translucent
+        self.steps = max_bounces + through + 2 + MOST_LAYERS
+        self.settings = Settings(ESTIMATORS[estimator], LEVELS[level], max_bounces, through)
         self.numbers = new_numbers(seed, independent=sampler == "random")
         self.epsilon = np.float32(1e-7 * self.tables.radius + 1e-12)
         self._limits = np.zeros((len(self.shaders), 4), np.float32)
@@ -175,11 +198,13 @@ class Tracer:
         first: int,
         samples: int,
         counters: NDArray[np.int64],
+        lost: NDArray[np.float64],
     ) -> None:
         """Trace `samples` paths of each pixel to their end and write the results to `wave.film`.
 
         first : number of the first sample
         counters : (3,) int64 - numbers of rays, shadow rays and non-finite values, added to
+        lost : (1,) float64 - throughput of the paths that were cut off, added to
         """
         count = len(pixels) * samples
         aovs = len(wave.film) > BEAUTY_ROWS
@@ -192,15 +217,15 @@ class Tracer:
         rows[LANE_BETA : LANE_BETA + 3, :count] = 1.0
         rows[LANE_PDF, :count] = -1.0
         tags[0, :count] = np.arange(count)
-        tags[1, :count] = 0
+        tags[1:, :count] = 0
         counts = np.zeros(QUEUES * len(self.shaders), np.int64)
         result = np.zeros(3, np.int64)
-        for step in range(self.max_bounces + 2 + MOST_LAYERS):
+        for step in range(self.steps):
             self.accelerator.intersect(wave.lanes.rays, (count + 15) // 16, coherent=step == 0)
             counters[0] += count
             arrive(
                 step, self.settings, count, wave.lanes, wave.paths, self.numbers, self.lights,
-                self.triangles, self._limits, wave.film, wave.queues, counts,
+                self.triangles, self._limits, wave.film, wave.queues, counts, lost,
             )  # fmt: skip
             ends = np.cumsum(counts)
             hits = int(ends[-1])
@@ -219,8 +244,8 @@ class Tracer:
             if aovs and step <= MOST_LAYERS:
                 record_first(hits, lens.eye, lens.axis, wave.hits, self.tables.uv, wave.film)
             depart(
-                step, self.settings, hits, wave.hits, wave.film, wave.shadows, wave.next_lanes,
-                result,
+                step, self.settings, hits, self.translucent, wave.hits, wave.film, wave.shadows,
+                wave.next_lanes, result,
             )  # fmt: skip
             counters[1] += result[0]
             counters[2] += result[2]
@@ -229,12 +254,14 @@ class Tracer:
             count = int(result[1])
             if count == 0:
                 break
+        else:
+            lost[0] += wave.lanes.rows[LANE_BETA : LANE_BETA + 3, :count].mean(axis=0).sum()
 
     def _shade(self, wave: Wave, queue: int, start: int, end: int) -> None:
         """Shade the hits from `start` to before `end`, all of one queue, by their material."""
         shader = self.shaders[queue // QUEUES]
         if shader is None:
-            shade = shade_mapped if self.mapped[queue // QUEUES] else shade_preview
+            shade = _PLAIN[bool(self.thin[queue // QUEUES]), bool(self.mapped[queue // QUEUES])]
             shade(self.surfaces, wave.hits.rows, wave.hits.tags, start, end)
         else:
             shader(queue // 2 % 3, queue % 2, wave, start, end)

@@ -42,5 +42,5 @@ def _meets(tracer: Tracer, lens: Lens, width: int, height: int) -> bool:
     steps = np.arange(min(count, LOOKED)) * 0.6180339887498949 % 1.0
     pixels = (steps * count).astype(np.int32)
     wave = Wave(len(pixels), aovs=False)
-    tracer.trace(wave, lens, width, pixels, 0, 1, np.zeros(3, np.int64))
+    tracer.trace(wave, lens, width, pixels, 0, 1, np.zeros(3, np.int64), np.zeros(1))
     return bool((wave.film[ALPHA, : len(pixels)] > 0).any())

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import os
-import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-import fabricusd
 from fabricusd.appearance.shadow.methods import METHODS
 from fabricusd.appearance.weave.footprint import DEFAULT, Limits
 from fabricusd.errors import FabricError
@@ -25,10 +22,10 @@ from fabricusd.ranges import RANGES, require_picture, require_ranges
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import AOVS, Film, require_aovs
 from fabricusd.reference.integrator import Tracer
-from fabricusd.reference.nothing_seen import reason_for_nothing
-from fabricusd.reference.rays.camera import Lens, build_lens, default_camera
+from fabricusd.reference.rays.camera import build_lens, default_camera
 from fabricusd.reference.rays.wave import ALPHA, Wave
 from fabricusd.reference.start.compile_ahead import EVERY_PICTURE, compile_ahead
+from fabricusd.reference.told import asked_for, note_losses, versions
 from fabricusd.reference.view_transform import view
 from fabricusd.run.workers import Batches, pixels_along_z_curve, worker_count
 from fabricusd.scene.read import read_scene
@@ -57,7 +54,7 @@ class RenderResult:
     """A rendered picture with its statistics.
 
     For several frames, the result holds the sums of the counts and times, all notes, the mean
-    number of samples and the worst noise, but only the last frame's layers.
+    number of samples and the worst noise and cut, but only the last frame's layers.
 
     layers : AOV name -> (h, w, c) float32
     paths : the files written; notes : what was left out or assumed, one line each
@@ -65,6 +62,9 @@ class RenderResult:
         the scene; processor_seconds : processor time of this process, all workers together, over
         the same span
     not_finite : number of values that were left out because they were not finite
+    cut : share of the light that bounds on bounces cut off: what the paths that they ended still
+        carried, relative to what the paths that met a surface began with. It is what surfaces
+        would gain in an even white surrounding, and at most that in a darker one
     noise : estimated relative error that 99 % of the pixels' means stay below
     complete : False after Ctrl-C
     met : whether in every picture some camera ray hit a surface
@@ -77,6 +77,7 @@ class RenderResult:
     seconds: float = 0.0
     processor_seconds: float = 0.0
     not_finite: int = 0
+    cut: float = 0.0
     samples: float = 0.0
     noise: float = 0.0
     complete: bool = True
@@ -95,6 +96,7 @@ def render(
     spp: int | None = None,
     noise: float | None = None,
     max_bounces: int = 4,
+    max_translucent: int | None = None,
     level: str = "auto",
     shadow: str = "horizon",
     limits: Limits = DEFAULT,
@@ -117,6 +119,9 @@ def render(
     spp : samples per pixel; with `noise`, the most that a pixel gets. 64 if neither is given
     limits : where level "auto" changes from one level to the next
     noise : stop sampling a pixel when its relative error is below this
+    max_bounces : most bounces of a path at all surfaces but translucent cloth
+    max_translucent : most bounces of a path at translucent cloth; None for 64, or for none with
+        `max_bounces` 0
     frames : time codes; None for the stage's default time
     exposure : of the PNG, in stops, added to the camera's own
     complexity : how finely subdivision surfaces are refined: "low" (their cages), "medium", "high"
@@ -126,7 +131,7 @@ def render(
     Raises `FabricError` if the scene cannot be rendered at all. Whatever had to be left out is in
     the result's `notes`. On Ctrl-C, the samples taken so far are written, and `complete` is False.
     """
-    _require_settings(width, height, spp, noise, max_bounces, seed, workers)
+    _require_settings(width, height, spp, noise, max_bounces, max_translucent, seed, workers)
     require_ranges(exposure=exposure)
     if shadow not in METHODS:
         raise FabricError("shadow", f"is '{shadow}'; it must be one of {', '.join(METHODS)}")
@@ -147,12 +152,13 @@ def render(
             )  # fmt: skip
             result = render_scene(
                 loaded, width=width, height=height, spp=spp, noise=noise, max_bounces=max_bounces,
-                level=level, shadow=shadow, limits=limits, aovs=layers, seed=seed, workers=workers,
-                pixel_filter=pixel_filter, estimator=estimator, stop=stop,
+                max_translucent=max_translucent, level=level, shadow=shadow, limits=limits,
+                aovs=layers, seed=seed, workers=workers, pixel_filter=pixel_filter,
+                estimator=estimator, stop=stop,
                 progress=progress and _of_frame(progress, number, len(targets), begun),
             )  # fmt: skip
             stops = exposure + (loaded.camera.exposure if loaded.camera else 0.0)
-            result.metadata.update(_asked_for(scene, time_code, stops))
+            result.metadata.update(asked_for(scene, time_code, stops))
             if target is not None:
                 paths += _write(target, result, stops)
             # Keep only the last frame's layers: those of all frames would fill the memory.
@@ -184,6 +190,7 @@ def _together(
         seconds=sum(r.seconds for r in results),
         processor_seconds=sum(r.processor_seconds for r in results),
         not_finite=sum(r.not_finite for r in results),
+        cut=max(r.cut for r in results),
         samples=float(np.mean([r.samples for r in results])),
         noise=max(r.noise for r in results),
         complete=complete and results[-1].complete,
@@ -197,12 +204,15 @@ def _require_settings(
     spp: int | None,
     noise: float | None,
     max_bounces: int,
+    max_translucent: int | None,
     seed: int,
     workers: int | None,
 ) -> None:
     require_picture(width, height)
     require_ranges(max_bounces=max_bounces, seed=seed)
-    optional = {"spp": spp, "noise": noise, "workers": workers}
+    optional = {
+        "spp": spp, "noise": noise, "workers": workers, "max_translucent": max_translucent,
+    }  # fmt: skip
     require_ranges(**{name: value for name, value in optional.items() if value is not None})
 
 
@@ -239,16 +249,6 @@ def written_files(target: Path) -> list[Path]:
     return list(dict.fromkeys([target, target.with_suffix(".png")]))
 
 
-def _asked_for(source: Any, time_code: float | None, stops: float) -> dict[str, Any]:
-    """The metadata that tell a picture's source and how its PNG was made."""
-    known: dict[str, Any] = {"fabricusd:exposure": stops}
-    if not isinstance(source, Scene):
-        known["fabricusd:scene"] = os.fspath(source)
-    if time_code is not None:
-        known["fabricusd:timeCode"] = float(time_code)
-    return known
-
-
 def _write(target: Path, result: RenderResult, exposure: float) -> tuple[str, ...]:
     """Write the picture's files and return their names."""
     picture = view(result.layers["beauty"][..., :3], exposure)
@@ -267,6 +267,7 @@ def render_scene(
     spp: int | None = None,
     noise: float | None = None,
     max_bounces: int = 4,
+    max_translucent: int | None = None,
     level: str = "auto",
     shadow: str = "horizon",
     limits: Limits = DEFAULT,
@@ -284,13 +285,13 @@ def render_scene(
     stop : the handler that asks rendering to stop; it is installed when sampling starts, and the
         caller must release it
     """
-    _require_settings(width, height, spp, noise, max_bounces, seed, workers)
+    _require_settings(width, height, spp, noise, max_bounces, max_translucent, seed, workers)
     begun = time.perf_counter()
     most = spp or (MOST_SAMPLES if noise else 64)
     camera = _furnished(scene, width, height)
     tracer = Tracer(
-        scene, max_bounces=max_bounces, level=level, shadow=shadow, limits=limits, seed=seed,
-        estimator=estimator, sampler=sampler,
+        scene, max_bounces=max_bounces, max_translucent=max_translucent, level=level,
+        shadow=shadow, limits=limits, seed=seed, estimator=estimator, sampler=sampler,
     )  # fmt: skip
     if not len(tracer.tables.triangles):
         scene.note("the scene", "has no triangles to render; only its lights are seen")
@@ -298,25 +299,29 @@ def render_scene(
     tracer.aim(lens, width, height)
     film = Film(width, height, aovs)
     count = worker_count(workers)
-    counters = np.zeros((count, 3), np.int64)
+    counters, lost = np.zeros((count, 3), np.int64), np.zeros((count, 1))
     built, busy = time.perf_counter(), time.process_time()
     stop = stop or Stop()
     stop.hold()
-    complete = _sample(tracer, lens, film, count, counters, most, noise, progress, built, stop)
+    counts = counters, lost
+    complete = _sample(tracer, lens, film, count, counts, most, noise, progress, built, stop)
     seconds, busy = time.perf_counter() - built, time.process_time() - busy
     rays, shadow_rays, not_finite = (int(x) for x in counters.sum(axis=0))
-    met = bool(film.sums[ALPHA].any()) or not complete
-    _note_losses(scene, tracer, lens, not_finite, met, (width, height))
+    begun_at = float(film.sums[ALPHA].sum(dtype=np.float64))
+    met, cut = begun_at > 0 or not complete, float(lost.sum()) / max(begun_at, 1.0)
+    note_losses(scene, tracer, lens, not_finite, cut, met, (width, height))
+    max_translucent = tracer.max_translucent
     embree, triangles = tracer.accelerator.version, len(tracer.tables.triangles)
     # Free the triangles and their acceleration structure before the layers are made.
     del tracer
     error = film.relative_error()
     metadata = {
-        **_versions(), "fabricusd:embree": embree,
+        **versions(), "fabricusd:embree": embree,
         "fabricusd:estimator": estimator, "fabricusd:sampler": sampler,
         "fabricusd:limits": str(limits),
         "fabricusd:samples": most, "fabricusd:noise": noise or 0.0,
-        "fabricusd:maxBounces": max_bounces, "fabricusd:level": level, "fabricusd:shadow": shadow,
+        "fabricusd:maxBounces": max_bounces, "fabricusd:maxTranslucent": max_translucent,
+        "fabricusd:cut": cut, "fabricusd:level": level, "fabricusd:shadow": shadow,
         "fabricusd:seed": seed, "fabricusd:workers": count, "fabricusd:pixelFilter": pixel_filter,
         "fabricusd:camera": camera.path, "fabricusd:triangles": triangles,
         "fabricusd:rays": str(rays + shadow_rays), "fabricusd:seconds": round(seconds, 3),
@@ -331,22 +336,13 @@ def render_scene(
         seconds=seconds,
         processor_seconds=busy,
         not_finite=not_finite,
+        cut=cut,
         samples=float(film.samples.mean()),
         noise=_typical_worst(error),
         complete=complete,
         met=met,
         metadata=metadata,
     )
-
-
-def _note_losses(
-    scene: Scene, tracer: Tracer, lens: Lens, not_finite: int, met: bool, size: tuple[int, int]
-) -> None:
-    """Note values that were not finite, and why a picture shows nothing."""
-    if not_finite:
-        scene.note("the picture", f"lost {not_finite} values that were not finite")
-    if not met and len(tracer.tables.triangles):
-        scene.note("the picture", reason_for_nothing(tracer, lens, *size))
 
 
 def _furnished(scene: Scene, width: int, height: int) -> Camera:
@@ -357,16 +353,6 @@ def _furnished(scene: Scene, width: int, height: int) -> Camera:
     if scene.camera is None:
         scene.note("the scene", "has no camera; one that sees all of it from the front is used")
     return scene.camera or default_camera(scene, width, height)
-
-
-def _versions() -> dict[str, Any]:
-    """The metadata that name the programs and versions that made a picture."""
-    return {
-        "Software": f"fabricusd {fabricusd.__version__}",
-        "fabricusd:python": platform.python_version(),
-        "fabricusd:numpy": np.__version__,
-        "fabricusd:numba": numba.__version__,
-    }
 
 
 def _typical_worst(error: NDArray[np.float32]) -> float:
@@ -380,7 +366,7 @@ def _sample(
     lens: Any,
     film: Film,
     workers: int,
-    counters: NDArray[np.int64],
+    counts: tuple[NDArray[np.int64], NDArray[np.float64]],
     most: int,
     noise: float | None,
     progress: Progress | None,
@@ -388,6 +374,8 @@ def _sample(
     stop: Stop,
 ) -> bool:
     """Run passes over the picture until every pixel has `most` samples or is below the noise bound.
+
+    counts : for each worker, the last two arguments of `Tracer.trace`
 
     Returns False if sampling was interrupted.
     """
@@ -412,7 +400,8 @@ def _sample(
         ) -> None:  # fmt: skip
             pixels = active[batch * per_batch : (batch + 1) * per_batch]
             wave = waves[worker]
-            tracer.trace(wave, lens, film.width, pixels, done, samples, counters[worker])
+            mine = counts[0][worker], counts[1][worker]
+            tracer.trace(wave, lens, film.width, pixels, done, samples, *mine)
             film.add(pixels, samples, wave.film)
 
         def report(

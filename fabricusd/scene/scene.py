@@ -36,9 +36,12 @@ class PreviewSurface:
 
     diffuse, emissive : (3,) float - linear Rec. 709
     ior : index of refraction; 1 removes the specular layer
-    textures : for diffuse, emissive, metallic, roughness, opacity and normal. A texture replaces
-        its constant instead of multiplying it. The texels of `normal` are normals of any length in
-        tangent space, see `normal_map`; a texel of length 0 stands for the surface's own normal.
+    transmission : linear Rec. 709 - share of the light that leaves on the other side, scattered
+        evenly; the surface is then a thin sheet
+    textures : for diffuse, emissive, metallic, roughness, opacity, normal and transmission. A
+        texture replaces its constant instead of multiplying it. The texels of `normal` are normals
+        of any length in tangent space, see `normal_map`; a texel of length 0 stands for the
+        surface's own normal.
     """
 
     name: str = ""
@@ -49,6 +52,7 @@ class PreviewSurface:
     ior: float = 1.5
     opacity: float = 1.0
     opacity_threshold: float = 0.0
+    transmission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     textures: dict[str, Texture] = field(default_factory=dict)
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from contextlib import ExitStack
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from fabricusd.bake.bake import bake, plan
 from fabricusd.bake.job import Settings
 from fabricusd.bake.ranges import check_settings
 from fabricusd.bake.texels.light import unit_light
+from fabricusd.bake.work.lock import locked
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
 from tests.bake.meshes import write_quad
@@ -61,6 +64,42 @@ def test_a_dry_run_refuses_overlaps_and_folders_that_cannot_be(tmp_path):
     for out, words in ((square, "is a file"), (square / "below", "cannot be created")):
         with pytest.raises(FabricError, match=words):
             plan(square, settings, fabric="linen_plain", out=out)
+
+
+def too_fine(monkeypatch, held, out):
+    monkeypatch.setattr("fabricusd.bake.btf.matrix.LARGEST", 100)
+    return {"btf": ("ubo",)}, "has a repeat of"
+
+
+def without_space(monkeypatch, held, out):
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=1000))
+    return {}, "of working space"
+
+
+def in_use(monkeypatch, held, out):
+    out.mkdir()
+    held.enter_context(locked(out))
+    return {}, "is being written by process"
+
+
+@pytest.mark.parametrize("prevent", [too_fine, without_space, in_use])
+def test_a_dry_run_refuses_what_a_bake_refuses(tmp_path, monkeypatch, prevent):
+    square, out = write_quad(tmp_path / "square.obj"), tmp_path / "out"
+    with ExitStack() as held:
+        change, words = prevent(monkeypatch, held, out)
+        settings = Settings(resolution=64, maps=("opacity",), **change)
+        for refused in (plan, bake):
+            with pytest.raises(FabricError, match=words):
+                refused(square, settings=settings, fabric="linen_plain", out=out)
+    assert not list(tmp_path.glob("out/*.exr"))
+
+
+def test_a_dry_run_needs_no_folder(tmp_path, capsys):
+    square = write_quad(tmp_path / "square.obj")
+    assert main(["bake", str(square), "--fabric", "linen_plain", "-n"]) == 0
+    assert "texels per thread" in capsys.readouterr().out
+    assert main(["bake", str(square), "--fabric", "linen_plain"]) == 2
+    assert "needs a SCENE and -o DIR" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -76,3 +76,38 @@ def test_pictures_of_one_seed_are_noted(tmp_path, reference, capsys):
     assert "both pictures have the seed 0" in capsys.readouterr().err
     assert main(["compare", reference, reference, "-q"]) == 0
     assert capsys.readouterr().err == ""
+
+
+def split(source, path):
+    """The layers of an EXR as parts of one, as other renderers write them."""
+    import OpenImageIO as oiio
+
+    from fabricusd.images.files import read_exr_layers
+
+    layers, _ = read_exr_layers(source)
+    specs, planes = [], []
+    for name, layer in layers.items():
+        h, w, c = layer.shape
+        spec = oiio.ImageSpec(w, h, c, oiio.FLOAT)
+        spec.channelnames = tuple("RGBA"[:c])
+        spec.attribute("oiio:subimagename", "rgba" if name == "beauty" else name)
+        specs.append(spec)
+        planes.append(layer)
+    out = oiio.ImageOutput.create(str(path))
+    assert out.open(str(path), specs)
+    for k, plane in enumerate(planes):
+        if k:
+            assert out.open(str(path), specs[k], "AppendSubimage")
+        assert out.write_image(np.ascontiguousarray(plane, np.float32))
+    out.close()
+    return str(path)
+
+
+def test_layers_in_parts_of_their_own_are_read_and_the_compared_part_is_named(tmp_path, capsys):
+    first = split(written(tmp_path / "a.exr", seed=1), tmp_path / "parts_a.exr")
+    second = split(written(tmp_path / "b.exr", change=1.03), tmp_path / "parts_b.exr")
+    assert main(["compare", first, second, "--significance", "0.001"]) == 1
+    shown = capsys.readouterr()
+    assert "larger than the noise" in shown.out
+    for name in (first, second):
+        assert f"{name}: has 2 parts; the first, 'rgba', is compared" in shown.err

@@ -26,6 +26,7 @@ OPTIONS = {
     ("render", "--spp"): ("0", "-1", "65537", "1e3"),
     ("render", "--noise"): ("0", "-1", "10.5"),
     ("render", "--max-bounces"): ("-1", "1025", "1e30", "1" + "0" * 30),
+    ("render", "--max-translucent"): ("-1", "1025", "1.5"),
     ("render", "--max-error"): ("0", "-1", "1001"),
     ("render", "--exposure"): ("100000", "-101"),
     ("render", "--seed"): (str(2**63), "1.5"),
@@ -136,7 +137,8 @@ OTHERS = {("bake", option) for option in ("--resolution", "--texels-per-thread",
 
 BOUNDS = {
     "width": (1, 65536), "height": (1, 65536), "spp": (1, 65536), "noise": (1e-9, 10),
-    "max_bounces": (0, 1024), "exposure": (-100, 100), "seed": (-(2**63), 2**63 - 1),
+    "max_bounces": (0, 1024), "max_translucent": (0, 1024), "exposure": (-100, 100),
+    "seed": (-(2**63), 2**63 - 1),
     "workers": (1, 1024), "max_error": (1e-9, 1000), "thickness": (0, 1000),
 }  # fmt: skip
 
@@ -167,6 +169,7 @@ IN_PYTHON = {
     "spp": (0, float("nan"), 16.0),
     "noise": (0, float("nan"), "x"),
     "max_bounces": (-1, 1e30, 10**30, None),
+    "max_translucent": (-1, 1e30, 10**30, True),
     "seed": (2**63, 0.5),
     "workers": (0, 100000, float("inf")),
 }

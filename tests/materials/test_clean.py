@@ -37,6 +37,11 @@ def written(tmp_path_factory) -> Path:
     make_samples.make_cylinders(folder / "samples")
     make_samples.make_drape(folder / "samples", cells=8, factor=1, steps=2)
     make_samples.make_skirt(folder / "samples", around=24, down=8, steps=2)
+    import lit_from_behind
+
+    lit_from_behind.make_lit_drape(folder / "samples", cells=8, factor=1, steps=2)
+    lit_from_behind.make_lit_skirt(folder / "samples", around=24, down=8, steps=2)
+    lit_from_behind.make_curtain(folder / "samples", across=24, up=4)
     assert main(["demo", "-o", str(folder / "demo"), "--quiet"]) == 0
     bake_shirt(folder)
     bake(

@@ -143,10 +143,9 @@ def test_construction_and_fibre_are_the_formats_words(preset, kind, fibre):
     assert physics(fabric)["composition"]["parts"][0]["type"] == fibre
 
 
-def test_the_command_writes_them_all(packed, tmp_path, capsys, monkeypatch):
+def test_the_command_writes_them_all_and_makes_their_folder(packed, tmp_path, capsys, monkeypatch):
     small = partial(write_u3m, resolution=64)
     monkeypatch.setattr("fabricusd.materials.targets.u3m.write_u3m", small)
-    (tmp_path / "cad").mkdir()
     words = ["material", str(packed[1].with_name("baked")), "-o", str(tmp_path / "look.usda")]
     assert main([*words, "--no-fit", "--u3m", str(tmp_path / "cad")]) == 0
     printed = capsys.readouterr().out.split()

@@ -14,7 +14,8 @@ from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.bake.layout.garment import garments
 from fabricusd.bake.texels.maps import REGISTRY, Texels
 from fabricusd.bake.texels.recipe import recipe
-from fabricusd.materials.fit.fit import fit, fit_threads, forward, with_threads
+from fabricusd.materials.fit.fit import fit, fit_threads, with_threads
+from fabricusd.materials.fit.forward import forward
 from fabricusd.materials.fit.judge import LIGHTS, SKY, VIEWS, Judge, direction_pairs, hemisphere
 from fabricusd.materials.fit.models import KINDS, Surface, evaluate
 from fabricusd.materials.fit.target import TexelSample, target_of

@@ -12,14 +12,20 @@ from fabricusd.materials.bake_folder import BakedLay
 from fabricusd.materials.networks.graph import Link, Parameter, Texture, Value
 from fabricusd.materials.networks.hair import absorption, hair
 from fabricusd.materials.networks.look import Look
-from fabricusd.materials.networks.surfaces import GRAPHS, MAPS, parameter_values, preview
+from fabricusd.materials.networks.surfaces import (
+    GRAPHS,
+    LIT_THROUGH,
+    MAPS,
+    parameter_values,
+    preview,
+)
 from fabricusd.materials.targets.mtlx import write_mtlx
 from fabricusd.materials.targets.write_usd import write_material
 from fabricusd.schema import load
 
 LOOK = Look(
     smooth_scale=0.8, rough_scale=0.9, base_color_scale=(1.5, 1.0, 0.5), fuzz_weight=0.25,
-    specular_tint=(0.8, 0.6, 0.4),
+    specular_tint=(0.8, 0.6, 0.4), transmission_scale=(0.5, 0.5, 1.0),
 )  # fmt: skip
 CONSTANTS = {
     "base_color": Value("color3", (0.5, 0.4, 0.3)),
@@ -29,6 +35,7 @@ CONSTANTS = {
     "normal": Value("vector3", (0.5, 0.5, 1.0)),
     "tangent": Value("vector3", (0.6, 0.8, 0.0)),
     "specular_tint": Value("color3", (0.5, 1.0, 1.0)),
+    "transmission_color": Value("color3", (0.2, 0.4, 0.15)),
 }
 ALPHA_SMOOTH, ALPHA_ROUGH = (0.4 * 0.8) ** 2, (0.9 * 0.9) ** 2
 
@@ -95,8 +102,25 @@ def test_the_tangent_is_the_rougher_axis_and_the_colour_is_scaled(kind):
     given = surface_inputs(kind)
     tangent = given.get("geometry_tangent", given.get("tangent"))
     assert np.allclose(tangent, (-0.8, 0.6, 0.0))
-    assert np.allclose(given["base_color"], (0.75, 0.4, 0.15))
+    weight = given.get("subsurface_weight", given.get("subsurface", 0.0))
+    assert np.allclose((1.0 - weight) * given["base_color"], (0.75, 0.4, 0.15))
     assert np.allclose(given["specular_color"], (0.4, 0.6, 0.4))
+
+
+@pytest.mark.parametrize("kind", LIT_THROUGH)
+def test_a_thin_sheet_transmits_the_map_times_its_scale(kind):
+    given = surface_inputs(kind)
+    weight = given.get("subsurface_weight", given.get("subsurface"))
+    assert np.allclose(weight * given["subsurface_color"], (0.1, 0.2, 0.15))
+    # MaterialX up to 1.39.5 squares the colour, which leaves a channel of 1 alone.
+    assert np.max(given["subsurface_color"]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("kind", GRAPHS)
+def test_a_surface_without_transmission_has_no_thin_sheet(kind):
+    plain = {name: value for name, value in CONSTANTS.items() if name != "transmission_color"}
+    graph = GRAPHS[kind](plain, False)
+    assert not {"subsurface", "subsurface_weight"} & set(graph.node(graph.terminal).inputs)
 
 
 @pytest.mark.parametrize("kind", GRAPHS)

@@ -1,7 +1,8 @@
 """Compute the table that all three forms compress: positions in the repeat by pairs of directions.
 
 An entry is the apparent BRDF of appearance level `weave`: radiance over irradiance [1/sr], without
-the cosine of the light. At that level the radiance depends on a position only through its thread
+the cosine of the light. Light comes from above: what cloth lets through is not in the table. At
+that level the radiance depends on a position only through its thread
 and tangent angle. The table is therefore a product: values at nodes of (set, thread, angle), times
 the share of each node in a texel. All computations use the nodes, of which there are a few hundred
 however large the repeat is.
@@ -16,13 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.published.tables import surface_tables
-from fabricusd.appearance.surface import points_all
+from fabricusd.appearance.law import surface_law
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.lookup import lookup
-from fabricusd.appearance.weave.place import Places
-from fabricusd.bake.texels.reflectance import refuse_conserving
+from fabricusd.bake.texels.law_values import law_values
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, even
 
@@ -84,17 +83,10 @@ def btf_of(fabric: Fabric, *, per_thread: int = 16, directions: Floats | None = 
     """Compute the table of one repeat of `fabric` with `per_thread` texels along a thread's pitch.
 
     The table is to be repeated, so its threads are even.
-    Raises FabricError if the repeat has too many texels or the fabric's model cannot be baked.
+    Raises FabricError if the repeat has too many texels, see `table_size`.
     """
-    refuse_conserving(fabric)
     fabric = even(fabric)
-    ends, picks = true_repeat(fabric)
-    size = (picks * per_thread, ends * per_thread)
-    if size[0] * size[1] > LARGEST:
-        raise FabricError(
-            fabric.name,
-            f"has a repeat of {size[1]} x {size[0]} texels; it must have at most {LARGEST} texels",
-        )
+    size = table_size(fabric, per_thread)
     chosen = ring_directions() if directions is None else directions
     keys, texels = _texels(fabric, size, per_thread)
     return Btf(
@@ -105,6 +97,18 @@ def btf_of(fabric: Fabric, *, per_thread: int = 16, directions: Floats | None = 
         size=size,
         per_thread=per_thread,
     )
+
+
+def table_size(fabric: Fabric, per_thread: int) -> tuple[int, int]:
+    """(h, w) texels of a table. Raises FabricError if a repeat has more than LARGEST texels."""
+    ends, picks = true_repeat(fabric)
+    h, w = picks * per_thread, ends * per_thread
+    if h * w > LARGEST:
+        raise FabricError(
+            fabric.name,
+            f"has a repeat of {w} x {h} texels; it must have at most {LARGEST} texels for a BTF",
+        )
+    return h, w
 
 
 def _spacing(fabric: Fabric) -> float:
@@ -150,18 +154,14 @@ def _nodes(fabric: Fabric, keys: NDArray[np.int64], directions: Floats) -> NDArr
     """(d*d, 3, k) values at the nodes."""
     step, d = _spacing(fabric), len(directions)
     middle = math.ceil(0.5 * math.pi / step)
-    tables = surface_tables(fabric)
-    real: Any = np.float64
+    law = surface_law(fabric, precision=np.float64)
     view, light = np.divmod(np.arange(d * d), d)
     wi = np.ascontiguousarray(directions[light].T)
     wo = np.ascontiguousarray(directions[view].T)
     out = np.empty((d * d, 3, len(keys)), np.float32)
-    values, zero = np.empty_like(wi), np.zeros(d * d)
     for k, (which, thread, number) in enumerate(keys):
         angle = min(max((number - middle) * step, -0.5 * math.pi), 0.5 * math.pi)
-        sets, threads = np.full(d * d, which, np.uint8), np.full(d * d, thread, np.int32)
-        places = Places(sets, threads, np.full(d * d, angle), zero)
-        points_all(real, tables, False, places, wi, wo, values)
+        values = law_values(law, int(which), int(thread), np.full(d * d, angle), wi, wo)
         out[:, :, k] = (values / wi[2]).T
     return out
 

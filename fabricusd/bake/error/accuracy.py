@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.accuracy import spread_pairs
+from fabricusd.appearance.scattering.models import translucent
 from fabricusd.appearance.surface import evaluate
 from fabricusd.bake.error.relight import NEEDED, relight
 from fabricusd.bake.layout.raster import NOBODY, owners
@@ -51,12 +52,14 @@ class SwatchError:
     texel : mean over texels and pairs, against the mean of level `weave` over each texel
     worst_pair : `texel` for the pair of directions with the largest error
     bound : the stated bound, see `bound_of`
+    behind : `texel` for light from behind the cloth; None where none comes through
     """
 
     point: float
     texel: float
     worst_pair: float
     bound: float
+    behind: float | None = None
 
 
 def pairs_between(count: int, skip: int = 0) -> tuple[Floats, Floats]:
@@ -69,7 +72,7 @@ def pairs_between(count: int, skip: int = 0) -> tuple[Floats, Floats]:
 
 def display(radiance: Floats, wi: Floats) -> Floats:
     """Display colours of (n, 3) radiance values, cosine included, under light wi (3,)."""
-    return np.asarray(np.clip(radiance * (math.pi / wi[2]), 0.0, 1.0))
+    return np.asarray(np.clip(radiance * (math.pi / abs(wi[2])), 0.0, 1.0))
 
 
 def fullest_block(sheet: Sheet) -> tuple[int, int, int]:
@@ -174,14 +177,19 @@ def swatch_errors(
     lit = pairs or pairs_between(PAIRS)
     at_points = compared(texels, fabric, points, lit)
     of_texels = compared(texels, fabric, areas, lit) if means else np.zeros_like(at_points)
+    behind: Sequence[float | None] = [None] * len(choices)
+    if means and translucent(fabric):
+        from_behind = lit[0] * (1.0, 1.0, -1.0), lit[1]
+        behind = [float(e.mean()) for e in compared(texels, fabric, areas, from_behind)]
     return [
         SwatchError(
             point=float(point.mean()),
             texel=float(texel.mean()),
             worst_pair=float(texel.max()),
             bound=bound_of(float(texel.max())),
+            behind=through,
         )
-        for point, texel in zip(at_points, of_texels, strict=True)
+        for point, texel, through in zip(at_points, of_texels, behind, strict=True)
     ]
 
 

@@ -72,7 +72,7 @@ def bytes_per_texel(names: Sequence[str]) -> int:
     return sum(REGISTRY[name].bytes_per_texel for name in names)
 
 
-def maps_with(names: Sequence[str], *, light: bool) -> list[TextureMap]:
-    """Return all maps that are not used to re-light, and those of `names`."""
-    every = [one.name for one in chosen_maps(None, light=light) if one.name not in NEEDED]
-    return chosen_maps([*every, *names], light=light)
+def maps_with(names: Sequence[str], *, light: bool, through: bool = False) -> list[TextureMap]:
+    """Return all maps that are not used to re-light, and those of `names`; see `chosen_maps`."""
+    every = [t.name for t in chosen_maps(None, light=light, through=through)]
+    return chosen_maps([*(n for n in every if n not in NEEDED), *names], light=light)

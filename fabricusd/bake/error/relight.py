@@ -24,8 +24,10 @@ from fabricusd.appearance.published.far import normalization
 from fabricusd.appearance.published.segment import along_set, segment
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.scattering.columns import GAMMA_SURFACE, MODEL
+from fabricusd.appearance.scattering.models import any_conserving
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.lookup import NO_THREAD
+from fabricusd.bake.error.relight_law import relight_law
 from fabricusd.bake.manifest_file import file_in, read_manifest
 from fabricusd.bake.texels.angle_shape import COUNTS, angle_shapes
 from fabricusd.bake.texels.encoding import Encoding
@@ -125,7 +127,8 @@ def relight(
     """(n, 3) radiance per unit `L_i dwi` of texels.
 
     maps : (n, channels) by name, one of the choices in RELIT
-    wi, wo : (3,) unit vectors in the weave's frame, x along U, y along V
+    wi, wo : (3,) unit vectors in the weave's frame, x along U, y along V. Cloth with `conserving`
+        threads may also be lit from below.
     """
     types = len(fabric.threads)
     area = coverage(fabric).type_area
@@ -138,8 +141,10 @@ def relight(
         shapes = np.repeat(shapes[:, PARTS:], PARTS + 1, axis=1)
     # Earlier versions stored 255 for texels without a thread.
     kinds = np.where((ids >= 0) & (ids < 2 * types), ids, NO_THREAD).astype(np.int64)
-    out = np.zeros((len(ids), 3))
     i, o = (np.asarray(w, np.float64) for w in (wi, wo))
+    if any_conserving(fabric):
+        return relight_law(fabric, share, shapes, sets, kinds, i, o)
+    out = np.zeros((len(ids), 3))
     _relight(surface_tables(fabric), share, shapes, types, sets, kinds, i, o, out)
     return out
 

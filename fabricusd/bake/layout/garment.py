@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.scattering.models import translucent
 from fabricusd.bake.layout.copies import are_copies, topology
 from fabricusd.bake.names import different_names, file_stem
 from fabricusd.errors import FabricError
@@ -30,7 +31,8 @@ PART = 1 << 16
 """Triangles that are processed together."""
 
 NOT_BAKED = ("weave", "back", "documentation")
-"""Fields of a fabric that are digested separately or do not affect a texture."""
+"""Fields of a fabric that are digested separately or do not affect a texture. The back does where
+light comes through the cloth."""
 
 GREATEST = 1e9
 """Largest point [m] or UV that is accepted: beyond it, float64 cannot resolve a thread."""
@@ -99,6 +101,8 @@ class Garment:
             # Not repr(lay.fabric): numpy prints the weave differently depending on other imports.
             cloth = lay.fabric
             parts = [getattr(cloth, f.name) for f in fields(cloth) if f.name not in NOT_BAKED]
+            if translucent(cloth):
+                parts.append(cloth.back)
             words = (parts, cloth.weave.cells.shape, lay.matrix.tolist(), lay.offset.tolist())
             digest.update(repr(words).encode())
             digest.update(np.ascontiguousarray(cloth.weave.cells).data)

@@ -15,7 +15,7 @@ from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.appearance.weave.curve import height_at
 from fabricusd.appearance.weave.quadrature import CELLS, Rule, curve_nodes
 from fabricusd.bake.texels import moment_indices as p
-from fabricusd.bake.texels.reflectance import ANGLES, reflectance_table
+from fabricusd.bake.texels import reflectance as r
 from fabricusd.fabric import PILE_ANGLE, Fabric
 
 STEPS = 721
@@ -65,8 +65,8 @@ def angle_rows(fabric: Fabric) -> NDArray[np.float32]:
     psi = np.linspace(-0.5 * math.pi, 0.5 * math.pi, STEPS)
     rows = np.zeros((2, len(fabric.threads), STEPS, p.LIT))
     slope = -np.tan(np.clip(psi, -PILE_ANGLE, PILE_ANGLE))
-    split, reflected = steepness(fabric), reflectance_table(fabric)
-    known = np.linspace(-0.5 * math.pi, 0.5 * math.pi, ANGLES)
+    split, reflected = steepness(fabric), r.reflectance_table(fabric)
+    known = np.linspace(-0.5 * math.pi, 0.5 * math.pi, r.ANGLES)
     for which in range(2):
         part = p.PARTS * which + part_of(psi, split[which])
         # A thread is a cylinder: normals across it span all angles, along it the lobe's width.
@@ -83,13 +83,19 @@ def angle_rows(fabric: Fabric) -> NDArray[np.float32]:
             row[:, p.SLOPE_2 + along] = slope * slope
             row[:, p.LOBE_2 + along] = min(thread.gamma_surface**2, 1.0)
             row[:, p.LOBE_2 + 1 - along] = 1.0
-            surface, volume, fuzz = (
-                np.interp(psi, known, reflected[which, kind, :, c]) for c in range(3)
-            )
-            row[:, p.SURFACE], row[:, p.FUZZ] = surface, fuzz
-            row[:, p.VOLUME : p.VOLUME + 3] = volume[:, None] * np.array(thread.albedo)
+            table = reflected[which, kind]
+            shown = np.stack([np.interp(psi, known, column) for column in table.T], axis=1)
+            row[:, p.SURFACE], row[:, p.FUZZ] = shown[:, r.SURFACE], shown[:, r.FUZZ]
+            row[:, p.VOLUME : p.VOLUME + 3] = shown[:, r.VOLUME : r.VOLUME + 3]
+            row[:, p.THROUGH : p.THROUGH + 3] = shown[:, r.THROUGH : r.THROUGH + 3]
             row[:, p.FRESNEL] = ((thread.ior - 1.0) / (thread.ior + 1.0)) ** 2
     return rows.astype(np.float32)
+
+
+def back_rows(back: Fabric) -> NDArray[np.float32]:
+    """(2, k, STEPS, 4) cover and VOLUME of a cloth's back, as `angle_rows` has them."""
+    rows = angle_rows(back)
+    return np.ascontiguousarray(rows[..., [p.COVER, p.VOLUME, p.VOLUME + 1, p.VOLUME + 2]])
 
 
 def height_rows(fabric: Fabric) -> NDArray[np.float32]:

@@ -21,12 +21,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.bake.layout.garment import Garment, Lay
 from fabricusd.bake.texels.maps import Texels, TextureMap
 from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.moments import samples_for, spans_repeats, texels
 from fabricusd.bake.texels.recipe import Recipe
+from fabricusd.bake.texels.repeat import baked_repeat
+from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import LEAN
 
 FINEST, COARSEST = 15, 9
@@ -83,21 +84,35 @@ def tables_of(
 
     Lays that differ only in their offset share a table.
     """
-    left = MOST_PHASES
-    made: dict[tuple[int, bytes], CellTable | None] = {}
-    for lay, recipe in zip(garment.lays, recipes, strict=True):
-        key = (id(recipe), lay.matrix.tobytes())
+    made: dict[tuple[Fabric, bytes], CellTable | None] = {}
+    rasters = rasters_of(garment, resolution)
+    for lay, recipe, raster in zip(garment.lays, recipes, rasters, strict=True):
+        key = (lay.fabric, lay.matrix.tobytes())
         if key not in made:
-            step = lay.matrix @ np.diag((1.0, -1.0)) / resolution
-            repeat = true_repeat(lay.fabric)
-            raster = affordable_raster(step, repeat, resolution**2, left)
             made[key] = None
             if raster is not None:
-                left -= math.prod(raster.counts)
+                step, repeat = _step(lay, resolution), baked_repeat(lay.fabric)
                 made[key] = cell_table(recipe, step, repeat, raster, levels)
-    return tuple(
-        made[id(r), lay.matrix.tobytes()] for lay, r in zip(garment.lays, recipes, strict=True)
-    )
+    return tuple(made[lay.fabric, lay.matrix.tobytes()] for lay in garment.lays)
+
+
+def rasters_of(garment: Garment, resolution: int) -> tuple[Raster | None, ...]:
+    """Return the raster of each lay's table, or None if it gets no table."""
+    left = MOST_PHASES
+    found: dict[tuple[Fabric, bytes], Raster | None] = {}
+    for lay in garment.lays:
+        key = (lay.fabric, lay.matrix.tobytes())
+        if key not in found:
+            step = _step(lay, resolution)
+            raster = affordable_raster(step, baked_repeat(lay.fabric), resolution**2, left)
+            left -= 0 if raster is None else math.prod(raster.counts)
+            found[key] = raster
+    return tuple(found[lay.fabric, lay.matrix.tobytes()] for lay in garment.lays)
+
+
+def _step(lay: Lay, resolution: int) -> NDArray[np.float64]:
+    """(2, 2) threads that a texel spans."""
+    return np.asarray(lay.matrix @ np.diag((1.0, -1.0)) / resolution)
 
 
 class Raster(NamedTuple):

@@ -23,6 +23,7 @@ from fabricusd.bake.texels.cell_table import CellLevel, CellTable
 from fabricusd.bake.texels.maps import Texels, TextureMap
 from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.recipe import Recipe
+from fabricusd.bake.texels.repeat import baked_repeat
 from fabricusd.bake.texels.sheet import Sheet, Window, texel_start, texel_step
 from fabricusd.kernels.real import LEAN
 
@@ -100,9 +101,10 @@ class Place:
             threads=np.empty((n, n), np.int32),
             shades=np.ones((2, n, n), np.float32),
         )
+        repeat = true_repeat(self.sheet.garment.lays[self.lay].fabric)
         _centres(
-            self.recipe, self.blur, *self._raster(), found.weave, found.sets, found.threads,
-            found.shades,
+            self.recipe, self.blur, *self._raster(), np.array(repeat, np.float64),
+            found.weave, found.sets, found.threads, found.shades,
         )  # fmt: skip
         return found
 
@@ -123,19 +125,20 @@ class Place:
     def phases(self, counts: tuple[int, int]) -> NDArray[np.int32]:
         """(h, w) entries of a cell table with `counts` phases along U and V."""
         found = np.empty((self.size, self.size), np.int32)
+        fabric = self.sheet.garment.lays[self.lay].fabric
         if self.recipe.uneven:
-            places = self.centres.weave / np.array(self._raster()[2])
+            places = self.centres.weave / np.array(true_repeat(fabric))
             steps = np.minimum((places * counts).astype(np.int32), np.array(counts) - 1)
             return np.asarray(steps[..., 1] * counts[0] + steps[..., 0], np.int32)
-        _phases(*self._raster(), *counts, found)
+        repeat = np.array(baked_repeat(fabric), np.float64)
+        _phases(*self._raster(), repeat, *counts, found)
         return found
 
     def _raster(self) -> tuple[NDArray[np.float64], ...]:
-        """(2,) weave coordinates of the first texel's corner, (2, 2) step, (2,) repeat."""
+        """(2,) weave coordinates of the first texel's corner, (2, 2) step."""
         return (
             texel_start(self.sheet, self.lay, *self.window[:2]),
             texel_step(self.sheet, self.lay, 1 << self.level),
-            np.array(true_repeat(self.sheet.garment.lays[self.lay].fabric), np.float64),
         )
 
     def texels(self, moments: Moments, mine: NDArray[np.bool_] | None) -> Texels:
@@ -168,7 +171,7 @@ class ComputedLayer:
         sheet, lay = place.sheet, place.lay
         found = np.zeros((MOMENTS, *owned.shape), np.float32)
         step = texel_step(sheet, lay)
-        side = moments.samples_for(step, true_repeat(sheet.garment.lays[lay].fabric))
+        side = moments.samples_for(step, baked_repeat(sheet.garment.lays[lay].fabric))
         start = texel_start(sheet, lay, *place.window[:2])
         moments.texels(
             sheet.recipes[lay], step, step, start, place.window[:2], owned.astype(np.int32), 1,

@@ -65,11 +65,14 @@ class Texels:
             lay=-1,
         )
 
-    def mean(self, moment: int, count: int = 1) -> Moments:
-        """(n, count) moments relative to the area of the threads, without the gaps."""
+    def mean(self, moment: int, count: int = 1, covers: int = m.COVER) -> Moments:
+        """(n, count) moments relative to the area of the threads, without the gaps.
+
+        covers : the moment that holds that area
+        """
         chosen = slice(moment, moment + count)
-        cover, least = self.moments[m.COVER], np.float32(1e-6)
-        usual = self.usual[chosen] / np.maximum(self.usual[m.COVER], least)
+        cover, least = self.moments[covers], np.float32(1e-6)
+        usual = self.usual[chosen] / np.maximum(self.usual[covers], least)
         shown = self.moments[chosen] / np.maximum(cover, least)
         return np.asarray(np.where(cover > least, shown, usual[:, None]).T)
 
@@ -88,6 +91,8 @@ class TextureMap:
     needs_light : baked only if a light is given
     spare : baked only if it is requested by name
     shaded : whether it depends on the albedo, which varies along uneven threads
+    of_light_through : baked only if it is requested by name or a fabric of the bake scatters light
+        to its other side
     kind_of : the meaning of the numbers, which determines how they are compared and how they are
         encoded in 16 bits: "share" from 0 to 1, "direction", "axis" (a direction whose sign is
         arbitrary), "angle" in [-pi/2, pi/2], "id", "place" in the repeat, or any "number"
@@ -106,6 +111,7 @@ class TextureMap:
     needs_light: bool = False
     spare: bool = False
     shaded: bool = False
+    of_light_through: bool = False
     kind_of: str = "share"
     unit: str = ""
     weight: Function | None = None
@@ -144,10 +150,19 @@ def texture_map(
     return keep
 
 
-def chosen_maps(names: Sequence[str] | None, *, light: bool) -> list[TextureMap]:
-    """Return the maps in `names`, in the registry's order; None selects all that can be baked."""
+def chosen_maps(
+    names: Sequence[str] | None, *, light: bool, through: bool = False
+) -> list[TextureMap]:
+    """Return the maps in `names`, in the registry's order; None selects all that can be baked.
+
+    light : whether a light is given; through : whether light comes through a fabric of the bake
+    """
     if names is None:
-        return [t for t in REGISTRY.values() if (light or not t.needs_light) and not t.spare]
+        return [
+            t
+            for t in REGISTRY.values()
+            if (light or not t.needs_light) and (through or not t.of_light_through) and not t.spare
+        ]
     unknown = [n for n in names if n not in REGISTRY]
     if unknown:
         raise FabricError(
@@ -187,6 +202,19 @@ def weave_coordinate(t: Texels) -> NDArray[Any]:
 def base_color(t: Texels) -> NDArray[Any]:
     """Reflectance of the threads' volume term seen from above, without the gaps"""
     return t.mean(m.VOLUME, 3)
+
+
+@texture_map("transmission_color", "R G B", (0.0,), color=True, of_light_through=True)
+def transmission_color(t: Texels) -> NDArray[Any]:
+    """Share of the light from behind that the threads scatter through, seen from above, without
+    the gaps"""
+    return t.mean(m.THROUGH, 3)
+
+
+@texture_map("back_base_color", "R G B", (0.5,), color=True, of_light_through=True)
+def back_base_color(t: Texels) -> NDArray[Any]:
+    """The map `base_color` of the cloth's back, seen from the back at the same place"""
+    return t.mean(m.BACK_VOLUME, 3, m.BACK_COVER)
 
 
 @texture_map("albedo", "R G B", (0.5,), color=True, shaded=True, weight=_whole)

@@ -17,6 +17,11 @@ HEIGHT = 36  # [m]
 LOBE_2 = 37  # 2: squared slope width of the surface lobe along U, along V
 SURFACE, VOLUME, FUZZ = 39, 40, 43  # reflectances, see `reflectance`; VOLUME has three channels
 FRESNEL = 44
-LIT = 45  # share of the chosen light that arrives
-HORIZON = 46  # AZIMUTHS: squared sine of the horizon
-MOMENTS = HORIZON + AZIMUTHS
+THROUGH = 45  # 3: transmittance
+LIT = 48  # share of the chosen light that arrives
+HORIZON = 49  # AZIMUTHS: squared sine of the horizon
+BACK_COVER = (
+    HORIZON + AZIMUTHS
+)  # cover and VOLUME of the back, seen from the back at the same place
+BACK_VOLUME = BACK_COVER + 1  # 3
+MOMENTS = BACK_VOLUME + 3

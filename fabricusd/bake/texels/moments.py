@@ -23,6 +23,7 @@ from fabricusd.appearance.weave.yarn.lay import EVENLY, lay_at, sound
 from fabricusd.bake.texels.angle_rows import HEIGHTS, STEPS
 from fabricusd.bake.texels.moment_indices import (
     AZIMUTHS,
+    BACK_COVER,
     HEIGHT,
     HORIZON,
     LIT,
@@ -149,10 +150,30 @@ def _mixed(x):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
+def _step_of(angle):  # type: ignore[no-untyped-def]
+    """Row of `Recipe.rows` for a tangent angle [rad]."""
+    R = np.float32
+    step = int((angle * R(1.0 / math.pi) + R(0.5)) * R(STEPS - 1) + R(0.5))
+    return min(max(step, 0), STEPS - 1)
+
+
+@njit(**INLINE)
+def _add_back(made, u, v, out):  # type: ignore[no-untyped-def]
+    """Add what the back of the cloth shows at weave coordinates (u, v) of its front."""
+    which, thread, _, _, angle, _ = find(np.float32, made.back, u, -v)
+    if which != GAP:
+        step = _step_of(angle)
+        for p in range(made.back_rows.shape[3]):
+            out[BACK_COVER + p] += made.back_rows[which, thread, step, p]
+
+
+@njit(**INLINE)
 def _add(made, u, v, out):  # type: ignore[no-untyped-def]
     """Add the sample at weave coordinates (u, v) to a texel's sums."""
     R = np.float32
     u, v, warp, weft = laid_at(made, u, v, R(0))
+    if made.two_sided != 0:
+        _add_back(made, u, v, out)
     which, thread, s, w, angle, length = find(R, made.cloth, u, v)
     if which == GAP:
         if made.light[2] > R(0):
@@ -165,8 +186,7 @@ def _add(made, u, v, out):  # type: ignore[no-untyped-def]
             v if which == WARP else u,
         )  # fmt: skip
         u, v = (u, at) if which == WARP else (at, v)
-    step = int((angle * R(1.0 / math.pi) + R(0.5)) * R(STEPS - 1) + R(0.5))
-    step = min(max(step, 0), STEPS - 1)
+    step = _step_of(angle)
     for p in range(LIT):
         out[p] += made.rows[which, thread, step, p]
     if made.uneven != 0:

@@ -7,13 +7,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.scattering.models import translucent
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
-from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric, true_repeat
+from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
+from fabricusd.appearance.weave.lookup import back_of
 from fabricusd.appearance.weave.yarn.compiled import Yarn, compile_yarn
-from fabricusd.bake.texels.angle_rows import angle_rows, height_rows
+from fabricusd.bake.texels.angle_rows import STEPS, angle_rows, back_rows, height_rows
 from fabricusd.bake.texels.light import unit_light
 from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.moments import texels
+from fabricusd.bake.texels.repeat import baked_repeat
 from fabricusd.fabric import Fabric
 
 
@@ -26,6 +29,8 @@ class Recipe(NamedTuple):
     rows, heights : see `angle_rows`
     rounded : int - 1 if threads are round across their width
     light : (3,) float32 - unit vector to the light in the weave's frame; zero for none
+    two_sided : int - 1 if the moments of the back are computed
+    back, back_rows : the cloth seen from behind at (u, -v), and what it adds, see `back_rows`
     mean : (MOMENTS,) float32 - moments of the whole repeat
     """
 
@@ -38,6 +43,9 @@ class Recipe(NamedTuple):
     heights: NDArray[np.float32]
     rounded: int
     light: NDArray[np.float32]
+    two_sided: int
+    back: CompiledFabric
+    back_rows: NDArray[np.float32]
     mean: NDArray[np.float32]
 
 
@@ -47,13 +55,17 @@ def recipe(
     level: str = "weave",
     light: tuple[float, float, float] | None = None,
     method: str = "peak",
+    back: bool = True,
 ) -> Recipe:
     """Compile the tables of `fabric`.
 
     level : "weave" for threads that are flat across their width, "thread" for round ones
     light : direction to the light in the surface frame, for the shadow mask
     method : method of the shadow mask
+    back : whether the back is baked, where threads scatter light to the other side
     """
+    two_sided = back and translucent(fabric)
+    behind = back_of(fabric) if two_sided else fabric
     cloth = compile_fabric(fabric, precision=np.float32)
     horizon = compile_shadow(fabric, "horizon")
     shadow = compile_shadow(fabric, method) if light is not None else horizon
@@ -68,6 +80,9 @@ def recipe(
         heights=height_rows(fabric),
         rounded=int(level == "thread"),
         light=towards.astype(np.float32),
+        two_sided=int(two_sided),
+        back=compile_fabric(behind, precision=np.float32) if two_sided else cloth,
+        back_rows=back_rows(behind) if two_sided else np.zeros((2, 1, STEPS, 4), np.float32),
         mean=np.zeros(MOMENTS, np.float32),
     )
     # The mean over the repeat is that of even threads, which uneven ones keep.
@@ -76,7 +91,7 @@ def recipe(
 
 def repeat_mean(fabric: Fabric, made: Recipe) -> NDArray[np.float32]:
     """(MOMENTS,) means over one repeat, from about 16 samples per thread along each axis."""
-    repeat = true_repeat(fabric)
+    repeat = baked_repeat(fabric)
     count = [min(max(16 * n, 256), 2048) for n in repeat]
     moments = np.empty((MOMENTS, count[1], 1), np.float32)
     sums = np.empty(MOMENTS, np.float32)

@@ -1,33 +1,36 @@
-"""Tabulate the reflectance of a thread in the cloth by its tangent angle, for the colour maps.
+"""Tabulate what a thread in the cloth reflects and transmits by its tangent angle, for the colours.
 
-Reflectance is the integral of level `weave` over all light directions, for a viewer at the normal.
-Its mean over the repeat is the reflectance of level `far`.
+Reflectance is the integral of level `weave` over all light directions above the cloth, for a viewer
+at the normal, and transmittance the integral over those below. Their means over the repeat are
+those of level `far`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.published.tables import surface_tables
-from fabricusd.appearance.scattering.model import CONSERVING, PUBLISHED
-from fabricusd.appearance.scattering.models import model_of, names
-from fabricusd.appearance.surface import points_all
-from fabricusd.appearance.weave.place import Places
-from fabricusd.errors import FabricError
+from fabricusd.appearance.law import PUBLISHED_ONLY, SurfaceLaw, surface_law
+from fabricusd.appearance.scattering.models import translucent
+from fabricusd.appearance.weave.coverage import WARP, WEFT
+from fabricusd.appearance.weave.quadrature import CELLS, Rule, curve_nodes
+from fabricusd.bake.texels.law_values import law_values, painted
 from fabricusd.fabric import Fabric
+
+Floats = NDArray[np.float64]
 
 ANGLES = 181
 """Tangent angles from -90 to 90 degrees in steps of one degree: the narrowest published lobe is 2.5
 degrees wide."""
 
-COLUMNS = 3
-"""Surface term, volume term without `A`, and the gain of both at a grazing view."""
+SURFACE, VOLUME, FUZZ, THROUGH = 0, 1, 4, 5
+COLUMNS = 8
+"""Columns of the table: the reflectance of the surface term, which is that of black threads; what
+the volume term adds, in three channels; what both gain at a grazing view; the transmittance, in
+three channels."""
 
 GRAZING = math.radians(75.0)
 """Inclination of the view at which fuzz is measured [rad]; closer to the horizon the published
@@ -36,47 +39,73 @@ models reflect hardly any light."""
 _POLAR, _AZIMUTHAL, _VIEWS = 24, 48, 4
 
 
+SPREAD = Rule(CELLS, math.radians(0.1))
+"""Quadrature rule that finds the tangent angles of each thread."""
+
+
 @lru_cache(maxsize=16)
-def reflectance_table(fabric: Fabric) -> NDArray[np.float64]:
+def reflectance_table(fabric: Fabric) -> Floats:
     """(2, k, ANGLES, COLUMNS) by thread set (weft, warp), thread type and tangent angle.
 
-    Raises FabricError for the `conserving` model.
+    Angles that a thread does not have hold the values of its nearest one, and threads that a set
+    does not show hold 0.
     """
-    refuse_conserving(fabric)
     table = np.zeros((2, len(fabric.threads), ANGLES, COLUMNS))
-    for column, tint in ((0, 0.0), (1, 1.0)):
-        painted = {
-            name: replace(t, albedo=(tint, tint, tint)) for name, t in fabric.threads.items()
-        }
-        tables = surface_tables(replace(fabric, threads=painted))
-        for thread_set in range(2):
-            for thread in range(len(fabric.threads)):
-                above = _reflected(tables, thread_set, thread, 0.0)
-                table[thread_set, thread, :, column] = above
-                if column == 1:
-                    grazing = _reflected(tables, thread_set, thread, GRAZING)
-                    table[thread_set, thread, :, 2] = np.maximum(grazing - above, 0.0)
-    # The second run, with A = 1, holds both terms; the volume term is the difference.
-    table[..., 1] = np.maximum(table[..., 1] - table[..., 0], 0.0)
-    brightness = np.array([np.mean(t.albedo) for t in fabric.thread_list])
-    table[..., 2] *= np.minimum(brightness, 1.0)[None, :, None]
+    black = surface_law(painted(fabric, 0.0), precision=np.float64, multiple=False)
+    # The published volume term is proportional to `A`. That of `conserving` cloth is not: light
+    # goes from thread to thread.
+    linear = black.kind == PUBLISHED_ONLY
+    lit = surface_law(painted(fabric, 1.0) if linear else fabric, precision=np.float64)
+    for (which, kind), used in _used_angles(fabric).items():
+        psi0 = np.radians(np.linspace(-90.0, 90.0, ANGLES)[used])
+        surface = _scattered(black, which, kind, psi0, 0.0)[:, :1]
+        both = _scattered(lit, which, kind, psi0, 0.0)
+        row = np.zeros((len(psi0), COLUMNS))
+        row[:, SURFACE] = surface[:, 0]
+        row[:, VOLUME : VOLUME + 3] = np.maximum(both - surface, 0.0)
+        gain = np.maximum(_scattered(lit, which, kind, psi0, GRAZING) - both, 0.0)
+        row[:, FUZZ] = gain.mean(axis=1)
+        if linear:
+            albedo = np.array(fabric.thread_list[kind].albedo)
+            row[:, VOLUME : VOLUME + 3] *= albedo
+            row[:, FUZZ] = gain[:, 0] * min(float(albedo.mean()), 1.0)
+        if translucent(fabric):
+            through = _scattered(lit, which, kind, psi0, 0.0, below=True)
+            row[:, THROUGH : THROUGH + 3] = through
+        table[which, kind] = np.pad(row, ((used.start, ANGLES - used.stop), (0, 0)), "edge")
     return table
 
 
-def refuse_conserving(fabric: Fabric) -> None:
-    """Raise FabricError if a thread's model cannot be baked."""
-    for name, thread in fabric.threads.items():
-        if model_of(fabric, thread).law == CONSERVING:
-            baked = " or ".join(f"'{n}'" for n in sorted(names(PUBLISHED)))
-            raise FabricError(
-                f"{fabric.name} {name} model",
-                f"is '{fabric.model_of(thread)}', whose light travels between threads and cannot "
-                f"be baked; it must be {baked}",
-            )
+def _used_angles(fabric: Fabric) -> dict[tuple[int, int], slice]:
+    """Indices of the angles that each set's visible threads have, by set and thread type."""
+    nodes = curve_nodes(fabric, SPREAD)
+    sets = np.where(np.arange(len(nodes.psi0)) < nodes.warp_start, WEFT, WARP)
+    found = {}
+    for which in (WEFT, WARP):
+        for kind in range(len(fabric.threads)):
+            mine = nodes.psi0[(sets == which) & (nodes.thread == kind) & (nodes.weight > 0)]
+            if len(mine):
+                low, high = (np.degrees(end) + 90.0 for end in (mine.min(), mine.max()))
+                first, last = max(math.floor(low) - 1, 0), min(math.ceil(high) + 1, ANGLES - 1)
+                found[which, kind] = slice(first, last + 1)
+    return found
 
 
-def _reflected(tables: Any, thread_set: int, thread: int, view: float) -> NDArray[np.float64]:
-    """(ANGLES,) reflectance for a viewer `view` [rad] from the normal, averaged over azimuths."""
+def _scattered(
+    law: SurfaceLaw,
+    thread_set: int,
+    thread: int,
+    psi0: Floats,
+    view: float,
+    *,
+    below: bool = False,
+) -> Floats:
+    """(n, 3) share of the light of one side for a viewer `view` [rad] from the normal.
+
+    psi0 : (n,) tangent angles [rad]
+
+    It is averaged over azimuths of the view. The light comes from above the cloth, or from below.
+    """
     x, weight = np.polynomial.legendre.leggauss(_POLAR)
     z = 0.5 * (x + 1.0)
     phi = (np.arange(_AZIMUTHAL) + 0.5) * (2.0 * math.pi / _AZIMUTHAL)
@@ -85,26 +114,19 @@ def _reflected(tables: Any, thread_set: int, thread: int, view: float) -> NDArra
         np.broadcast_arrays(
             flat[:, None] * np.cos(phi),
             flat[:, None] * np.sin(phi),
-            np.repeat(z[:, None], len(phi), 1),
+            np.repeat((-z if below else z)[:, None], len(phi), 1),
         )
     ).reshape(3, -1)
     solid = np.repeat(0.5 * weight * 2.0 * math.pi / _AZIMUTHAL, _AZIMUTHAL)
-    psi0 = np.radians(np.linspace(-90.0, 90.0, ANGLES))
-    turns = 1 if view == 0 else _VIEWS
-    total = np.zeros(ANGLES)
+    turns, n = 1 if view == 0 else _VIEWS, wi.shape[1]
+    lights = np.tile(wi, (1, len(psi0)))
+    total = np.zeros((len(psi0), 3))
     for turn in range(turns):
         azimuth = 2.0 * math.pi * (turn + 0.5) / turns
         wo = np.array(
             [math.sin(view) * math.cos(azimuth), math.sin(view) * math.sin(azimuth), math.cos(view)]
         )
-        n = wi.shape[1]
-        lights = np.ascontiguousarray(np.tile(wi, (1, ANGLES)))
-        out = np.empty_like(lights)
-        sets = np.full(n * ANGLES, thread_set, np.uint8)
-        threads = np.full(n * ANGLES, thread, np.int32)
-        viewers = np.ascontiguousarray(np.repeat(wo[:, None], n * ANGLES, axis=1))
-        real: Any = np.float64
-        places = Places(sets, threads, np.repeat(psi0, n), np.zeros(n * ANGLES))
-        points_all(real, tables, False, places, lights, viewers, out)
-        total += (out[0].reshape(ANGLES, n) * solid).sum(axis=1)
+        viewers = np.repeat(wo[:, None], n * len(psi0), axis=1)
+        found = law_values(law, thread_set, thread, np.repeat(psi0, n), lights, viewers)
+        total += np.einsum("cal,l->ac", found.reshape(3, len(psi0), n), solid)
     return total / turns

@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.bake.layout.garment import Garment
 from fabricusd.bake.layout.raster import texel_triangles
 from fabricusd.bake.texels.cell_table import CellTable, tables_of
 from fabricusd.bake.texels.recipe import Recipe
+from fabricusd.bake.texels.repeat import baked_repeat
 
 SMALLEST, LARGEST = 64, 32768
 """Texels along a side of a texture. Most tools cannot open larger ones; use more UDIM tiles."""
 
 BLOCK_SIDE = 256
-"""Texels along the side of a block, whose moments take 12 MB."""
+"""Texels along the side of a block, whose moments take 18 MB."""
 
 Window = tuple[int, int, int, int]
 """(x0, y0, x1, y1): texels of the finest level in the half-open ranges [x0, x1) and [y0, y1)."""
@@ -103,5 +103,5 @@ def texel_start(sheet: Sheet, lay: int, x: float, y: float) -> NDArray[np.float6
     )
     place = one.matrix @ uv + one.offset
     return np.asarray(
-        place if one.fabric.is_uneven else np.mod(place, true_repeat(one.fabric)), np.float64
+        place if one.fabric.is_uneven else np.mod(place, baked_repeat(one.fabric)), np.float64
     )

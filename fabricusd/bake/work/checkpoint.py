@@ -15,12 +15,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.bake.layout.garment import Garment
 from fabricusd.bake.layout.raster import NOBODY
 from fabricusd.bake.texels.blocks import Layers, bake_block, composed, layers_of, top
+from fabricusd.bake.texels.cell_table import rasters_of
 from fabricusd.bake.texels.layers import Place, TableLayer, cut_texels, shares
 from fabricusd.bake.texels.maps import TextureMap
 from fabricusd.bake.texels.moment_indices import MOMENTS
-from fabricusd.bake.texels.sheet import Sheet
+from fabricusd.bake.texels.sheet import BLOCK_SIDE, Sheet
 from fabricusd.files import whole_file
 
 DIGEST = 16
@@ -36,10 +38,6 @@ Floats = NDArray[np.float32]
 class Checkpoint(Protocol):
     """How the blocks of one sheet are stored in files, and how maps are read back from them."""
 
-    @property
-    def bytes_needed(self) -> int:
-        """Upper bound on the size of all blocks [bytes]."""
-
     def write(self, path: Path, bx: int, by: int) -> None:
         """Compute a block and store it."""
 
@@ -48,6 +46,16 @@ class Checkpoint(Protocol):
 
     def values(self, path: Path, bx: int, by: int, k: int, level: int) -> NDArray[Any]:
         """(h, w, channels) values of map `k` in a block."""
+
+
+def space_needed(garment: Garment, resolution: int, maps: Sequence[TextureMap]) -> int:
+    """Upper bound on the size of all blocks of one sheet [bytes]."""
+    if all(raster is not None for raster in rasters_of(garment, resolution)):
+        return 2 * resolution**2
+    side = min(BLOCK_SIDE, resolution)
+    texels = sum((side >> level) ** 2 for level in range(side.bit_length()))
+    each = sum(len(one.channels) * np.dtype(one.kind).itemsize for one in maps)
+    return texels * each * (resolution // side) ** 2
 
 
 def checkpoint_of(sheet: Sheet, maps: Sequence[TextureMap]) -> Checkpoint:
@@ -71,7 +79,6 @@ class ValuesCheckpoint:
         ]
         ends = np.cumsum([0, *(count for row in self.places for count in row)])
         self.offsets = ends[:-1].reshape(len(maps), sheet.levels)
-        self.bytes_needed = int(ends[-1]) * sheet.across**2
 
     def write(self, path: Path, bx: int, by: int) -> None:
         """Compute a block and store it."""
@@ -110,7 +117,6 @@ class LayoutCheckpoint:
 
     def __init__(self, sheet: Sheet, maps: Sequence[TextureMap]) -> None:
         self.sheet, self.maps = sheet, maps
-        self.bytes_needed = 2 * sheet.resolution**2
 
     def write(self, path: Path, bx: int, by: int) -> None:
         """Compute a block and store it."""

@@ -17,7 +17,8 @@ from fabricusd.chart.panel import Panel, Row
 from fabricusd.chart.timing import in_turns, typical
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.materials.bake_folder import read_bake_folder
-from fabricusd.materials.fit.fit import fit, forward
+from fabricusd.materials.fit.fit import fit
+from fabricusd.materials.fit.forward import forward
 from fabricusd.materials.fit.judge import direction_pairs
 from fabricusd.materials.fit.models import KINDS
 from fabricusd.materials.fit.target import TexelSample

@@ -17,11 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from fabricusd.appearance.scattering.models import translucent
 from fabricusd.appearance.weave.lookup import NO_THREAD
 from fabricusd.fabric import Fabric
+from fabricusd.materials.fit.forward import forward, frames_of
 from fabricusd.materials.fit.judge import Judge, albedo, direction_pairs
-from fabricusd.materials.fit.models import Surface, evaluate
 from fabricusd.materials.fit.target import Target, TexelSample, target_of
+from fabricusd.materials.fit.through import fit_through
 from fabricusd.materials.networks.look import Look
 
 Floats = NDArray[np.float64]
@@ -46,6 +48,8 @@ class Fitted:
     score : the value of `Judge.score`
     start_delta_e, start_score : the same figures for the textures without a fit
     pairs : number of pairs of directions
+    through_delta_e, through_start_delta_e : mean delta E 2000 over as many pairs with the light
+        behind the cloth, with and without the fit; None where no scattered light comes through
     """
 
     look: Look
@@ -57,6 +61,8 @@ class Fitted:
     start_delta_e: float
     start_score: float
     pairs: int
+    through_delta_e: float | None = None
+    through_start_delta_e: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fit for JSON."""
@@ -74,7 +80,16 @@ def fit(
     The result is never worse than `texels` alone, neither in `Judge.score` nor in the mean delta E
     of the pairs.
     """
-    return _fitted(kind, texels, target_of(fabric, texels), _free(kind), baked or texels)
+    found = _fitted(kind, texels, target_of(fabric, texels), _free(kind), baked or texels)
+    if not translucent(fabric):
+        return found
+    through = fit_through(kind, texels, fabric, found.look)
+    return replace(
+        found,
+        look=replace(found.look, transmission_scale=through.scale),
+        through_delta_e=through.delta_e,
+        through_start_delta_e=through.start_delta_e,
+    )
 
 
 def fit_threads(texels: TexelSample, fabric: Fabric) -> dict[int, Fitted]:
@@ -170,7 +185,7 @@ def _fitted(
 
 def _renderer(kind: str, texels: TexelSample, target: Target) -> Callable[[Look], Floats]:
     """Return a function from a look to (rows, n, 3) values, with the rows of `target`."""
-    frames = _frames(texels)
+    frames = frames_of(texels)
     wi, wo = (np.einsum("kab,nb->kna", frames, w) for w in direction_pairs())
     return lambda look: np.einsum(
         "rk,knc->rnc", target.members, forward(kind, look, texels, wi, wo), optimize=True
@@ -211,34 +226,6 @@ def _sought(
     plain, end = _pack(replace(tried[-1], **_BARE), free), _pack(tried[-1], free)
     between = [_unpack(plain + t * (end - plain), free, tried[-1]) for t in (0.25, 0.5, 0.75)]
     return [*tried, *between]
-
-
-def forward(kind: str, look: Look, texels: TexelSample, wi: Floats, wo: Floats) -> Floats:
-    """(k, n, 3) radiance of each texel, for wi, wo (k, n, 3) in the texel's frame."""
-    one = np.ones((len(texels.base), 1))
-    smooth = np.minimum((texels.smooth * look.smooth_scale) ** 2, 1.0)[:, None]
-    rough = np.minimum((texels.rough * look.rough_scale) ** 2, 1.0)[:, None]
-    if kind == "preview":
-        rough = smooth
-    made = Surface(
-        base=np.minimum(texels.base * np.array(look.base_color_scale), 1.0)[:, None],
-        ior=look.specular_ior * one,
-        alpha_rough=np.maximum(rough, smooth),
-        alpha_smooth=smooth,
-        tint=(np.ones((len(one), 3)) * texels.tint * np.array(look.specular_tint))[:, None],
-        fuzz_weight=look.fuzz_weight * one,
-        fuzz_color=np.array(look.fuzz_color)[None, None],
-        fuzz_roughness=look.fuzz_roughness * one,
-    )
-    return np.asarray(evaluate(kind, made, wi, wo) * texels.opacity[:, None, None])
-
-
-def _frames(texels: TexelSample) -> Floats:
-    """(k, 3, 3) frame of each texel: rows x (the rougher axis), y, z (the normal)."""
-    z = texels.normal
-    x = texels.tangent - np.sum(texels.tangent * z, axis=1, keepdims=True) * z
-    x = x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-9)
-    return np.stack((x, np.cross(z, x), z), axis=1)
 
 
 @dataclass(frozen=True)

@@ -68,6 +68,25 @@ def evaluate(kind: str, s: Surface, wi: Floats, wo: Floats) -> Floats:
     return np.where(above[..., None], out, 0.0)
 
 
+def transmitted(kind: str, s: Surface, through: Floats, wi: Floats, wo: Floats) -> Floats:
+    """(..., 3) value of a thin sheet below the layers, for light wi from below; 0 for any other.
+
+    through : (..., 3) diffuse transmittance of the sheet
+    """
+    below = (wi[..., 2] < 0) & (wo[..., 2] > 0)
+    cos_i = np.clip(-wi[..., 2], SMALLEST, 1.0)
+    cos_o = np.clip(wo[..., 2], SMALLEST, 1.0)
+    # What the layers leave depends on the view alone.
+    above = wi * np.array((1.0, 1.0, -1.0))
+    _, left = specular(kind, s, above, wo, cos_i, cos_o)
+    if kind in ("openpbr", "principled"):
+        left = left * zeltner(s, above, wo, cos_o)[1][..., None]
+    elif kind != "preview":
+        rough = s.fuzz_roughness if kind == "standard_surface" else s.fuzz_roughness**2
+        left = left * conty_kulla(s, rough, above, wo, cos_i, cos_o)[1][..., None]
+    return np.where(below[..., None], left * through * (cos_i / np.pi)[..., None], 0.0)
+
+
 def specular(
     kind: str, s: Surface, wi: Floats, wo: Floats, cos_i: Floats, cos_o: Floats
 ) -> tuple[Floats, Floats]:

@@ -29,6 +29,7 @@ class TexelSample:
     tangent : (k, 3) unit vectors along the rougher axis, perpendicular to `normal`
     weight : (k,) share of the lay that each texel represents
     tint : (k, 3) factor on the reflection, or 1
+    through : (k, 3) map `transmission_color`, or 0
     thread : (k,) thread number as in the map `thread_id`; NO_THREAD for texels of no single thread
     """
 
@@ -40,6 +41,7 @@ class TexelSample:
     tangent: Floats
     weight: Floats
     tint: Floats | float = 1.0
+    through: Floats | float = 0.0
     thread: NDArray[np.int64] | int = NO_THREAD
 
     @property

@@ -22,6 +22,7 @@ LEAST, MOST = 0.02, 8
 """Smallest share of the texels of a thread that is fitted individually, and most such threads."""
 
 NEEDED = ("base_color", "roughness_along", "roughness_across", "normal", "tangent", "opacity")
+OPTIONAL = ("transmission_color",)
 
 
 def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
@@ -29,7 +30,8 @@ def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
     if any(name not in maps.textures for name in NEEDED):
         return None
     tile = next(iter(maps.textures["base_color"]))
-    read = {name: read_mip_level(maps.textures[name][tile]) for name in NEEDED}
+    optional = tuple(name for name in OPTIONAL if name in maps.textures)
+    read = {name: read_mip_level(maps.textures[name][tile]) for name in (*NEEDED, *optional)}
     if "lay" in maps.textures:
         mine = read_mip_level(maps.textures["lay"][tile])[..., 0] == number
     else:
@@ -52,7 +54,7 @@ def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
     rows = np.concatenate(
         (
             value["base_color"], value["roughness_along"], value["roughness_across"],
-            value["opacity"], normal, rough,
+            value["opacity"], normal, rough, *(value[name] for name in optional),
         ),
         axis=1,
     )  # fmt: skip
@@ -72,7 +74,8 @@ def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
         rough=means[:, 4],
         opacity=means[:, 5],
         normal=normal,
-        tangent=means[:, 9:],
+        tangent=means[:, 9:12],
+        through=means[:, 12:] if optional else 0.0,
         weight=np.concatenate([w * s for (_, w), s in zip(groups, share, strict=True)]),
         thread=np.repeat(shown, [len(w) for _, w in groups]),
     )

@@ -16,6 +16,8 @@ class Look:
     smooth_scale, rough_scale : factors on the maps `roughness_along` and `roughness_across`, whose
         squares are microfacet alphas
     fuzz_weight, fuzz_roughness, fuzz_color (3,) : the top layer
+    transmission_scale : (3,) factor on the map `transmission_color`; None for cloth that lets no
+        scattered light through
     """
 
     base_color_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -26,3 +28,4 @@ class Look:
     fuzz_weight: float = 0.0
     fuzz_color: tuple[float, float, float] = (1.0, 1.0, 1.0)
     fuzz_roughness: float = 0.5
+    transmission_scale: tuple[float, float, float] | None = None

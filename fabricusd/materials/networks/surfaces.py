@@ -31,11 +31,19 @@ MAPS = {
     "normal": "vector3",
     "tangent": "vector3",
     "specular_tint": "color3",
+    "transmission_color": "color3",
 }
 """Maps that a surface reads, and their types."""
 
 NO_TINT = Value("color3", (1.0, 1.0, 1.0))
 """Replaces the map `specular_tint`, which exists only if threads are fitted."""
+
+NO_TRANSMISSION = Value("color3", (0.0, 0.0, 0.0))
+"""Replaces the map `transmission_color`, which exists only where light comes through the cloth."""
+
+LIT_THROUGH = ("openpbr", "standard_surface")
+"""The surfaces that can carry light through a thin sheet. glTF's has clear transmission only, and
+UsdPreviewSurface none."""
 
 PARAMETERS = {
     "base_color_scale": "color3",
@@ -46,13 +54,18 @@ PARAMETERS = {
     "fuzz_weight": "float",
     "fuzz_color": "color3",
     "fuzz_roughness": "float",
+    "transmission_scale": "color3",
 }
-"""Fields of `Look` that are inputs of the material, and their types."""
+"""Fields of `Look` that are inputs of the material, and their types; None is left out."""
 
 
 def parameter_values(look: Look, prefix: str = "") -> dict[str, Value]:
     """Return the inputs of the material itself."""
-    return {prefix + name: Value(kind, getattr(look, name)) for name, kind in PARAMETERS.items()}
+    return {
+        prefix + name: Value(kind, getattr(look, name))
+        for name, kind in PARAMETERS.items()
+        if getattr(look, name) is not None
+    }
 
 
 def one(value: float) -> Value:
@@ -130,8 +143,43 @@ def _base(b: Builder, read: Maps) -> Link:
     scaled = b.math(
         "base_scaled", "multiply", "color3", read("base_color"), Parameter("base_color_scale")
     )
-    inputs: dict[str, Source] = {"in": scaled, "low": one(0.0), "high": one(1.0)}
-    return b.add("base", "clamp", "color3", "ND_clamp_color3FA", **inputs)
+    return _clamped(b, "base", scaled)
+
+
+def _clamped(b: Builder, name: str, value: Source) -> Link:
+    inputs: dict[str, Source] = {"in": value, "low": one(0.0), "high": one(1.0)}
+    return b.add(name, "clamp", "color3", "ND_clamp_color3FA", **inputs)
+
+
+def transmits(maps: Inputs) -> bool:
+    """Whether scattered light comes through the surface of these maps."""
+    return maps.get("transmission_color", NO_TRANSMISSION) != NO_TRANSMISSION
+
+
+def _through(b: Builder, read: Maps, base: Link) -> tuple[Link, Link, Link]:
+    """Return the weight and the colour of light through a thin sheet, and the base's colour.
+
+    Both surfaces mix the base with a diffuse sheet: `(1 - w) base + w color`. With `w` the largest
+    channel of the transmittance, the largest channel of the colour is 1. MaterialX up to 1.39.5
+    squares the colour of OpenPBR's sheet, which then changes its saturation alone.
+    """
+    scaled = b.math(
+        "through_scaled", "multiply", "color3", read("transmission_color"),
+        Parameter("transmission_scale"),
+    )  # fmt: skip
+    through = _clamped(b, "through", scaled)
+    channels = []
+    for k, name in enumerate("rgb"):
+        inputs: dict[str, Source] = {"in": through, "index": Value("integer", k)}
+        channels.append(b.add(f"through_{name}", "extract", "float", "ND_extract_color3", **inputs))
+    most = b.math("through_rg", "max", "float", channels[0], channels[1])
+    weight = b.math("through_weight", "max", "float", most, channels[2])
+    some = b.math("through_floor", "max", "float", weight, one(1e-6))
+    color = b.math("through_color", "divide", "color3", through, some, short=True)
+    rest = b.math("through_rest", "subtract", "float", one(1.0), weight)
+    least = b.math("rest_floor", "max", "float", rest, one(1e-6))
+    undimmed = b.math("base_undimmed", "divide", "color3", base, least, short=True)
+    return weight, color, _clamped(b, "base_beside_through", undimmed)
 
 
 def _tint(b: Builder, read: Maps) -> Source:
@@ -176,6 +224,14 @@ def openpbr(maps: Inputs, opaque: bool) -> Graph:
         "geometry_normal": frame["normal"],
         "geometry_tangent": frame["tangent"],
     }
+    if transmits(maps):
+        weight, color, base = _through(b, read, _base(b, read))
+        inputs |= {
+            "base_color": base,
+            "subsurface_weight": weight,
+            "subsurface_color": color,
+            "subsurface_scatter_anisotropy": one(1.0),
+        }
     if not opaque:
         inputs["geometry_opacity"] = read("opacity")
     return _finished(
@@ -208,6 +264,9 @@ def standard_surface(maps: Inputs, opaque: bool) -> Graph:
         "thin_walled": Value("boolean", True),
         **frame,
     }
+    if transmits(maps):
+        weight, color, base = _through(b, read, _base(b, read))
+        inputs |= {"base_color": base, "subsurface": weight, "subsurface_color": color}
     if not opaque:
         inputs["opacity"] = b.add(
             "opacity_color", "convert", "color3", "ND_convert_float_color3",

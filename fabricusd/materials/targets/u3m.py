@@ -46,9 +46,11 @@ PILE = "velvet", "velour", "corduroy"
 
 
 def check(where: Path, clobber: bool) -> None:
-    """Raise FabricError if the folder does not exist."""
-    if not where.is_dir():
-        raise FabricError(f"--u3m '{where}'", "is not a folder; create it first")
+    """Raise FabricError if the folder cannot be made."""
+    if where.exists() and not where.is_dir():
+        raise FabricError(f"--u3m '{where}'", "is a file; it must be a folder")
+    if not where.parent.is_dir():
+        raise FabricError(f"--u3m '{where}'", f"is in '{where.parent}', which is not a folder")
 
 
 def folder(look: Path, where: Path) -> Path:
@@ -59,6 +61,10 @@ def folder(look: Path, where: Path) -> Path:
 def write(job: Job, where: Path) -> list[Path]:
     """Write a swatch of each fabric and its pictures."""
     made: list[Path] = []
+    try:
+        where.mkdir(exist_ok=True)
+    except OSError as error:
+        raise FabricError(f"--u3m '{where}'", f"cannot be made: {error.strerror}") from error
     for name, fabric in job.fabrics.items():
         made += write_u3m(fabric, where / f"{name}.u3m", fitted=job.fitted)
     return made

@@ -40,8 +40,9 @@ from fabricusd.reference.rays.embree import aligned_empty, new_packets
 )  # fmt: skip
 HIT_ROWS = 58
 
-# Rows of `Hits.tags`.
-PATH, DEPTH, PRIMITIVE, MATERIAL, LEVEL = range(5)
+# Rows of `Hits.tags`. DEPTH: all bounces of the path so far. THROUGH: those of them at translucent
+# cloth.
+PATH, DEPTH, PRIMITIVE, MATERIAL, LEVEL, THROUGH = range(6)
 
 # Rows of `Lanes.rows`: throughput, pdf of the ray's direction (negative if light sampling does not
 # compete with it), width and spread of the ray's cone.
@@ -71,7 +72,7 @@ class Lanes(NamedTuple):
 
     rays : (packets, ROWS, 16) float32 - as `embree` traces them
     rows : (6, n) float32 - rows LANE_BETA to LANE_SPREAD
-    tags : (2, n) int32 - the lane's path and its depth
+    tags : (3, n) int32 - the lane's path, its depth, and its bounces at translucent cloth
     """
 
     rays: NDArray[np.float32]
@@ -101,7 +102,7 @@ class Hits(NamedTuple):
     """The hits of a batch.
 
     rows : (HIT_ROWS, n) float32 - rows FRONT to CORNERS
-    tags : (5, n) int32 - rows PATH to LEVEL
+    tags : (6, n) int32 - rows PATH to THROUGH
     """
 
     rows: NDArray[np.float32]
@@ -129,12 +130,12 @@ class Wave:
         # Rows at a distance of a power of two would all map to the same few cache lines.
         row = capacity + ROW_PADDING
         self.lanes, self.next_lanes = (
-            Lanes(new_packets(capacity), aligned_empty((6, row)), aligned_empty((2, row), np.int32))
+            Lanes(new_packets(capacity), aligned_empty((6, row)), aligned_empty((3, row), np.int32))
             for _ in range(2)
         )
         self.paths = Paths(*(aligned_empty((capacity,), np.uint32) for _ in range(2)))
         self.queues = Queues(*(aligned_empty((capacity,), np.int32) for _ in range(2)))
-        self.hits = Hits(aligned_empty((HIT_ROWS, row)), aligned_empty((5, row), np.int32))
+        self.hits = Hits(aligned_empty((HIT_ROWS, row)), aligned_empty((6, row), np.int32))
         self.shadows = ShadowRays(
             new_packets(capacity), aligned_empty((4, row)), aligned_empty((capacity,), np.int32)
         )

@@ -66,12 +66,14 @@ AUTO_LEVEL = 3
 class Settings(NamedTuple):
     """What holds for all paths of a picture.
 
-    estimator : MIS to UNIFORM; level : a level or AUTO_LEVEL; max_depth : most bounces of a path
+    estimator : MIS to UNIFORM; level : a level or AUTO_LEVEL
+    max_depth, max_through : most bounces of a path, at translucent cloth and at all other surfaces
     """
 
     estimator: int
     level: int
     max_depth: int
+    max_through: int
 
 
 NUMBERS_PER_STEP = 4
@@ -91,13 +93,14 @@ _ROWS = LIGHT_ROWS + 16
 
 @njit(**KERNEL)
 def arrive(step, settings, count, lanes, paths, numbers, lights, triangles, limits, film, queues,
-           counts):  # fmt: skip
+           counts, lost):  # fmt: skip
     """Add the light that rays hit, and write each lane's queue key; -1 for a lane that ends.
 
     limits : (materials, 4) float32 - `footprint.Limits.row` of a fabric, 0 for a surface without
         levels
     counts : (QUEUES materials,) int64 - filled with the length of each queue; the key of a queue is
         `(3 material + level) 2 + back`
+    lost : (1,) float64 - throughput of the lanes that a bound on bounces ends, added to
     """
     counts[:] = 0
     count = whole(count)
@@ -114,7 +117,7 @@ def arrive(step, settings, count, lanes, paths, numbers, lights, triangles, limi
             _load_levels(start, size, lanes, paths, triangles, limits, counters, block)
             place = np.uint32(2 + NUMBERS_PER_STEP * step + 2)
             _choose_levels(numbers, place, size, counters, block)
-        _give_keys(start, size, settings, lanes, triangles, limits, queues, counts, block)
+        _give_keys(start, size, settings, lanes, triangles, limits, queues, counts, lost, block)
 
 
 @njit(**PART)
@@ -227,15 +230,26 @@ def _choose_levels(numbers, place, size, counters, block):
         block[_LEVEL + x] = R(level)
 
 
+@njit(**INLINE)
+def throughput(rows, k):
+    """What lane `k` still carries: the mean of its channels."""
+    return R(1 / 3) * (rows[LANE_BETA, k] + rows[LANE_BETA + 1, k] + rows[LANE_BETA + 2, k])
+
+
 @njit(**PART)
-def _give_keys(start, size, settings, lanes, triangles, limits, queues, counts, block):
+def _give_keys(start, size, settings, lanes, triangles, limits, queues, counts, lost, block):
     bits, tags, keys = lanes.rays.view(np.uint32), lanes.tags, queues.keys
     level, max_depth, triangle_material = settings.level, settings.max_depth, triangles.material
+    max_through = settings.max_through
     for x in range(size):
         k = start + x
-        # The ray beyond the last surface only sees lights; it is not shaded.
-        if block[REACH + x] >= ENDLESS or tags[1, k] > max_depth:
+        if block[REACH + x] >= ENDLESS:
             keys[k] = -1
+            continue
+        # The ray beyond the last surface only sees lights; it is not shaded.
+        if tags[1, k] - tags[2, k] > max_depth or tags[2, k] > max_through:
+            keys[k] = -1
+            lost[0] += throughput(lanes.rows, k)
             continue
         material = whole(triangle_material[bits[k >> 4, PRIMITIVE, k & 15]])
         queue = FAR_LEVEL

@@ -48,12 +48,14 @@ from fabricusd.reference.rays.wave import (
     LEVEL,
     LIGHT,
     LIGHT_PDF,
+    MATERIAL,
     NORMAL,
     PATH,
     SPREAD,
     TANGENT,
     THREAD,
     THREAD_ID,
+    THROUGH,
     TO_LIGHT,
     UNLIT,
     UV,
@@ -90,13 +92,14 @@ _NONE, _BROKEN = R(-1), R(-2)
 
 
 @njit(**KERNEL)
-def depart(step, settings, count, hits, film, shadows, lanes, result):
+def depart(step, settings, count, translucent, hits, film, shadows, lanes, result):
     """Write the shadow rays and the next rays of all hits, both packed.
 
+    translucent : (materials,) uint8 - 1 for cloth that scatters light to its other side
     lanes : `Lanes` of the next step
     result : (3,) int64 - numbers of shadow rays, next rays and non-finite values
     """
-    estimator, max_depth = settings.estimator, settings.max_depth
+    estimator = settings.estimator
     block = np.empty(_ROWS * BLOCK, np.float32)
     result[:] = 0
     count = whole(count)
@@ -109,8 +112,9 @@ def depart(step, settings, count, hits, film, shadows, lanes, result):
         _onwards(step, estimator == MIS, size, block)
         _write_shadows(start, size, hits, film, shadows, result, block)
         # Trace one ray beyond the last surface: the lights that it sees illuminate that surface.
-        deepest = max_depth if estimator == LIGHT_ONLY else max_depth + 1
-        _write_next(start, size, deepest, hits, lanes, result, block)
+        beyond = 0 if estimator == LIGHT_ONLY else 1
+        deepest = settings.max_depth + beyond, settings.max_through + beyond
+        _write_next(start, size, deepest, translucent, hits, lanes, result, block)
     _fill_up(result[0], shadows.rays)
     _fill_up(result[1], lanes.rays)
 
@@ -267,16 +271,19 @@ def _write_shadows(start, size, hits, film, shadows, result, block):
 
 
 @njit(**PART)
-def _write_next(start, size, deepest, hits, lanes, result, block):
+def _write_next(start, size, deepest, translucent, hits, lanes, result, block):
     tags, (rays, rows, lane_tags) = hits.tags, lanes
+    max_depth, max_through = deepest
     k = whole(result[1])
     for x in range(size):
         h = start + x
-        alive, depth = block[_ALIVE * BLOCK + x], tags[DEPTH, h]
+        alive, depth, through = block[_ALIVE * BLOCK + x], tags[DEPTH, h], tags[THROUGH, h]
+        clear = translucent[tags[MATERIAL, h]] != 0
         straight = block[GO_PDF * BLOCK + x] < R(0)
         if alive == _BROKEN:
             result[2] += 1
-        if alive < R(0) or (depth >= deepest and not straight):
+        at_bound = through >= max_through if clear else depth - through >= max_depth
+        if alive < R(0) or (at_bound and not straight):
             continue
         _write_ray(k, _START * BLOCK + x, _ALONG * BLOCK + x, INFINITE_DISTANCE, rays, block)
         for row in range(3):
@@ -285,6 +292,7 @@ def _write_next(start, size, deepest, hits, lanes, result, block):
         rows[LANE_WIDTH, k] = block[WIDTH * BLOCK + x]
         rows[LANE_SPREAD, k] = block[_SPREAD * BLOCK + x]
         lane_tags[0, k], lane_tags[1, k] = tags[PATH, h], depth if straight else depth + 1
+        lane_tags[2, k] = through + 1 if clear and not straight else through
         k += 1
     result[1] = k
 

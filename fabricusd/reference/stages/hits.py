@@ -46,6 +46,7 @@ from fabricusd.reference.rays.wave import (
     PLACE,
     SIDE,
     SPREAD,
+    THROUGH,
     WI,
     WIDTH,
 )
@@ -144,6 +145,7 @@ def _take(k, h, x, lanes, queues, triangles, block, hits):
     p, lane = k >> 4, k & 15
     triangle, key = bits[p, PRIMITIVE, lane], whole(queues.keys[k])
     tags[PATH, h], tags[DEPTH, h] = lane_tags[0, k], lane_tags[1, k]
+    tags[THROUGH, h] = lane_tags[2, k]
     tags[TRIANGLE, h], tags[MATERIAL, h], tags[LEVEL, h] = triangle, key // 6, (key // 2) % 3
     for row in range(3):
         into[BETA + row, h] = rows[LANE_BETA + row, k]

@@ -57,7 +57,7 @@ from fabricusd.reference.surfaces.preview import build_surfaces, shade_preview
 from fabricusd.scene.scene import Camera, Mesh, PreviewSurface, Scene
 
 R = np.float32
-_SETTINGS = Settings(estimator=0, level=0, max_depth=1)
+_SETTINGS = Settings(estimator=0, level=0, max_depth=1, max_through=0)
 
 
 class _Sample(NamedTuple):
@@ -113,7 +113,7 @@ def _arrive() -> None:
     counts, limits = np.zeros(6, np.int64), np.zeros((1, 4), np.float32)
     arrive(
         0, _SETTINGS, 0, wave.lanes, wave.paths, new_numbers(0), lights, triangles, limits,
-        wave.film, wave.queues, counts,
+        wave.film, wave.queues, counts, np.zeros(1),
     )  # fmt: skip
     sort_lanes(0, wave.queues, np.cumsum(counts) - counts)
 
@@ -135,8 +135,9 @@ def _camera_rays() -> None:
 def _depart() -> None:
     wave = _sample().wave
     depart(
-        0, _SETTINGS, 0, wave.hits, wave.film, wave.shadows, wave.next_lanes, np.zeros(3, np.int64)
-    )
+        0, _SETTINGS, 0, np.zeros(1, np.uint8), wave.hits, wave.film, wave.shadows,
+        wave.next_lanes, np.zeros(3, np.int64),
+    )  # fmt: skip
 
 
 def _trace_and_settle() -> None:

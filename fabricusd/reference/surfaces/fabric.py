@@ -26,6 +26,7 @@ from fabricusd.appearance.law import (
 from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.sampling.blocks import Drawn, sample_points
+from fabricusd.appearance.scattering.models import translucent
 from fabricusd.appearance.shadow.methods import NONE, Shadow, compile_shadow, shade
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
@@ -197,6 +198,7 @@ class FabricShader:
         self.gap = 0.0 if fabric.opaque else float(law.published.gap)
         self.gaps = gap_table(law, fabric.opaque)
         self.is_open = R(0 if fabric.opaque else 1)
+        self.translucent = translucent(fabric)
 
     def __call__(self, level: int, back: int, wave: Wave, first: int, last: int) -> None:
         """Shade the hits from `first` to before `last`, all on one side and at one level."""

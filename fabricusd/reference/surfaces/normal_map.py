@@ -115,15 +115,16 @@ def turn_frames(surfaces, hits, tags, first, last, own):
 
 @njit(**LEAN)
 def end_below(hits, first, last, own):
-    """Drop light from below the unmapped surface, and end the paths that go there.
+    """Drop light that the unmapped surface has on the other side than the mapped one, and end the
+    paths that would go there.
 
     own : (3, last - first) float32 - as filled by `turn_frames`
     """
     first, last = whole(first), whole(last)
     for h in range(first, last):
         x, y, z = own[0, h - first], own[1, h - first], own[2, h - first]
-        lit = R(1) if _dot(hits, WI, h, x, y, z) > R(0) else R(0)
-        out = R(1) if _dot(hits, GO, h, x, y, z) > R(0) else R(0)
+        lit = R(1) if (_dot(hits, WI, h, x, y, z) > R(0)) == (hits[WI + 2, h] > R(0)) else R(0)
+        out = R(1) if (_dot(hits, GO, h, x, y, z) > R(0)) == (hits[GO + 2, h] > R(0)) else R(0)
         for k in range(3):
             hits[F + k, h] *= lit
             hits[WEIGHT + k, h] *= out

@@ -39,11 +39,13 @@ _PI = R(math.pi)
 # Columns of the table of surfaces; each *_MAP is an index into the textures, or -1.
 DIFFUSE, METALLIC, ROUGHNESS, IOR, OPACITY, THRESHOLD, EMISSIVE = 0, 3, 4, 5, 6, 7, 8
 DIFFUSE_MAP, METALLIC_MAP, ROUGHNESS_MAP, OPACITY_MAP, EMISSIVE_MAP = 11, 12, 13, 14, 15
-NORMAL_MAP = 16
-COLUMNS = 17
+NORMAL_MAP, TRANSMISSION_MAP = 16, 17
+TRANSMISSION = 18
+COLUMNS = 21
 _MAPS = {
     "diffuse": DIFFUSE_MAP, "metallic": METALLIC_MAP, "roughness": ROUGHNESS_MAP,
     "opacity": OPACITY_MAP, "emissive": EMISSIVE_MAP, "normal": NORMAL_MAP,
+    "transmission": TRANSMISSION_MAP,
 }  # fmt: skip
 _WRAPS = ("repeat", "clamp", "mirror", "black")
 
@@ -62,7 +64,7 @@ class Surfaces(NamedTuple):
 def build_surfaces(scene: Scene) -> Surfaces:
     """Build the table with one row per material of the scene; the rows of fabrics stay empty."""
     table = np.zeros((max(len(scene.materials), 1), COLUMNS), np.float32)
-    table[:, DIFFUSE_MAP:] = -1.0
+    table[:, DIFFUSE_MAP:TRANSMISSION] = -1.0
     table[:, OPACITY] = 1.0
     maps: list[list[int]] = []
     places: list[tuple[float, ...]] = []
@@ -74,6 +76,7 @@ def build_surfaces(scene: Scene) -> Surfaces:
         row[DIFFUSE : DIFFUSE + 3], row[EMISSIVE : EMISSIVE + 3] = surface.diffuse, surface.emissive
         row[METALLIC], row[ROUGHNESS], row[IOR] = surface.metallic, surface.roughness, surface.ior
         row[OPACITY], row[THRESHOLD] = surface.opacity, surface.opacity_threshold
+        row[TRANSMISSION : TRANSMISSION + 3] = surface.transmission
         for name, column in _MAPS.items():
             texture = surface.textures.get(name)
             if texture is None:
@@ -178,13 +181,14 @@ def emission_at(surfaces, material, u, v):
 
 
 @njit(**INLINE)
-def _fresnel(f0, f90, c):
+def fresnel(f0, f90, c):
+    """Schlick's approximation at the cosine `c`."""
     d = R(1) - c
     d2 = d * d
     return f0 + (f90 - f0) * d2 * d2 * d
 
 
-class _Layers(NamedTuple):
+class Layers(NamedTuple):
     """The surface at a hit: base colour, metallic, the alpha of GGX, the reflectance at normal
     incidence, and the share of samples that the specular layer gets."""
 
@@ -198,7 +202,7 @@ class _Layers(NamedTuple):
 
 
 @njit(**INLINE)
-def _evaluate(layers, wo, wi):
+def evaluate(layers, wo, wi):
     """f times cosine (r, g, b) and pdf of `wi`; 0 unless both directions are above the surface."""
     red, green, blue, metallic, alpha, f0, share = layers
     (ox, oy, oz), (ix, iy, iz) = wo, wi
@@ -216,14 +220,14 @@ def _evaluate(layers, wo, wi):
     visible = R(0.5) * iz / max(iz * go + oz * gi, R(1e-20))
     specular = distribution * visible
     f90 = min(R(50) * f0, R(1))
-    through = R(1) - max(_fresnel(f0, f90, oz), _fresnel(f0, f90, iz))
+    through = R(1) - max(fresnel(f0, f90, oz), fresnel(f0, f90, iz))
     diffuse = (R(1) - metallic) * through * iz / _PI
-    dielectric = _fresnel(f0, f90, c) * (R(1) - metallic)
+    dielectric = fresnel(f0, f90, c) * (R(1) - metallic)
     pdf = share * distribution / max(R(2) * (oz + go), R(1e-20)) + (R(1) - share) * iz / _PI
     above = iz > R(0) and oz > R(0)
-    red = red * diffuse + specular * (dielectric + metallic * _fresnel(red, R(1), c))
-    green = green * diffuse + specular * (dielectric + metallic * _fresnel(green, R(1), c))
-    blue = blue * diffuse + specular * (dielectric + metallic * _fresnel(blue, R(1), c))
+    red = red * diffuse + specular * (dielectric + metallic * fresnel(red, R(1), c))
+    green = green * diffuse + specular * (dielectric + metallic * fresnel(green, R(1), c))
+    blue = blue * diffuse + specular * (dielectric + metallic * fresnel(blue, R(1), c))
     return (
         red if above else R(0), green if above else R(0), blue if above else R(0),
         pdf if above else R(0),
@@ -231,7 +235,7 @@ def _evaluate(layers, wo, wi):
 
 
 @njit(**INLINE)
-def _sample(alpha, share, ox, oy, oz, u0, u1, u2):
+def sample(alpha, share, ox, oy, oz, u0, u1, u2):
     """Sample `wi`: by GGX visible normals with probability `share`, else by the cosine."""
     phi = R(2) * _PI * u1
     c, s = cos(R, phi), sin(R, phi)
@@ -253,16 +257,18 @@ def _sample(alpha, share, ox, oy, oz, u0, u1, u2):
     )
 
 
-_STEP = BLOCK + 16
+STEP = BLOCK + 16
 """Distance between rows of a block. Rows at a distance of a power of two would all map to the same
 few cache lines."""
 
 # Rows of a block: inputs from `Hits.rows`, the surface's properties at each hit, and the results.
-(_O, _I, _CHANCE, _RED, _GREEN, _BLUE, _METALLIC, _ALPHA, _OPACITY, _F, _F_PDF, _GO, _WEIGHT,
- _GO_PDF) = (
-    row * _STEP for row in (0, 3, 6, 10, 11, 12, 13, 14, 15, 16, 19, 20, 23, 26)
+(
+    _O, _I, _CHANCE, RED_ROW, GREEN_ROW, BLUE_ROW, METALLIC_ROW, ALPHA_ROW, OPACITY_ROW, _F, _F_PDF,
+    _GO, _WEIGHT, _GO_PDF,
+) = (
+    row * STEP for row in (0, 3, 6, 10, 11, 12, 13, 14, 15, 16, 19, 20, 23, 26)
 )  # fmt: skip
-_ROWS = 27
+ROWS = 27
 
 
 @njit(**KERNEL)
@@ -271,7 +277,7 @@ def shade_preview(surfaces, hits, tags, first, last):
 
     Fills rows F, F_PDF, GO, WEIGHT, GO_PDF, KEEP and THREAD, and updates the last row of CHANCE.
     """
-    block = np.empty(_ROWS * _STEP, np.float32)
+    block = np.empty(ROWS * STEP, np.float32)
     row = surfaces.table[tags[MATERIAL, first]]
     f0 = (row[IOR] - R(1)) / (row[IOR] + R(1))
     f0 = f0 * f0
@@ -281,32 +287,32 @@ def shade_preview(surfaces, hits, tags, first, last):
             for k in range(count):
                 source = hits[row + k][start:]
                 for x in range(size):
-                    block[place + k * _STEP + x] = source[x]
-        _look_up(surfaces, tags[MATERIAL, first], hits, start, size, block)
+                    block[place + k * STEP + x] = source[x]
+        look_up(surfaces, tags[MATERIAL, first], hits, start, size, block)
         _shade(f0, size, block)
         for row, count, place in (
             (F, 3, _F), (GO, 3, _GO), (WEIGHT, 3, _WEIGHT), (F_PDF, 1, _F_PDF),
-            (GO_PDF, 1, _GO_PDF), (KEEP, 1, _OPACITY), (CHANCE + 3, 1, _CHANCE + 3 * _STEP),
+            (GO_PDF, 1, _GO_PDF), (KEEP, 1, OPACITY_ROW), (CHANCE + 3, 1, _CHANCE + 3 * STEP),
         ):  # fmt: skip
             for k in range(count):
                 target = hits[row + k][start:]
                 for x in range(size):
-                    target[x] = block[place + k * _STEP + x]
+                    target[x] = block[place + k * STEP + x]
         thread = hits[THREAD][start:]
         for x in range(size):
             thread[x] = R(-1)
 
 
 @njit(**PART)
-def _look_up(surfaces, material, hits, start, size, block):
+def look_up(surfaces, material, hits, start, size, block):
     """Look up the surface's properties at each hit of a block."""
     row = surfaces.table[material]
     for x in range(size):
-        block[_RED + x], block[_GREEN + x] = row[DIFFUSE], row[DIFFUSE + 1]
-        block[_BLUE + x], block[_METALLIC + x] = row[DIFFUSE + 2], row[METALLIC]
+        block[RED_ROW + x], block[GREEN_ROW + x] = row[DIFFUSE], row[DIFFUSE + 1]
+        block[BLUE_ROW + x], block[METALLIC_ROW + x] = row[DIFFUSE + 2], row[METALLIC]
         # A lobe of roughness below 0.02 is nearly a mirror; light sampling would make fireflies.
-        block[_ALPHA + x] = max(row[ROUGHNESS] * row[ROUGHNESS], R(4e-4))
-        block[_OPACITY + x] = min(max(row[OPACITY], R(0)), R(1))
+        block[ALPHA_ROW + x] = max(row[ROUGHNESS] * row[ROUGHNESS], R(4e-4))
+        block[OPACITY_ROW + x] = min(max(row[OPACITY], R(0)), R(1))
     textured = row[OPACITY_MAP] >= R(0) or row[THRESHOLD] > R(0)
     if not textured and max(row[DIFFUSE_MAP], max(row[METALLIC_MAP], row[ROUGHNESS_MAP])) < R(0):
         return
@@ -314,41 +320,45 @@ def _look_up(surfaces, material, hits, start, size, block):
         u, v = hits[PLACE, start + x], hits[PLACE + 1, start + x]
         if row[DIFFUSE_MAP] >= R(0):
             red, green, blue = texture_at(surfaces, int(row[DIFFUSE_MAP]), u, v)
-            block[_RED + x], block[_GREEN + x], block[_BLUE + x] = red, green, blue
+            block[RED_ROW + x], block[GREEN_ROW + x], block[BLUE_ROW + x] = red, green, blue
         if row[METALLIC_MAP] >= R(0):
-            block[_METALLIC + x], _, _ = texture_at(surfaces, int(row[METALLIC_MAP]), u, v)
+            block[METALLIC_ROW + x], _, _ = texture_at(surfaces, int(row[METALLIC_MAP]), u, v)
         if row[ROUGHNESS_MAP] >= R(0):
             rough, _, _ = texture_at(surfaces, int(row[ROUGHNESS_MAP]), u, v)
-            block[_ALPHA + x] = max(rough * rough, R(4e-4))
-        block[_OPACITY + x] = opacity_at(surfaces, material, u, v)
+            block[ALPHA_ROW + x] = max(rough * rough, R(4e-4))
+        block[OPACITY_ROW + x] = opacity_at(surfaces, material, u, v)
 
 
 @njit(**PART)
 def _shade(f0, size, block):
     """Evaluate and sample a block in one loop without branches, which LLVM vectorises."""
     for x in range(size):
-        red, green, blue = block[_RED + x], block[_GREEN + x], block[_BLUE + x]
-        metallic, alpha, opacity = block[_METALLIC + x], block[_ALPHA + x], block[_OPACITY + x]
-        ox, oy, oz = block[_O + x], block[_O + _STEP + x], block[_O + 2 * _STEP + x]
-        gloss = metallic + (R(1) - metallic) * _fresnel(f0, min(R(50) * f0, R(1)), oz)
+        red, green, blue = block[RED_ROW + x], block[GREEN_ROW + x], block[BLUE_ROW + x]
+        metallic, alpha, opacity = (
+            block[METALLIC_ROW + x],
+            block[ALPHA_ROW + x],
+            block[OPACITY_ROW + x],
+        )
+        ox, oy, oz = block[_O + x], block[_O + STEP + x], block[_O + 2 * STEP + x]
+        gloss = metallic + (R(1) - metallic) * fresnel(f0, min(R(50) * f0, R(1)), oz)
         base = max(red, max(green, blue)) * (R(1) - metallic)
         share = gloss / max(gloss + base, R(1e-6))
         share = R(0) if gloss <= R(0) else min(max(share, R(0.1)), R(1))
-        layers = _Layers(red, green, blue, metallic, alpha, f0, share)
-        wi = block[_I + x], block[_I + _STEP + x], block[_I + 2 * _STEP + x]
-        fr, fg, fb, pdf = _evaluate(layers, (ox, oy, oz), wi)
-        block[_F + x], block[_F + _STEP + x] = opacity * fr, opacity * fg
-        block[_F + 2 * _STEP + x], block[_F_PDF + x] = opacity * fb, opacity * pdf
-        gx, gy, gz = _sample(
+        layers = Layers(red, green, blue, metallic, alpha, f0, share)
+        wi = block[_I + x], block[_I + STEP + x], block[_I + 2 * STEP + x]
+        fr, fg, fb, pdf = evaluate(layers, (ox, oy, oz), wi)
+        block[_F + x], block[_F + STEP + x] = opacity * fr, opacity * fg
+        block[_F + 2 * STEP + x], block[_F_PDF + x] = opacity * fb, opacity * pdf
+        gx, gy, gz = sample(
             alpha, share, ox, oy, oz,
-            block[_CHANCE + x], block[_CHANCE + _STEP + x], block[_CHANCE + 2 * _STEP + x],
+            block[_CHANCE + x], block[_CHANCE + STEP + x], block[_CHANCE + 2 * STEP + x],
         )  # fmt: skip
-        wr, wg, wb, pdf = _evaluate(layers, (ox, oy, oz), (gx, gy, gz))
-        block[_GO + x], block[_GO + _STEP + x], block[_GO + 2 * _STEP + x] = gx, gy, gz
+        wr, wg, wb, pdf = evaluate(layers, (ox, oy, oz), (gx, gy, gz))
+        block[_GO + x], block[_GO + STEP + x], block[_GO + 2 * STEP + x] = gx, gy, gz
         inverse = R(1) / pdf if pdf > R(0) else R(0)
-        block[_WEIGHT + x], block[_WEIGHT + _STEP + x] = wr * inverse, wg * inverse
-        block[_WEIGHT + 2 * _STEP + x] = wb * inverse
-        chance = block[_CHANCE + 3 * _STEP + x]
+        block[_WEIGHT + x], block[_WEIGHT + STEP + x] = wr * inverse, wg * inverse
+        block[_WEIGHT + 2 * STEP + x] = wb * inverse
+        chance = block[_CHANCE + 3 * STEP + x]
         straight = chance >= opacity
         block[_GO_PDF + x] = R(-1) if straight else opacity * pdf
-        block[_CHANCE + 3 * _STEP + x] = chance if straight else chance / opacity
+        block[_CHANCE + 3 * STEP + x] = chance if straight else chance / opacity

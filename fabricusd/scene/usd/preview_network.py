@@ -91,8 +91,42 @@ class PreviewNetwork:
                 values[row.field] = self._constant(name, row, source)
         self._keep_normal(values, textures)
         self._note_left_out(shader)
+        self._thin_sheet(values, textures)
         known = {field: value for field, value in values.items() if value is not None}
         return PreviewSurface(name=self.where, textures=textures, **known), self.uv_set
+
+    def _thin_sheet(self, values: dict[str, Any], textures: dict[str, Texture]) -> None:
+        """Read the light through a thin sheet that a look of fabricusd has beside its preview.
+
+        UsdPreviewSurface has none. In the look's MaterialX network it is the node `through_scaled`:
+        an image or a colour times the material's `transmission_scale`.
+        """
+        node = UsdShade.Shader(self.material.GetPrim().GetChild("through_scaled"))
+        given = self.material.GetInput("transmission_scale")
+        if not node or not given:
+            return
+        row = _Input("transmission", COLOR, 0.0, 1.0, True)
+        scale = _numbers(given.Get(self.time), 3)
+        source, _ = self._source(node, "in1")
+        if scale is None:
+            self._note(f"has transmission_scale {given.Get(self.time)}; it must be {COLOR}, and no "
+                       "light comes through")  # fmt: skip
+        elif isinstance(source, UsdShade.Shader):
+            try:
+                pixels, tiles = self._pixels(source, True, None)
+            except FabricError as error:
+                self._note(f"lets no light through: {error}")
+                return
+            found = self._sound(
+                "transmission_color", row, pixels[..., :3] * scale.astype(np.float32)
+            )
+            place = np.eye(3) if tiles is None else tiles
+            wrap = "clamp" if tiles is None else "black"
+            textures[row.field] = Texture(
+                pixels=found, wrap=(wrap, wrap), place=tuple(place[:2].ravel())
+            )
+        elif source is not None and (color := _numbers(source, 3)) is not None:
+            values[row.field] = tuple(float(x) for x in np.clip(color * scale, 0.0, 1.0))
 
     def _note(self, problem: str) -> None:
         self.scene.note(self.where, problem)

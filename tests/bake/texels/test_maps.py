@@ -26,7 +26,6 @@ from fabricusd.bake.texels.maps import REGISTRY, chosen_maps
 from fabricusd.bake.texels.moment_indices import COVER, HORIZON, MOMENTS, SHARE
 from fabricusd.bake.texels.moments import texels
 from fabricusd.bake.texels.recipe import recipe
-from fabricusd.bake.texels.reflectance import reflectance_table
 from fabricusd.bake.texels.sheet import sheets_of, texel_start, texel_step
 from fabricusd.errors import FabricError
 from fabricusd.quality.colors import delta_e_2000
@@ -243,11 +242,6 @@ def test_ids_and_coordinates_are_those_of_the_texels_centre_at_every_level():
         ids = maps["thread_id"][level].ravel()
         expected = np.where(hit.gap, NO_THREAD, hit.thread + 2 * (hit.set == 1))
         assert (ids == expected).mean() > 0.995
-
-
-def test_a_model_that_is_not_baked_is_refused():
-    with pytest.raises(FabricError, match="conserving"):
-        reflectance_table(replace(load("linen_plain"), model="conserving"))
 
 
 def test_unknown_maps_and_a_shadow_without_a_light_are_refused():

@@ -40,6 +40,11 @@ def any_conserving(fabric: Fabric) -> bool:
     return any(model_of(fabric, t).law == CONSERVING for t in fabric.thread_list)
 
 
+def translucent(fabric: Fabric) -> bool:
+    """Whether threads scatter light to the other side of the cloth."""
+    return not fabric.opaque and any_conserving(fabric)
+
+
 def any_published(fabric: Fabric) -> bool:
     """Whether any thread follows the published law."""
     return any(model_of(fabric, t).law == PUBLISHED for t in fabric.thread_list)

@@ -18,7 +18,7 @@ bl_info = {
     "version": (1, 0, 0),
     "blender": (4, 4, 0),
     "category": "Import-Export",
-    "description": "Restores anisotropy, tangents and sheen of baked fabrics on USD import",
+    "description": "Restores anisotropy, tangents, sheen and light through on USD import",
 }
 
 SURFACE = "ND_open_pbr_surface_surfaceshader"
@@ -164,7 +164,33 @@ def rebuild(material: Any, network: Network) -> None:
     normal = network.file("normal")
     if normal is not None:
         give("Normal", nodes.world(nodes.image(normal, data=True)))
+    if network.material.GetInput("transmission_scale"):
+        _light_through(nodes, network, surface, output)
     _arrange(tree)
+
+
+def _light_through(nodes: Nodes, network: Network, surface: Any, output: Any) -> None:
+    """Add a Translucent BSDF: the Principled BSDF has no light through a thin sheet."""
+    tree = nodes.tree
+    scale = tuple(network.constant("transmission_scale"))
+    file = network.file("transmission_color")
+    if file is not None:
+        color = nodes.vector("MULTIPLY", nodes.image(file, data=False), scale)
+        color = nodes.vector("MINIMUM", color, (1.0, 1.0, 1.0))
+    else:
+        fixed = network.fixed("through_scaled", "in1") or (0.0, 0.0, 0.0)
+        color = tuple(min(c * s, 1.0) for c, s in zip(fixed, scale, strict=True))
+    # The sheet is not there in a gap, and the Principled BSDF's own alpha does not dim it.
+    alpha = surface.inputs["Alpha"]
+    cover = nodes.tree.nodes.new("ShaderNodeCombineXYZ")
+    for socket in cover.inputs:
+        nodes.set(socket, alpha.links[0].from_socket if alpha.is_linked else alpha.default_value)
+    translucent = tree.nodes.new("ShaderNodeBsdfTranslucent")
+    nodes.set(translucent.inputs["Color"], nodes.vector("MULTIPLY", color, cover.outputs[0]))
+    both = tree.nodes.new("ShaderNodeAddShader")
+    tree.links.new(surface.outputs[0], both.inputs[0])
+    tree.links.new(translucent.outputs[0], both.inputs[1])
+    tree.links.new(both.outputs[0], output.inputs["Surface"])
 
 
 def _reflection(nodes: Nodes, network: Network, give: Any) -> None:
@@ -235,7 +261,7 @@ class FabricLooks(bpy.types.USDHook):  # type: ignore[misc]
 
     bl_idname = "fabricusd_looks"
     bl_label = "fabricusd looks"
-    bl_description = "Restores anisotropy, tangents and sheen of baked fabrics"
+    bl_description = "Restores anisotropy, tangents, sheen and light through baked fabrics"
 
     @staticmethod
     def on_import(import_context: Any) -> bool:
