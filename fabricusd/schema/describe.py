@@ -10,6 +10,7 @@ import numpy as np
 
 from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage
 from fabricusd.fabric import Fabric, TangentCurve, Thread, ThreadSet
+from fabricusd.weaves.floats import longest_float
 
 INCHES_PER_METRE = 1 / 0.0254
 
@@ -70,26 +71,6 @@ def _sequence(sequence: tuple[int, ...], names: list[str], longest: int = 8) -> 
     words = [f"{count} {names[index]}" for count, index in runs[:longest]]
     more = f", and {len(runs) - longest} more" if len(runs) > longest else ""
     return ", ".join(words) + more
-
-
-def longest_float(cells: np.ndarray[Any, np.dtype[np.bool_]], axis: int) -> int | None:
-    """Longest run of warp on top along axis 1, or of weft on top along axis 0; None where endless.
-
-    Runs go on across the repeat's border.
-    """
-    on_top = cells if axis == 1 else ~cells.T
-    broken = on_top[~on_top.all(axis=1)]
-    if len(broken) < len(on_top):
-        return None
-    longest = 0
-    # A stripe of rows at a time: the run starts and ends of a whole jacquard would take a gigabyte.
-    for first in range(0, len(broken), 128):
-        stripe = broken[first : first + 128]
-        twice = np.zeros((stripe.shape[0], 2 * stripe.shape[1] + 1), np.bool_)
-        twice[:, 1:] = np.tile(stripe, (1, 2))
-        breaks = np.flatnonzero(~twice)
-        longest = max(longest, int(np.diff(np.append(breaks, twice.size)).max()) - 1)
-    return longest
 
 
 def _floats(cells: np.ndarray[Any, np.dtype[np.bool_]]) -> str:
