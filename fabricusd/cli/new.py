@@ -7,7 +7,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from fabricusd.cli.arguments.draft import add_colors, add_figure, add_sources, given_draft
-from fabricusd.cli.arguments.number import number
+from fabricusd.cli.arguments.yarn import add_yarns, settle_densities, spun
 from fabricusd.cli.stdout import write_utf8
 from fabricusd.errors import FabricError
 
@@ -19,6 +19,7 @@ SOURCES = ("preset", "weave", "source", "wif", "image", "figure", "tartan", "str
 
 NOT_OF_PRESETS = (
     "tartan", "stripes", "palette", "thread", "warp_color", "weft_color", "thickness", "invert",
+    "yarn", "warp_yarn", "weft_yarn",
 )  # fmt: skip
 """Options that a preset, whose threads and weave are what they are, cannot follow."""
 
@@ -31,6 +32,8 @@ example:
   fabricusd new --weave "twill 2/2" --warp-color "4*#111" "4*#eee" -o houndstooth.usda
   fabricusd new --tartan "B24 W4 B24 R2 K24" --ends-per-cm 22 --picks-per-cm 22 -o tartan.usda
   fabricusd new --figure rose.png --figure-ends 480 --ends-per-cm 60 --picks-per-cm 40 -o rose.usda
+  fabricusd new --weave "twill 3/1" --warp-yarn "Ne 7" --weft-yarn "Ne 8" --ends-per-inch 68 \\
+      --picks-per-inch 44 --weight 14oz --warp-color "#1f2a4d" --weft-color "#ddd" -o denim14.usda
   fabricusd new --from 8452.wif --thread linen_plain -o draft.usda"""
 
 
@@ -51,19 +54,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--thread",
         metavar="FABRIC[:THREAD]",
-        help="make the threads scatter like those of this fabric file or preset",
-    )
-    for which, noun in (("warp", "ends"), ("weft", "picks")):
-        density = f"{noun}_per_cm"
-        parser.add_argument(
-            f"--{noun}-per-cm", type=number(density), metavar="N", help=f"density of the {which}"
-        )
-    parser.add_argument(
-        "--thickness", type=number("thickness"), metavar="MM", help="thickness of the threads"
+        help="make the threads scatter like those of this fabric file or preset; their size stays",
     )
     parser.add_argument(
         "--invert", action="store_true", help="in an image, white means warp on top"
     )
+    add_yarns(parser)
     add_figure(parser)
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
     parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
@@ -84,10 +80,11 @@ def run(options: argparse.Namespace) -> int:
         )
     if options.output == "-":
         options.output = None
+    settle_densities(options)
     fabric, notes = _fabric(options)
-    fabric = _changed(fabric, options)
+    fabric, spinning = spun(_changed(fabric, options), options)
     _write(fabric, options)
-    for note in notes:
+    for note in (*notes, *spinning):
         if not options.quiet:
             print(f"fabricusd: {note}", file=sys.stderr)
     return 0
@@ -134,19 +131,18 @@ def _base_thread(options: argparse.Namespace) -> Thread:
     from fabricusd.schema.anysource import load_any
     from fabricusd.weaves import DEFAULT_THREAD
 
-    thread = DEFAULT_THREAD
-    if options.thread:
-        file, _, wanted = options.thread.partition(":")
-        fabric, _notes = load_any(file)
-        if wanted and wanted not in fabric.threads:
-            raise FabricError(
-                f"--thread '{options.thread}'",
-                f"is not a thread of {file}; it must be one of {', '.join(fabric.threads)}",
-            )
-        thread = fabric.threads[wanted or next(iter(fabric.threads))]
-    if options.thickness is not None:
-        thread = replace(thread, thickness=options.thickness * 1e-3)
-    return thread
+    if not options.thread:
+        return DEFAULT_THREAD
+    file, _, wanted = options.thread.partition(":")
+    fabric, _notes = load_any(file)
+    if wanted and wanted not in fabric.threads:
+        raise FabricError(
+            f"--thread '{options.thread}'",
+            f"is not a thread of {file}; it must be one of {', '.join(fabric.threads)}",
+        )
+    thread = fabric.threads[wanted or next(iter(fabric.threads))]
+    # How it scatters is a matter of the fibre; how thick it is, of this cloth.
+    return replace(thread, thickness=0.0, linear_density=0.0)
 
 
 def _changed(fabric: Fabric, options: argparse.Namespace) -> Fabric:

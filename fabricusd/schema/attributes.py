@@ -17,6 +17,7 @@ from fabricusd.fabric import Binding, Fabric, Thread, ThreadSet
 DEGREE = math.pi / 180.0
 MILLIMETRE = 1e-3
 PER_CENTIMETRE = 100.0
+TEX = 1e-6
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ THREAD = (
     Attribute("thread:gammaVolume", "double", Thread, "gamma_volume", DEGREE, "degrees"),
     Attribute("thread:surfaceGain", "double", Thread, "surface_gain"),
     Attribute("thread:thickness", "double", Thread, "thickness", MILLIMETRE, "mm"),
+    Attribute("thread:linearDensity", "double", Thread, "linear_density", TEX, "tex"),
     Attribute("thread:color", "color3d", Thread, "color"),
 )
 """Numbers of a WovenThread; its curve and its model are read apart."""

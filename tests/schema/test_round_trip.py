@@ -61,6 +61,7 @@ OTHER_VALUES = {
     "thread:albedo": (0.1, 0.2, 0.3), "thread:color": (0.3, 0.2, 0.1), "thread:ior": 1.7,
     "thread:isotropic": 0.9, "thread:gammaSurface": 3.0, "thread:gammaVolume": 6.0,
     "thread:surfaceGain": 0.125, "thread:model": "thesis", "thread:thickness": 0.75,
+    "thread:linearDensity": 20.0,
     "thread:curve:positions": [0.0, 0.0, 1.0], "thread:curve:angles": [-10.0, 20.0, 30.0],
 }  # fmt: skip
 

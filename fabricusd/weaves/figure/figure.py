@@ -54,8 +54,8 @@ class Figure:
 def read_figure(path: str | os.PathLike[str], figure: Figure | None = None) -> Draft:
     """The draft that weaves the artwork in the file `path`.
 
-    Of a figure of one region, the warp has the figure's colour and the weft the ground's. The
-    draft's warnings say how large the repeat is, which colour is which weave, and how long the
+    The warp has the colour of the figure's largest region, and the weft the ground's. The draft's
+    warnings say how large the repeat is, which colour is which weave, and how long the
     floats are.
 
     Raises FabricError for a file that is not a picture, for a weave that is not one, for colours
@@ -85,12 +85,12 @@ def read_figure(path: str | os.PathLike[str], figure: Figure | None = None) -> D
             f"Some floats stay longer than {longest} threads; allow more, or draw it coarser."
         )
     palette = palette_from_codes(colors)
-    one = len(weaves) == 2
+    largest = 1 + int(np.argmax(np.bincount(region.ravel(), minlength=len(colors))[1:]))
     return Draft(
         weave=Weave(cells, Path(path).stem),
-        palette=(palette[1], palette[0]) if one else (),
-        warp_colors=(0,) if one else (),
-        weft_colors=(1,) if one else (),
+        palette=(palette[largest], palette[0]),
+        warp_colors=(0,),
+        weft_colors=(1,),
         title=Path(path).stem,
         source=Path(path).name,
         warnings=tuple(notes),

@@ -90,11 +90,11 @@ def test_any_number_of_regions_is_told_by_colour(drawn: Path) -> None:
     draft = read_figure(drawn, Figure(weaves=weaves, ground_weave="satin 5 weft"))
     satin = parse_weave("satin 5").weave.cells
     assert np.array_equal(draft.weave.cells[55:65, 55:65], np.tile(satin, (2, 2)))
-    assert draft.palette == ()
+    assert draft.palette == (parse_color("#961e28"), parse_color("#f0e8d7"))
     assert "#1e326e in plain" in draft.warnings[0]
 
 
-def test_a_figure_of_one_colour_has_it_in_the_warp_and_the_ground_in_the_weft(drawn: Path) -> None:
+def test_a_figure_has_its_colour_in_the_warp_and_the_ground_in_the_weft(drawn: Path) -> None:
     draft = read_figure(drawn)
     assert len(draft.palette) == 2
     assert draft.palette[draft.weft_colors[0]] == parse_color("#f0e8d7")
