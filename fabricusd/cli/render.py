@@ -89,7 +89,15 @@ def _add_picture(parser: argparse.ArgumentParser) -> None:
         type=number("exposure"),
         default=0.0,
         metavar="STOPS",
-        help="exposure of the .png (default: 0)",
+        help="exposure of the .png, in stops (default: 0)",
+    )
+    parser.add_argument(
+        "--view",
+        default="neutral",
+        metavar="VIEW",
+        help="how the .png shows the light: neutral (Khronos PBR Neutral: colours as they are, "
+        "highlights rolled off), srgb (clipped), aces, or 'ocio CONFIG[:VIEW]' in quotes, with the "
+        "file or name of an OpenColorIO config (default: neutral)",
     )
 
 
@@ -137,9 +145,11 @@ def _add_quality(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Render, and report what was left out."""
     require_picture(options.width, options.height)
+    from fabricusd.images.view import parse_view
     from fabricusd.reference import AOVS, read_scene, render
     from fabricusd.scene.size import mesh_words
 
+    options.view = parse_view(options.view)
     frames = None if options.frames is None else parse_frames(options.frames)
     output = Path(options.output)
     if options.no_clobber:
@@ -177,7 +187,8 @@ def run(options: argparse.Namespace) -> int:
             max_bounces=options.max_bounces, level=options.level, shadow=options.shadow,
             limits=options.limits, aovs=layers, frames=frames, seed=options.seed,
             workers=options.workers, exposure=options.exposure,
-            complexity=options.complexity, units=options.units, progress=progress,
+            view=options.view, complexity=options.complexity, units=options.units,
+            progress=progress,
         )  # fmt: skip
     finally:
         bar()

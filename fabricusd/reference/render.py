@@ -21,6 +21,7 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.files import require_writable
 from fabricusd.images.files import write_exr, write_png
+from fabricusd.images.view import View, encode, parse_view
 from fabricusd.ranges import RANGES, require_picture, require_ranges
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.film import AOVS, Film, require_aovs
@@ -29,7 +30,6 @@ from fabricusd.reference.nothing_seen import reason_for_nothing
 from fabricusd.reference.rays.camera import Lens, build_lens, default_camera
 from fabricusd.reference.rays.wave import ALPHA, Wave
 from fabricusd.reference.start.compile_ahead import EVERY_PICTURE, compile_ahead
-from fabricusd.reference.view_transform import view
 from fabricusd.run.workers import Batches, pixels_along_z_curve, worker_count
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.scene import Camera, Scene
@@ -104,6 +104,7 @@ def render(
     workers: int | None = None,
     pixel_filter: str = "tent",
     exposure: float = 0.0,
+    view: str | View = "neutral",
     estimator: str = "mis",
     complexity: str = "auto",
     units: str | None = None,
@@ -119,6 +120,7 @@ def render(
     noise : stop sampling a pixel when its relative error is below this
     frames : time codes; None for the stage's default time
     exposure : of the PNG, in stops, added to the camera's own
+    view : of the PNG, see `images.view`: "neutral", "srgb", "aces" or "ocio CONFIG[:VIEW]"
     complexity : how finely subdivision surfaces are refined: "low" (their cages), "medium", "high"
         or "veryhigh" as in usdrecord and usdview, or "auto" for what the picture can show
     units : of an .obj or .ply, see `read_scene`
@@ -128,6 +130,7 @@ def render(
     """
     _require_settings(width, height, spp, noise, max_bounces, seed, workers)
     require_ranges(exposure=exposure)
+    shown = view if isinstance(view, View) else parse_view(view, "view")
     if shadow not in METHODS:
         raise FabricError("shadow", f"is '{shadow}'; it must be one of {', '.join(METHODS)}")
     layers = tuple(dict.fromkeys(("beauty", *aovs)))
@@ -152,9 +155,9 @@ def render(
                 progress=progress and _of_frame(progress, number, len(targets), begun),
             )  # fmt: skip
             stops = exposure + (loaded.camera.exposure if loaded.camera else 0.0)
-            result.metadata.update(_asked_for(scene, time_code, stops))
+            result.metadata.update(_asked_for(scene, time_code, stops, shown))
             if target is not None:
-                paths += _write(target, result, stops)
+                paths += _write(target, result, stops, shown)
             # Keep only the last frame's layers: those of all frames would fill the memory.
             frame_results = [replace(r, layers={}) for r in frame_results] + [result]
             stop.release()
@@ -239,9 +242,9 @@ def written_files(target: Path) -> list[Path]:
     return list(dict.fromkeys([target, target.with_suffix(".png")]))
 
 
-def _asked_for(source: Any, time_code: float | None, stops: float) -> dict[str, Any]:
+def _asked_for(source: Any, time_code: float | None, stops: float, shown: View) -> dict[str, Any]:
     """The metadata that tell a picture's source and how its PNG was made."""
-    known: dict[str, Any] = {"fabricusd:exposure": stops}
+    known: dict[str, Any] = {"fabricusd:exposure": stops, "fabricusd:view": str(shown)}
     if not isinstance(source, Scene):
         known["fabricusd:scene"] = os.fspath(source)
     if time_code is not None:
@@ -249,13 +252,15 @@ def _asked_for(source: Any, time_code: float | None, stops: float) -> dict[str, 
     return known
 
 
-def _write(target: Path, result: RenderResult, exposure: float) -> tuple[str, ...]:
+def _write(target: Path, result: RenderResult, exposure: float, shown: View) -> tuple[str, ...]:
     """Write the picture's files and return their names."""
-    picture = view(result.layers["beauty"][..., :3], exposure)
+    picture = encode(result.layers["beauty"][..., :3], exposure, shown)
     files = written_files(target)
     if target.suffix.lower() == ".exr":
         write_exr(target, result.layers, AOVS, result.metadata)
-    write_png(files[-1], picture)
+    made_how = {key: result.metadata[key] for key in ("Software", "fabricusd:view")}
+    made_how["fabricusd:exposure"] = f"{exposure:g}"
+    write_png(files[-1], picture, metadata=made_how)
     return tuple(str(file) for file in files)
 
 

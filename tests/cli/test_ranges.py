@@ -210,11 +210,11 @@ def test_so_many_workers_are_refused_where_they_are_counted():
 
 
 def test_a_camera_of_any_exposure_makes_a_picture():
-    from fabricusd.reference.view_transform import view
+    from fabricusd.images.view import encode
 
     for stops in (1e5, -1e5, 1e308, float("inf"), -float("inf")):
-        code = view(np.array([[[0.5, 3e38, 0.0]]], np.float32), stops)
-        assert code.tolist() == ([[[255, 255, 0]]] if stops > 0 else [[[0, 0, 0]]])
+        code = encode(np.array([[[0.5, 3e38, 0.0]]], np.float32), stops)
+        assert code.tolist() == ([[[255, 255, 255]]] if stops > 0 else [[[0, 0, 0]]])
 
 
 def test_options_are_described_with_a_type_that_argparse_can_name():
