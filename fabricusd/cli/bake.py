@@ -20,11 +20,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to bake, at which resolution, into which maps."""
     parser.add_argument("scene", metavar="SCENE", nargs="?", help="USD, OBJ, glTF or PLY file")
     parser.add_argument(
-        "--fabric", metavar="FILE[:/PRIM]", help="fabric for meshes that are bound to none"
+        "--fabric",
+        metavar="FILE[:/PRIM]",
+        help="fabric for meshes that are bound to none (default: leave them out)",
     )
     add_units(parser)
-    parser.add_argument("--mesh", metavar="PATH", help="bake only this mesh")
-    parser.add_argument("-o", "--output", metavar="DIR", help="folder for the textures")
+    parser.add_argument(
+        "--mesh", metavar="PATH", help="prim path of the only mesh to bake (default: every mesh)"
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="DIR", help="folder for the textures (no default)"
+    )
     finely = parser.add_mutually_exclusive_group()
     finely.add_argument(
         "--resolution", type=int, metavar="N", help="texels per side (default: 1024)"
@@ -33,7 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--texels-per-thread",
         type=float,
         metavar="X",
-        help="choose the resolution that gives a thread this many texels",
+        help="choose the resolution that gives a thread this many texels (default: by "
+        "--resolution)",
     )
     parser.add_argument("--maps", nargs="+", metavar="MAP", help="maps to bake (default: all)")
     parser.add_argument("--list-maps", action="store_true", help="list the maps and exit")
@@ -45,10 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     layout.add_argument(
         "--unwrap",
         choices=("x", "y", "z"),
-        help="make new UVs, with the warp along this world axis",
+        help="make new UVs, with the warp along this world axis (default: the UVs of the mesh)",
     )
     parser.add_argument(
-        "--light", metavar="X,Y,Z", help="direction to the light of the map 'shadow'"
+        "--light",
+        metavar="X,Y,Z",
+        help="direction to the light of the map 'shadow', in the surface's frame (default: no "
+        "such map)",
     )
     parser.add_argument(
         "--shadow",
@@ -73,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--btf",
         nargs="+",
         metavar="FORM",
-        help="also write a BTF of each fabric: ubo, ubo-joint, factored, atlas",
+        help="also write a BTF of each fabric: ubo, ubo-joint, factored, atlas (default: none)",
     )
     parser.add_argument(
         "--format",

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from fabricusd.cli.arguments.draft import add_colors, add_figure, add_sources, given_draft
 from fabricusd.cli.arguments.yarn import add_yarns, settle_densities, spun
-from fabricusd.cli.stdout import write_utf8
-from fabricusd.errors import FabricError
+from fabricusd.cli.terminal.stdout import write_utf8
+from fabricusd.errors import FabricError, did_you_mean
 
 if TYPE_CHECKING:
     from fabricusd.fabric import Fabric, Thread
@@ -54,7 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--thread",
         metavar="FABRIC[:THREAD]",
-        help="make the threads scatter like those of this fabric file or preset; their size stays",
+        help="make the threads scatter like those of this fabric file or preset; their size stays "
+        "(default: a plain spun thread)",
     )
     parser.add_argument(
         "--invert", action="store_true", help="in an image, white means warp on top"
@@ -99,7 +100,9 @@ def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
         if options.preset not in preset_names():
             raise FabricError(
                 "",
-                f"there is no preset {quoted(options.preset)}; see 'fabricusd new --list-presets'",
+                f"there is no preset {quoted(options.preset)}"
+                f"{did_you_mean(options.preset, preset_names())}; see 'fabricusd new "
+                "--list-presets'",
             )
         for option in NOT_OF_PRESETS:
             # Compare by identity, since 0 == False.
@@ -138,7 +141,8 @@ def _base_thread(options: argparse.Namespace) -> Thread:
     if wanted and wanted not in fabric.threads:
         raise FabricError(
             f"--thread '{options.thread}'",
-            f"is not a thread of {file}; it must be one of {', '.join(fabric.threads)}",
+            f"is not a thread of {file}{did_you_mean(wanted, fabric.threads)}; it must be one of "
+            f"{', '.join(fabric.threads)}",
         )
     thread = fabric.threads[wanted or next(iter(fabric.threads))]
     # How it scatters is a matter of the fibre; how thick it is, of this cloth.

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fabric",
         metavar="FILE[:/PRIM]",
-        help="fabric file, draft or preset for meshes without a fabric",
+        help="fabric file, draft or preset for meshes without a fabric (default: they are grey)",
     )
     add_units(parser)
     _add_picture(parser)
@@ -63,7 +63,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _add_picture(parser: argparse.ArgumentParser) -> None:
     """What the picture shows and holds."""
     parser.add_argument(
-        "--camera", metavar="PATH", help="prim path of the camera (default: the first one)"
+        "--camera",
+        metavar="NAME",
+        help="prim path of the camera, or its name if no other has it (default: the first one)",
     )
     parser.add_argument(
         "--width",
@@ -79,10 +81,12 @@ def _add_picture(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="LAYER",
-        help="also write this layer, or 'all' (repeatable)",
+        help="also write this layer of the .exr, or 'all' (repeatable; default: beauty alone)",
     )
     parser.add_argument(
-        "--frames", metavar="A-B", help="time codes to render: 7, 1-10, 1-10x2, or a list of these"
+        "--frames",
+        metavar="A-B",
+        help="time codes to render: 7, 1-10, 1-10x2, or a list of these (default: the first)",
     )
     parser.add_argument(
         "--exposure",
@@ -110,7 +114,8 @@ def _add_quality(parser: argparse.ArgumentParser) -> None:
         "--noise",
         type=number("noise"),
         metavar="E",
-        help="stop sampling a pixel at this relative error",
+        help="stop sampling a pixel at this relative error, 0.05 for 5 %% (default: sample all "
+        "alike)",
     )
     parser.add_argument(
         "--max-bounces",
@@ -134,11 +139,14 @@ def _add_quality(parser: argparse.ArgumentParser) -> None:
         "--max-error",
         type=number("max_error"),
         metavar="E",
-        help="choose --shadow, --noise and the level for an error of at most this",
+        help="choose --shadow, --noise and the level for a relative error of at most this "
+        "(default: as "
+        "they are given)",
     )
     parser.add_argument(
         "--complexity", choices=("auto", "low", "medium", "high", "veryhigh"), default="auto",
-        help="refinement of subdivision surfaces; low: none; auto: as fine as the picture shows",
+        help="refinement of subdivision surfaces; low: none; auto: as fine as the picture shows "
+        "(default: auto)",
     )  # fmt: skip
 
 

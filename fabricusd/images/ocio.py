@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from fabricusd.errors import FabricError, one_line
+from fabricusd.errors import FabricError, did_you_mean, one_line
 
 LINEAR = "lin_rec709"
 """The colour space of every rendering, by the alias that configs give it."""
@@ -65,11 +64,10 @@ def _display_and_view(config: Any, view: str, where: str) -> tuple[str, str]:
     if not name:
         return display, str(config.getDefaultViewName(display))
     if name not in views:
-        near = difflib.get_close_matches(name, views, n=1)
-        hint = f" (did you mean '{near[0]}'?)" if near else ""
         raise FabricError(
             where,
-            f"has the view '{one_line(name, 60)}'{hint}; of '{display}' it must be one of "
+            f"has the view '{one_line(name, 60)}'{did_you_mean(name, views)}; of '{display}' it "
+            "must be one of "
             f"{', '.join(views)}",
         )
     return display, name

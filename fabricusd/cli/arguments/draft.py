@@ -19,9 +19,17 @@ FIGURE_ONLY = ("figure_weave", "ground_weave", "ground_color", "figure_ends", "f
 
 def add_sources(source: Any) -> None:
     """Where the weave comes from; `source` is a group of which one is given."""
-    source.add_argument("--weave", metavar="WEAVE", help="a named weave or an expression")
     source.add_argument(
-        "--from", dest="source", metavar="FILE", help="a WIF draft or an image, told by its suffix"
+        "--weave",
+        metavar="WEAVE",
+        help="a named weave or an expression (default with --tartan: twill 2/2, with --stripes: "
+        "plain)",
+    )
+    source.add_argument(
+        "--from",
+        dest="source",
+        metavar="FILE",
+        help="a WIF draft or a drawdown as an image, told by its suffix",
     )
     source.add_argument("--wif", metavar="FILE", help="a WIF draft, with any suffix")
     source.add_argument(
@@ -44,13 +52,13 @@ def add_colors(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         metavar="SETT",
         help='threadcount of warp and weft, or of each: "B24 W4 B24 R2 K24" turns at its first and '
-        'last stripe, "...B24 W4 R2..." repeats (weave: twill 2/2, if none is given)',
+        'last stripe, "...B24 W4 R2..." repeats (default: colours by --warp-color)',
     )
     order.add_argument(
         "--stripes",
         metavar="SETT",
         help="threadcount of the warp; the weft has --weft-color, or the first stripe's colour "
-        "(weave: plain, if none is given)",
+        "(default: colours by --warp-color)",
     )
     parser.add_argument(
         "--palette",
@@ -64,7 +72,8 @@ def add_colors(parser: argparse.ArgumentParser) -> None:
             f"--{which}-color",
             nargs="+",
             metavar="COLOR",
-            help=f"colours of the {noun} in order: #rrggbb, linear r,g,b, or COUNT*COLOR",
+            help=f"colours of the {noun} in order: #rrggbb, linear r,g,b, or COUNT*COLOR "
+            "(default: the draft's, or none)",
         )
 
 

@@ -25,7 +25,7 @@ def add_yarns(parser: argparse.ArgumentParser) -> None:
                 type=number(f"{noun}_per_{unit}"),
                 metavar="N",
                 help=f"density of the {which}, per {unit} of cloth"
-                + (" (default: the draft's, or 20)" if unit == "cm" else ""),
+                f" (default: the draft's, or {'20' if unit == 'cm' else '50.8'})",
             )
     yarn.add_argument(
         "--yarn",
@@ -34,7 +34,9 @@ def add_yarns(parser: argparse.ArgumentParser) -> None:
         "the thickness by Peirce (default: threads fill their pitch)",
     )
     for which in ("warp", "weft"):
-        yarn.add_argument(f"--{which}-yarn", metavar="COUNT", help=f"yarn count of the {which}")
+        yarn.add_argument(
+            f"--{which}-yarn", metavar="COUNT", help=f"yarn count of the {which} (default: --yarn)"
+        )
     yarn.add_argument(
         "--fibre",
         "--fiber",
@@ -52,13 +54,14 @@ def add_yarns(parser: argparse.ArgumentParser) -> None:
         "--thickness",
         type=number("thickness"),
         metavar="MM",
-        help="visible width of the threads, in mm; precedes that of a yarn count",
+        help="visible width of the threads, in mm; precedes that of a yarn count "
+        "(default: the count's, the draft's, or the pitch)",
     )
     yarn.add_argument(
         "--weight",
         metavar="W",
         help="weight of the cloth, 14oz (per square yard) or 470gsm: scales the yarn counts, and "
-        "keeps the densities",
+        "keeps the densities (default: what it comes to)",
     )
     yarn.add_argument(
         "--open",
