@@ -80,7 +80,7 @@ def settle_densities(options: argparse.Namespace) -> None:
 
 def spun(fabric: Fabric, options: argparse.Namespace) -> tuple[Fabric, list[str]]:
     """(`fabric` of the yarns and the weight asked for, what was changed and what is open)."""
-    from fabricusd.schema.closed import opened, unasked_gap
+    from fabricusd.schema.rules.closed import opened, unasked_gap
     from fabricusd.weaves.cloth import parse_weight, weight, with_weight, with_yarns
     from fabricusd.weaves.yarn import PACKING, fibre_density, parse_count
 

@@ -138,7 +138,7 @@ def threads_used(prim: Usd.Prim) -> Iterator[Fault]:
 @rule(FABRIC, severity="warning", sound=True)
 def gap_is_asked_for(prim: Usd.Prim) -> Iterator[Fault]:
     """Cloth closes, up to 3 % of gap, unless a coverage asks for more or the cloth is opaque."""
-    from fabricusd.schema.closed import unasked_gap
+    from fabricusd.schema.rules.closed import unasked_gap
 
     problem = unasked_gap(build_side(prim))
     if problem:
