@@ -34,6 +34,7 @@ COMMANDS = {
     "new": "make a fabric from a preset, a weave, an image or a WIF draft",
     "cat": "describe a fabric in a weaver's words, and draw its draft",
     "set": "change attributes of a fabric, by their names or by words of the trade",
+    "dress": "put a fabric on garments, in a lit studio with a camera",
     "check": "find faults in fabrics, threads and bindings",
     "bake": "bake a fabric on a garment into textures",
     "material": "turn a bake into materials for USD, MaterialX and other tools",

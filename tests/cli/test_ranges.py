@@ -34,6 +34,8 @@ OPTIONS = {
     ("new", "--ends-per-cm"): ("0", "-3", "10001"),
     ("new", "--picks-per-cm"): ("0", "-3", "10001"),
     ("new", "--thickness"): ("-0.1", "1001"),
+    ("dress", "--grain"): ("361", "-361"),
+    ("dress", "--scale"): ("-1", "1e7"),
     ("new", "--ends-per-inch"): ("0", "-3", "25401"),
     ("new", "--picks-per-inch"): ("0", "-3", "25401"),
     ("new", "--packing"): ("0", "-0.1", "1.1"),
@@ -48,6 +50,7 @@ OPTIONS = {
 ARGUMENTS = {
     "render": ["x.obj", "-o", "out.exr"],
     "bake": ["x.obj", "--fabric", "velvet", "-o", "out"],
+    "dress": ["x.obj", "--fabric", "velvet", "-o", "out.usda"],
     "new": ["--weave", "plain", "-o", "out.usda"],
     "compare": ["a.png", "b.png", "-o", "out.png"],
 }
