@@ -68,7 +68,7 @@ def parse_view(text: str, where: str = "--view") -> View:
     one.
     """
     name, _, rest = text.strip().partition(" ")
-    rest = rest.strip()
+    name, rest = name.lower(), rest.strip()
     if name in _CURVES and not rest:
         return View(name=name)
     if name != "ocio" or not rest:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numba
@@ -19,28 +19,26 @@ from fabricusd.appearance.shadow.methods import METHODS
 from fabricusd.appearance.weave.footprint import DEFAULT, Limits
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
-from fabricusd.files import require_writable
-from fabricusd.images.files import write_exr, write_png
-from fabricusd.images.view import View, encode, parse_view
+from fabricusd.images.view import View, parse_view
 from fabricusd.ranges import RANGES, require_picture, require_ranges
 from fabricusd.reference.defaults import default_lights
-from fabricusd.reference.film import AOVS, Film, require_aovs
+from fabricusd.reference.denoise import GUIDES, denoised, require_denoiser
+from fabricusd.reference.film import Film, require_aovs
 from fabricusd.reference.integrator import Tracer
 from fabricusd.reference.nothing_seen import reason_for_nothing
+from fabricusd.reference.picture_files import DENOISED, made_how, picture_targets, write_picture
 from fabricusd.reference.rays.camera import Lens, build_lens, default_camera
 from fabricusd.reference.rays.wave import ALPHA, Wave
 from fabricusd.reference.start.compile_ahead import EVERY_PICTURE, compile_ahead
 from fabricusd.run.workers import Batches, pixels_along_z_curve, worker_count
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.scene import Camera, Scene
+from fabricusd.scene.staging import Staging, over_background, put
 from fabricusd.stop import Stop
 
 BATCH = 1 << 13
 """Number of paths in a batch: large enough to amortise the start of a stage, small enough for the
 cache."""
-
-MOST_TRIED = 100
-"""Number of frames whose output files are checked before rendering starts."""
 
 PASS = 16
 """Samples per pixel in one pass over the picture; no pixel gets more before all have had these."""
@@ -105,6 +103,8 @@ def render(
     pixel_filter: str = "tent",
     exposure: float = 0.0,
     view: str | View = "neutral",
+    staging: Staging = Staging(),  # noqa: B008
+    denoise: bool = False,
     estimator: str = "mis",
     complexity: str = "auto",
     units: str | None = None,
@@ -121,6 +121,8 @@ def render(
     frames : time codes; None for the stage's default time
     exposure : of the PNG, in stops, added to the camera's own
     view : of the PNG, see `images.view`: "neutral", "srgb", "aces" or "ocio CONFIG[:VIEW]"
+    staging : the dome, the background, the studio and the camera of a review
+    denoise : add the layer `denoised`, which the PNG then shows; needs the extra `denoise`
     complexity : how finely subdivision surfaces are refined: "low" (their cages), "medium", "high"
         or "veryhigh" as in usdrecord and usdview, or "auto" for what the picture can show
     units : of an .obj or .ply, see `read_scene`
@@ -133,37 +135,66 @@ def render(
     shown = view if isinstance(view, View) else parse_view(view, "view")
     if shadow not in METHODS:
         raise FabricError("shadow", f"is '{shadow}'; it must be one of {', '.join(METHODS)}")
-    layers = tuple(dict.fromkeys(("beauty", *aovs)))
+    guides: tuple[str, ...] = ()
+    if denoise:
+        require_denoiser()
+        guides = GUIDES
+    layers = tuple(dict.fromkeys(("beauty", *aovs, *guides)))
     require_aovs(layers)
-    for code in frames or ():
-        RANGES["frame"].require("frames", code)
-    targets = _targets(out, frames)
+    for asked in frames or ():
+        RANGES["frame"].require("frames", asked)
+    if staging.orbit and frames:
+        raise FabricError("orbit", "cannot be had with frames; it must be one of both")
+    targets = picture_targets(out, tuple(range(1, staging.orbit + 1)) or frames)
     compile_ahead(EVERY_PICTURE)
     begun = time.perf_counter()
     frame_results: list[RenderResult] = []
     paths: tuple[str, ...] = ()
     with Stop() as stop:
-        for number, (time_code, target) in enumerate(targets):
+        for number, (code, target) in enumerate(targets):
+            time_code = None if staging.orbit else code
             loaded = scene if isinstance(scene, Scene) else read_scene(
                 scene, fabric=fabric, camera=camera, time_code=time_code, complexity=complexity,
                 width=width, units=units,
             )  # fmt: skip
+            # A scene in memory stays the caller's.
+            loaded = replace(
+                loaded,
+                lights=[*loaded.lights], meshes=[*loaded.meshes], materials=[*loaded.materials],
+            )  # fmt: skip
+            if staging.dome is None and not staging.studio:
+                _light(loaded)
+            put(staging, loaded, width / height, turn=math.tau * number / (staging.orbit or 1))
             result = render_scene(
                 loaded, width=width, height=height, spp=spp, noise=noise, max_bounces=max_bounces,
                 level=level, shadow=shadow, limits=limits, aovs=layers, seed=seed, workers=workers,
                 pixel_filter=pixel_filter, estimator=estimator, stop=stop,
                 progress=progress and _of_frame(progress, number, len(targets), begun),
             )  # fmt: skip
+            _finish(result, staging, denoise)
             stops = exposure + (loaded.camera.exposure if loaded.camera else 0.0)
-            result.metadata.update(_asked_for(scene, time_code, stops, shown))
+            result.metadata.update(made_how(scene, time_code, stops, shown))
             if target is not None:
-                paths += _write(target, result, stops, shown)
+                paths += write_picture(target, result.layers, result.metadata, stops, shown)
             # Keep only the last frame's layers: those of all frames would fill the memory.
             frame_results = [replace(r, layers={}) for r in frame_results] + [result]
             stop.release()
             if stop.asked or not result.complete:
                 break
     return _together(frame_results, paths, complete=len(frame_results) == len(targets))
+
+
+def _finish(result: RenderResult, staging: Staging, denoise: bool) -> None:
+    """Lay the picture over its background, and denoise it."""
+    layers = result.layers
+    if denoise:
+        layers[DENOISED] = denoised(layers)
+    if staging.background is not None:
+        alpha = layers["beauty"][..., 3:4]
+        layers["beauty"] = over_background(layers["beauty"], staging.background)
+        if denoise:
+            smooth = np.concatenate((layers[DENOISED], alpha), axis=-1)
+            layers[DENOISED] = over_background(smooth, staging.background)[..., :3]
 
 
 def _of_frame(progress: Progress, number: int, frames: int, begun: float) -> Progress:
@@ -207,61 +238,6 @@ def _require_settings(
     require_ranges(max_bounces=max_bounces, seed=seed)
     optional = {"spp": spp, "noise": noise, "workers": workers}
     require_ranges(**{name: value for name, value in optional.items() if value is not None})
-
-
-def _targets(
-    out: str | os.PathLike[str] | None, frames: tuple[float, ...] | None
-) -> list[tuple[float | None, Path | None]]:
-    """(time code, file) of each picture. Raises FabricError for a file that cannot be written."""
-    if out is None:
-        return [(code, None) for code in frames or (None,)]
-    path = Path(out)
-    if path.suffix.lower() not in (".exr", ".png"):
-        raise FabricError(str(path), "is not a picture format; it must end in .exr or .png")
-    targets = frame_files(path, frames)
-    for _, target in targets[:MOST_TRIED]:
-        for file in written_files(target):
-            require_writable(file)
-    return [*targets]
-
-
-def frame_files(path: Path, frames: tuple[float, ...] | None) -> list[tuple[float | None, Path]]:
-    """(time code, file) of each picture: `path` itself, or numbered before its suffix."""
-    if not frames:
-        return [(None, path)]
-    return [
-        (code, path.with_name(f"{path.stem}.{code:04.10g}{path.suffix}"))
-        if code != int(code)
-        else (code, path.with_name(f"{path.stem}.{int(code):04d}{path.suffix}"))
-        for code in frames
-    ]
-
-
-def written_files(target: Path) -> list[Path]:
-    """All files that are written for one picture: an EXR has a PNG beside it."""
-    return list(dict.fromkeys([target, target.with_suffix(".png")]))
-
-
-def _asked_for(source: Any, time_code: float | None, stops: float, shown: View) -> dict[str, Any]:
-    """The metadata that tell a picture's source and how its PNG was made."""
-    known: dict[str, Any] = {"fabricusd:exposure": stops, "fabricusd:view": str(shown)}
-    if not isinstance(source, Scene):
-        known["fabricusd:scene"] = os.fspath(source)
-    if time_code is not None:
-        known["fabricusd:timeCode"] = float(time_code)
-    return known
-
-
-def _write(target: Path, result: RenderResult, exposure: float, shown: View) -> tuple[str, ...]:
-    """Write the picture's files and return their names."""
-    picture = encode(result.layers["beauty"][..., :3], exposure, shown)
-    files = written_files(target)
-    if target.suffix.lower() == ".exr":
-        write_exr(target, result.layers, AOVS, result.metadata)
-    made_how = {key: result.metadata[key] for key in ("Software", "fabricusd:view")}
-    made_how["fabricusd:exposure"] = f"{exposure:g}"
-    write_png(files[-1], picture, metadata=made_how)
-    return tuple(str(file) for file in files)
 
 
 def render_scene(
@@ -354,11 +330,16 @@ def _note_losses(
         scene.note("the picture", reason_for_nothing(tracer, lens, *size))
 
 
-def _furnished(scene: Scene, width: int, height: int) -> Camera:
-    """The scene's camera, or one that sees the whole scene. Adds lights to a scene without any."""
+def _light(scene: Scene) -> None:
+    """Add lights to a scene without any, with a note."""
     if not scene.lights:
         scene.lights = default_lights(scene)
         scene.note("the scene", "has no light; a sky and a key light are added")
+
+
+def _furnished(scene: Scene, width: int, height: int) -> Camera:
+    """The scene's camera, or one that sees the whole scene. Adds lights to a scene without any."""
+    _light(scene)
     if scene.camera is None:
         scene.note("the scene", "has no camera; one that sees all of it from the front is used")
     return scene.camera or default_camera(scene, width, height)

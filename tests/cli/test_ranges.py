@@ -30,6 +30,8 @@ OPTIONS = {
     ("render", "--exposure"): ("100000", "-101"),
     ("render", "--seed"): (str(2**63), "1.5"),
     ("render", "--workers"): ("0", "-1", "1025", "100000"),
+    ("render", "--dome-rotation"): ("361", "-361"),
+    ("render", "--orbit"): ("0", "-1", "3601", "1.5"),
     ("bake", "--workers"): ("0", "-1", "1025", "100000"),
     ("new", "--ends-per-cm"): ("0", "-3", "10001"),
     ("new", "--picks-per-cm"): ("0", "-3", "10001"),
@@ -137,8 +139,11 @@ def test_the_table_has_every_option_that_takes_a_number():
     assert found - OTHERS == set(OPTIONS)
 
 
-OTHERS = {("bake", option) for option in ("--resolution", "--texels-per-thread", "--max-error")}
-"""Options with a `type` whose values `tests/bake` judges."""
+OTHERS = {
+    *(("bake", option) for option in ("--resolution", "--texels-per-thread", "--max-error")),
+    ("render", "--imageWidth"),
+}
+"""Options with a `type` whose values `tests/bake` judges, and another name of one above."""
 
 
 BOUNDS = {
