@@ -1,6 +1,6 @@
 """What denoising costs and gains: error against converged pictures, of garments and of threads.
 
-    python bench/tracer/bench_denoise.py [--samples 16] [--reference 1024]
+    python bench/tracer/bench_denoise.py [--samples 16] [--reference 512] [--size 480]
 
 The error is the mean over pixels of (a - b)^2 / (b^2 + 0.01), b being converged with another seed.
 """
@@ -40,9 +40,11 @@ def relative_error(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.mean((a - b) ** 2 / (b**2 + 0.01)))
 
 
-def measure(name: str, scene: str, samples: int, reference: int, **settings: object) -> None:
+def measure(
+    name: str, scene: str, samples: int, reference: int, side: int, **settings: object
+) -> None:
     """Print a row of the table in docs/path_tracer.md."""
-    size = {"width": 480, "height": 480}
+    size = {"width": side, "height": side}
     noisy = render(scene, spp=samples, aovs=GUIDES, **size, **settings)
     exact = render(scene, spp=reference, seed=1, **size, **settings).layers["beauty"][..., :3]
     began = time.perf_counter()
@@ -57,20 +59,19 @@ def main() -> None:
     """Measure a garment and two swatches."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=16)
-    parser.add_argument("--reference", type=int, default=1024)
+    parser.add_argument("--reference", type=int, default=512)
+    parser.add_argument("--size", type=int, default=480)
     options = parser.parse_args()
     from make_samples import make_skirt
 
     with tempfile.TemporaryDirectory() as folder:
         print("| picture | samples | relative MSE | denoised | time |\n|---|---|---|---|---|")
         skirt = str(make_skirt(Path(folder)))
-        measure("satin skirt, far", skirt, options.samples, options.reference)
+        how = (options.samples, options.reference, options.size)
+        measure("satin skirt", skirt, *how)
         (Path(folder) / "swatch.obj").write_text(PLANE)
         for name, units in SWATCHES.items():
-            measure(
-                name, f"{folder}/swatch.obj", options.samples, options.reference,
-                fabric="linen_plain", units=units,
-            )  # fmt: skip
+            measure(name, f"{folder}/swatch.obj", *how, fabric="linen_plain", units=units)
 
 
 if __name__ == "__main__":

@@ -47,31 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--udim", action="store_true", help="bake one texture per UDIM tile, 1001 to 1109"
     )
-    layout = parser.add_mutually_exclusive_group()
-    layout.add_argument("--fit", action="store_true", help="scale the UVs into the unit square")
-    layout.add_argument(
-        "--unwrap",
-        choices=("x", "y", "z"),
-        help="make new UVs, with the warp along this world axis (default: the UVs of the mesh)",
-    )
-    parser.add_argument(
-        "--light",
-        metavar="X,Y,Z",
-        help="direction to the light of the map 'shadow', in the surface's frame (default: no "
-        "such map)",
-    )
-    parser.add_argument(
-        "--shadow",
-        default="peak",
-        choices=("peak", "horizon", "traced"),
-        help="shadowing method of the map 'shadow' (default: peak)",
-    )
-    parser.add_argument(
-        "--level",
-        default="weave",
-        choices=("weave", "thread"),
-        help="weave: flat threads, thread: round threads (default: weave)",
-    )
+    _add_layout(parser)
     parser.add_argument(
         "--max-error",
         type=float,
@@ -98,6 +74,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
     parser.add_argument(
         "--no-clobber", action="store_true", help="refuse a folder that holds a bake already"
+    )
+
+
+def _add_layout(parser: argparse.ArgumentParser) -> None:
+    """How the fabric lies on the texture, and how it is lit and seen."""
+    layout = parser.add_mutually_exclusive_group()
+    layout.add_argument("--fit", action="store_true", help="scale the UVs into the unit square")
+    layout.add_argument(
+        "--unwrap",
+        choices=("x", "y", "z"),
+        help="make new UVs, with the warp along this world axis (default: the UVs of the mesh)",
+    )
+    parser.add_argument(
+        "--light",
+        metavar="X,Y,Z",
+        help="direction to the light of the map 'shadow', in the surface's frame (default: no "
+        "such map)",
+    )
+    parser.add_argument(
+        "--shadow",
+        default="peak",
+        choices=("peak", "horizon", "traced"),
+        help="shadowing method of the map 'shadow' (default: peak)",
+    )
+    parser.add_argument(
+        "--level",
+        default="weave",
+        choices=("weave", "thread"),
+        help="weave: flat threads, thread: round threads (default: weave)",
     )
 
 

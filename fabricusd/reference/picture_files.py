@@ -72,13 +72,18 @@ def made_how(source: Any, time_code: float | None, stops: float, view: View) -> 
 
 
 def write_picture(
-    target: Path,
+    target: Path | None,
     layers: Mapping[str, NDArray[np.float32]],
     metadata: Mapping[str, Any],
     exposure: float,
     view: View,
 ) -> tuple[str, ...]:
-    """Write the picture's files and return their names. The PNG shows the denoised layer."""
+    """Write the picture's files and return their names; none for no target.
+
+    The PNG shows the denoised layer, where there is one.
+    """
+    if target is None:
+        return ()
     shown = layers.get(DENOISED, layers["beauty"][..., :3])
     picture = encode(shown, exposure, view)
     files = written_files(target)

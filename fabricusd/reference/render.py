@@ -130,22 +130,10 @@ def render(
     Raises `FabricError` if the scene cannot be rendered at all. Whatever had to be left out is in
     the result's `notes`. On Ctrl-C, the samples taken so far are written, and `complete` is False.
     """
-    _require_settings(width, height, spp, noise, max_bounces, seed, workers)
-    require_ranges(exposure=exposure)
+    _require_settings(width, height, spp, noise, max_bounces, seed, workers, exposure, shadow)
     shown = view if isinstance(view, View) else parse_view(view, "view")
-    if shadow not in METHODS:
-        raise FabricError("shadow", f"is '{shadow}'; it must be one of {', '.join(METHODS)}")
-    guides: tuple[str, ...] = ()
-    if denoise:
-        require_denoiser()
-        guides = GUIDES
-    layers = tuple(dict.fromkeys(("beauty", *aovs, *guides)))
-    require_aovs(layers)
-    for asked in frames or ():
-        RANGES["frame"].require("frames", asked)
-    if staging.orbit and frames:
-        raise FabricError("orbit", "cannot be had with frames; it must be one of both")
-    targets = picture_targets(out, tuple(range(1, staging.orbit + 1)) or frames)
+    layers = _layers(aovs, denoise)
+    targets = picture_targets(out, _numbers(frames, staging.orbit))
     compile_ahead(EVERY_PICTURE)
     begun = time.perf_counter()
     frame_results: list[RenderResult] = []
@@ -157,31 +145,55 @@ def render(
                 scene, fabric=fabric, camera=camera, time_code=time_code, complexity=complexity,
                 width=width, units=units,
             )  # fmt: skip
-            # A scene in memory stays the caller's.
-            loaded = replace(
-                loaded,
-                lights=[*loaded.lights], meshes=[*loaded.meshes], materials=[*loaded.materials],
-            )  # fmt: skip
-            if staging.dome is None and not staging.studio:
-                _light(loaded)
-            put(staging, loaded, width / height, turn=math.tau * number / (staging.orbit or 1))
+            loaded = _staged(loaded, staging, width / height, number)
             result = render_scene(
                 loaded, width=width, height=height, spp=spp, noise=noise, max_bounces=max_bounces,
                 level=level, shadow=shadow, limits=limits, aovs=layers, seed=seed, workers=workers,
                 pixel_filter=pixel_filter, estimator=estimator, stop=stop,
                 progress=progress and _of_frame(progress, number, len(targets), begun),
             )  # fmt: skip
-            _finish(result, staging, denoise)
             stops = exposure + (loaded.camera.exposure if loaded.camera else 0.0)
+            _finish(result, staging, denoise)
             result.metadata.update(made_how(scene, time_code, stops, shown))
-            if target is not None:
-                paths += write_picture(target, result.layers, result.metadata, stops, shown)
+            paths += write_picture(target, result.layers, result.metadata, stops, shown)
             # Keep only the last frame's layers: those of all frames would fill the memory.
             frame_results = [replace(r, layers={}) for r in frame_results] + [result]
             stop.release()
             if stop.asked or not result.complete:
                 break
     return _together(frame_results, paths, complete=len(frame_results) == len(targets))
+
+
+def _layers(aovs: tuple[str, ...], denoise: bool) -> tuple[str, ...]:
+    """The layers to render: those asked for, and the guides of the denoiser, if there is one."""
+    if denoise:
+        require_denoiser()
+    layers = tuple(dict.fromkeys(("beauty", *aovs, *(GUIDES if denoise else ()))))
+    require_aovs(layers)
+    return layers
+
+
+def _numbers(frames: tuple[float, ...] | None, orbit: int) -> tuple[float, ...] | None:
+    """The numbers of the pictures: time codes, or places on an orbit; None for one picture."""
+    for code in frames or ():
+        RANGES["frame"].require("frames", code)
+    if orbit and frames:
+        raise FabricError("orbit", "cannot be had with frames; it must be one of both")
+    return tuple(range(1, orbit + 1)) or frames
+
+
+def _staged(scene: Scene, staging: Staging, aspect: float, number: int) -> Scene:
+    """`scene` as `staging` asks for it, for picture `number` from 0 of an orbit.
+
+    A scene in memory stays the caller's.
+    """
+    own = replace(
+        scene, lights=[*scene.lights], meshes=[*scene.meshes], materials=[*scene.materials]
+    )
+    if staging.dome is None and not staging.studio:
+        _light(own)
+    put(staging, own, aspect, turn=math.tau * number / (staging.orbit or 1))
+    return own
 
 
 def _finish(result: RenderResult, staging: Staging, denoise: bool) -> None:
@@ -233,9 +245,13 @@ def _require_settings(
     max_bounces: int,
     seed: int,
     workers: int | None,
+    exposure: float = 0.0,
+    shadow: str = METHODS[0],
 ) -> None:
     require_picture(width, height)
-    require_ranges(max_bounces=max_bounces, seed=seed)
+    require_ranges(max_bounces=max_bounces, seed=seed, exposure=exposure)
+    if shadow not in METHODS:
+        raise FabricError("shadow", f"is '{shadow}'; it must be one of {', '.join(METHODS)}")
     optional = {"spp": spp, "noise": noise, "workers": workers}
     require_ranges(**{name: value for name, value in optional.items() if value is not None})
 
