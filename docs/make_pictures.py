@@ -10,8 +10,8 @@ import tempfile
 from pathlib import Path
 
 from fabricusd.images.files import write_png
+from fabricusd.images.view import encode
 from fabricusd.reference import render
-from fabricusd.reference.view_transform import view
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "samples"))
@@ -41,7 +41,7 @@ def main() -> None:
             scene = made[name](Path(folder))
             result = render(scene, width=width, height=height, spp=options.spp)
             target = HERE / "images" / f"sample_{name}.png"
-            write_png(target, view(result.layers["beauty"][..., :3], 0.0))
+            write_png(target, encode(result.layers["beauty"][..., :3], 0.0))
             print(f"{target}: {result.samples:.0f} samples, {result.seconds:.1f} s")
 
 

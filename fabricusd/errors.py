@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import functools
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import ParamSpec, TypeVar
 
@@ -26,6 +27,13 @@ def one_line(text: str, longest: int = 600) -> str:
     """
     line = "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
     return line if len(line) <= longest else line[: longest - 3] + "..."
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """` (did you mean 'twill'?)`, with the nearest of the `known` words; "" where none is near."""
+    names = {name.lower(): name for name in known}
+    near = difflib.get_close_matches(word.lower()[:200], names, n=1)
+    return f" (did you mean '{names[near[0]]}'?)" if near else ""
 
 
 class FabricError(ValueError):

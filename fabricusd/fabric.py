@@ -206,6 +206,7 @@ class Thread:
     gamma_surface, gamma_volume : float - lobe standard deviations `gs`, `gv` [rad]
     surface_gain : float - `ks`, factor on the surface reflectance (`conserving` only)
     thickness : float - visible width [m]; 0 if unknown
+    linear_density : float - mass per length [kg/m], the yarn's count; 0 if unknown
     curve : TangentCurve
     model : str - one of MODELS, or "" for that of the fabric
     color : (3,) float - its colour in a draft, linear Rec. 709; rendering does not use it
@@ -231,6 +232,7 @@ class Thread:
     gamma_volume: float = field(default=24 * DEGREE, metadata=_limits(above=0.0, maximum=math.pi))
     surface_gain: float = field(default=1.0, metadata=_limits(0.0))
     thickness: float = field(default=0.0, metadata=_limits(0.0))
+    linear_density: float = field(default=0.0, metadata=_limits(0.0))
     curve: TangentCurve = TangentCurve()
     model: str = ""
     color: tuple[float, float, float] = field(default=(0.5, 0.5, 0.5), metadata=_limits(0.0))
@@ -253,7 +255,7 @@ class Thread:
             object.__setattr__(self, name, value)
         for name in (
             "ior", "isotropic", "gamma_surface", "gamma_volume", "surface_gain", "thickness",
-            *UNEVENNESS, "twist",
+            "linear_density", *UNEVENNESS, "twist",
         ):  # fmt: skip
             object.__setattr__(self, name, float(getattr(self, name)))
         if self.plies != int(self.plies):

@@ -48,6 +48,7 @@ def threads(draw: st.DrawFn, uneven: bool = False) -> Thread:
         gamma_volume=draw(degrees(0.1, 120)),
         surface_gain=draw(numbers(0, 2)),
         thickness=draw(scaled(0, 2, 1e-3)),
+        linear_density=draw(scaled(0, 500, 1e-6)),
         curve=draw(curves()),
         model=draw(st.sampled_from(("", *MODELS))),
         color=draw(COLORS),

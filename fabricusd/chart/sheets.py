@@ -16,8 +16,8 @@ from fabricusd.chart.draw import pyplot, save
 from fabricusd.chart.highlights import predicted
 from fabricusd.chart.scenes import RADIUS, cloth, curtain, cylinder, facing, sky, sun
 from fabricusd.fabric import Fabric, Thread
+from fabricusd.images.view import encode
 from fabricusd.reference.render import render_scene
-from fabricusd.reference.view_transform import view
 from fabricusd.scene.scene import Scene
 from fabricusd.schema import load
 
@@ -140,7 +140,7 @@ def _bright(beauty: NDArray[Any]) -> Any:
     """A display picture, exposed so that only its brightest hundredth is clipped."""
     light = beauty[..., :3]
     top = float(np.quantile(light.max(axis=-1), 0.99))
-    return view(light, -math.log2(max(top, 1e-6)))
+    return encode(light, -math.log2(max(top, 1e-6)))
 
 
 SHEETS: dict[str, tuple[str, Callable[[Path, bool], list[Path]]]] = {

@@ -20,11 +20,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to bake, at which resolution, into which maps."""
     parser.add_argument("scene", metavar="SCENE", nargs="?", help="USD, OBJ, glTF or PLY file")
     parser.add_argument(
-        "--fabric", metavar="FILE[:/PRIM]", help="fabric for meshes that are bound to none"
+        "--fabric",
+        metavar="FILE[:/PRIM]",
+        help="fabric for meshes that are bound to none (default: leave them out)",
     )
     add_units(parser)
-    parser.add_argument("--mesh", metavar="PATH", help="bake only this mesh")
-    parser.add_argument("-o", "--output", metavar="DIR", help="folder for the textures")
+    parser.add_argument(
+        "--mesh", metavar="PATH", help="prim path of the only mesh to bake (default: every mesh)"
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="DIR", help="folder for the textures (no default)"
+    )
     finely = parser.add_mutually_exclusive_group()
     finely.add_argument(
         "--resolution", type=int, metavar="N", help="texels per side (default: 1024)"
@@ -33,35 +39,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--texels-per-thread",
         type=float,
         metavar="X",
-        help="choose the resolution that gives a thread this many texels",
+        help="choose the resolution that gives a thread this many texels (default: by "
+        "--resolution)",
     )
     parser.add_argument("--maps", nargs="+", metavar="MAP", help="maps to bake (default: all)")
     parser.add_argument("--list-maps", action="store_true", help="list the maps and exit")
     parser.add_argument(
         "--udim", action="store_true", help="bake one texture per UDIM tile, 1001 to 1109"
     )
-    layout = parser.add_mutually_exclusive_group()
-    layout.add_argument("--fit", action="store_true", help="scale the UVs into the unit square")
-    layout.add_argument(
-        "--unwrap",
-        choices=("x", "y", "z"),
-        help="make new UVs, with the warp along this world axis",
-    )
-    parser.add_argument(
-        "--light", metavar="X,Y,Z", help="direction to the light of the map 'shadow'"
-    )
-    parser.add_argument(
-        "--shadow",
-        default="peak",
-        choices=("peak", "horizon", "traced"),
-        help="shadowing method of the map 'shadow' (default: peak)",
-    )
-    parser.add_argument(
-        "--level",
-        default="weave",
-        choices=("weave", "thread"),
-        help="weave: flat threads, thread: round threads (default: weave)",
-    )
+    _add_layout(parser)
     parser.add_argument(
         "--max-error",
         type=float,
@@ -73,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--btf",
         nargs="+",
         metavar="FORM",
-        help="also write a BTF of each fabric: ubo, ubo-joint, factored, atlas",
+        help="also write a BTF of each fabric: ubo, ubo-joint, factored, atlas (default: none)",
     )
     parser.add_argument(
         "--format",
@@ -90,6 +76,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--no-clobber", action="store_true", help="refuse a folder that holds a bake already"
+    )
+
+
+def _add_layout(parser: argparse.ArgumentParser) -> None:
+    """How the fabric lies on the texture, and how it is lit and seen."""
+    layout = parser.add_mutually_exclusive_group()
+    layout.add_argument("--fit", action="store_true", help="scale the UVs into the unit square")
+    layout.add_argument(
+        "--unwrap",
+        choices=("x", "y", "z"),
+        help="make new UVs, with the warp along this world axis (default: the UVs of the mesh)",
+    )
+    parser.add_argument(
+        "--light",
+        metavar="X,Y,Z",
+        help="direction to the light of the map 'shadow', in the surface's frame (default: no "
+        "such map)",
+    )
+    parser.add_argument(
+        "--shadow",
+        default="peak",
+        choices=("peak", "horizon", "traced"),
+        help="shadowing method of the map 'shadow' (default: peak)",
+    )
+    parser.add_argument(
+        "--level",
+        default="weave",
+        choices=("weave", "thread"),
+        help="weave: flat threads, thread: round threads (default: weave)",
     )
 
 

@@ -9,7 +9,7 @@ import shutil
 import sys
 from collections.abc import Sequence
 
-from fabricusd.cli.stdout import can_show, write_utf8
+from fabricusd.cli.terminal.stdout import can_show, write_utf8
 
 EPILOG = """FILE is a USD file, FILE:/PRIM, a WIF draft, an image of a weave, or a preset.
 

@@ -20,26 +20,35 @@ example:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where to write, and what to measure."""
-    parser.add_argument("-o", "--output", metavar="DIR", help="folder for the charts")
+    parser.add_argument("-o", "--output", metavar="DIR", help="folder for the charts (no default)")
     parser.add_argument(
         "--quick", action="store_true", help="measure fewer presets and methods, less often"
     )
     parser.add_argument(
-        "--panel", action="append", metavar="NAME", help="measure only this panel (repeatable)"
+        "--panel",
+        action="append",
+        metavar="NAME",
+        help="measure only this panel (repeatable; default: all)",
     )
     parser.add_argument(
-        "--sheet", action="append", metavar="NAME", help="draw only this sheet (repeatable)"
+        "--sheet",
+        action="append",
+        metavar="NAME",
+        help="draw only this sheet (repeatable; default: all)",
     )
     parser.add_argument(
         "--list-panels", action="store_true", help="list the panels and sheets, and exit"
     )
     parser.add_argument(
-        "--stability", metavar="MD", help="instead of charts, write the page on where formulas fail"
+        "--stability",
+        metavar="MD",
+        help="write the page on where formulas fail instead (default: charts)",
     )
     parser.add_argument(
         "--choice",
         metavar="JSON",
-        help="instead of charts, measure the table that render --max-error reads, on this machine",
+        help="measure the table that render --max-error reads instead, on this machine (default: "
+        "charts)",
     )
     parser.add_argument("--page", metavar="MD", help="file for the page (default: DIR/charts.md)")
 

@@ -32,27 +32,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("a", metavar="A", help="picture")
     parser.add_argument("b", metavar="B", help="reference")
     parser.add_argument(
-        "-o", "--output", metavar="PNG", help="write a map of where they differ, by FLIP"
+        "-o",
+        "--output",
+        metavar="PNG",
+        help="write a map of where they differ, by FLIP (default: none)",
     )
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     parser.add_argument(
         "--max-flip",
         type=number("difference"),
         metavar="X",
-        help="exit with status 1 if the mean FLIP is above this",
+        help="exit with status 1 if the mean FLIP, 0 to 1, is above this (default: no bound)",
     )
     parser.add_argument(
         "--max-error",
         type=number("difference"),
         metavar="DE",
-        help="exit with status 1 if the mean delta E 2000 is above this",
+        help="exit with status 1 if the mean delta E 2000 is above this (default: no bound)",
     )
     parser.add_argument(
         "--significance",
         type=number("significance"),
         metavar="P",
         help="exit with status 1 if noise alone makes such a difference with a probability below "
-        "this; both pictures need a layer 'variance'",
+        "this (default: no bound); both pictures need a layer 'variance'",
     )
 
 

@@ -5,10 +5,19 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fabricusd.errors import FabricError
 
-EPILOG = """example:
+if TYPE_CHECKING:
+    from fabricusd.fabric import Fabric
+
+SHOWN = "silk_shot"
+"""The preset that the last lines propose to look at."""
+
+EPILOG = """Prints a line for each preset, and what to open. With -v, each is described and drawn.
+
+example:
   fabricusd demo -o demo"""
 
 
@@ -43,13 +52,25 @@ def run(options: argparse.Namespace) -> int:
         if load(layer) != fabric:
             print(f"{layer} reads back as a different fabric")
             findings += 1
-        if not options.quiet:
-            print(in_words(fabric))
-            print()
-            print(draw(fabric, width=72, height=24, color=False))
-            print()
+        if options.verbose:
+            print(f"{in_words(fabric)}\n\n{draw(fabric, width=72, height=24, color=False)}\n")
+        elif not options.quiet:
+            print(_line(fabric))
+    if not options.quiet:
+        print()
+        print(f"Look at one:  fabricusd cat {folder / SHOWN}.usda")
+        print(f"Change it:    open {folder / SHOWN}.usda in an editor or in usdview")
+        print("Put it on:    fabricusd help dress")
     print(
-        f"fabricusd: {len(preset_names())} presets in {folder}, {findings} findings",
+        f"fabricusd: {len(preset_names())} presets in {folder}, each as .usda and .wif, "
+        f"{findings} findings",
         file=sys.stderr,
     )
     return 1 if findings else 0
+
+
+def _line(fabric: Fabric) -> str:
+    """Name, weave and densities of a fabric."""
+    weave = f"{fabric.weave.name or 'unnamed weave'}"
+    densities = f"{fabric.warp.density / 100:.3g} x {fabric.weft.density / 100:.3g} threads/cm"
+    return f"{fabric.name:30} {weave:22} {densities}"

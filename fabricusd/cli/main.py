@@ -15,13 +15,14 @@ import argparse
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
-from typing import NoReturn
 
 from fabricusd import __version__
-from fabricusd.cli.stdout import drop_stdout, ready_stdout
+from fabricusd.cli.terminal.completion import SHELLS
+from fabricusd.cli.terminal.parser import Parser
+from fabricusd.cli.terminal.stdout import drop_stdout, ready_stdout
 from fabricusd.errors import FabricError, FabricWarning, debugging, described, one_line
 from fabricusd.host import MISSING
 from fabricusd.partial_files import remove_own_partial_files
@@ -32,6 +33,8 @@ INTERNAL = "internal error"
 COMMANDS = {
     "new": "make a fabric from a preset, a weave, an image or a WIF draft",
     "cat": "describe a fabric in a weaver's words, and draw its draft",
+    "set": "change attributes of a fabric, by their names or by words of the trade",
+    "dress": "put a fabric on garments, in a lit studio with a camera",
     "check": "find faults in fabrics, threads and bindings",
     "sides": "measure where a fabric's light goes, for the conserving model",
     "bake": "bake a fabric on a garment into textures",
@@ -45,24 +48,23 @@ COMMANDS = {
 }
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser that reports an error in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: {one_line(message, 400)}; see '{self.prog} --help'\n")
-
-
-def build_parser(command: str | None) -> argparse.ArgumentParser:
-    """The parser, with the arguments of `command` only."""
-    parser = _Parser(
+def build_parser(command: str | None, *, whole: bool = False) -> argparse.ArgumentParser:
+    """The parser, with the arguments of `command` only, or, if `whole`, of every command."""
+    parser = Parser(
         prog="fabricusd",
         description="Woven cloth as USD prims: author, check, render, bake.",
-        epilog="'fabricusd COMMAND --help' describes a command, with examples.",
+        epilog="'fabricusd help COMMAND' describes a command, with examples.",
     )
     parser.add_argument("--version", action="version", version=f"fabricusd {__version__}")
+    parser.add_argument(
+        "--print-completion",
+        choices=SHELLS,
+        help="print the script that completes command lines in this shell, and exit: "
+        'eval "$(fabricusd --print-completion bash)"',
+    )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, line in COMMANDS.items():
-        if name != command:
+        if name != command and not whole:
             commands.add_parser(name, help=line, add_help=False)
             continue
         module = import_module(f"fabricusd.cli.{name.replace('-', '_')}")
@@ -84,16 +86,44 @@ def build_parser(command: str | None) -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if given and given[0] == "help":
+        # `help COMMAND` is `COMMAND --help`; `help` alone lists the commands.
+        given = [*given[1:2], "--help", *given[2:]]
     command = next((word for word in given if word in COMMANDS), None)
-    options, unknown = build_parser(command).parse_known_args(given)
+    if command is None and given[:1] == ["--print-completion"] and given[1:2] != []:
+        return _print_completion(given)
+    parser = build_parser(command)
+    options, unknown = parser.parse_known_args(given)
     if unknown:
         # argparse itself would refer to the help that lists the commands.
-        _Parser(prog=f"fabricusd {command}").error(f"unrecognized arguments: {' '.join(unknown)}")
+        commands = parser._subparsers._group_actions[0].choices  # type: ignore[union-attr]
+        commands[command].refuse_unknown(unknown)  # type: ignore[index]
     ready_stdout()
     warnings.formatwarning = _format_warning
+    return _guarded(lambda: int(options.run(options)))
+
+
+def _print_completion(given: list[str]) -> int:
+    """Print the script for the shell in `given`, and return the exit status."""
+    from fabricusd.cli.terminal.completion import script
+
+    parser = build_parser(None, whole=True)
+    # A command is needed, but only to be parsed.
+    shell = parser.parse_args([*given, "cache"]).print_completion
+    ready_stdout()
+
+    def run() -> int:
+        print(script(parser, shell))
+        return 0
+
+    return _guarded(run)
+
+
+def _guarded(run: Callable[[], int]) -> int:
+    """Run a command, and turn whatever it raises into a line and an exit status."""
     try:
         with Stop():
-            status: int = options.run(options)
+            status = run()
             sys.stdout.flush()
             return status
     except KeyboardInterrupt:

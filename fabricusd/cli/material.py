@@ -20,7 +20,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which bake, over which scene, as which surfaces and targets."""
     parser.add_argument("bake", metavar="DIR", help="folder that 'fabricusd bake' made")
     parser.add_argument(
-        "--scene", metavar="SCENE", help="the USD scene that was baked; the look is a layer over it"
+        "--scene",
+        metavar="SCENE",
+        help="the USD scene that was baked; the look is a layer over it "
+        "(default: the look stands alone)",
     )
     parser.add_argument(
         "-o", "--output", metavar="LOOK", help="layer to write (default: DIR/look.usda)"

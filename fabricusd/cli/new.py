@@ -6,17 +6,22 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
-from fabricusd.cli.arguments.number import number
-from fabricusd.cli.stdout import write_utf8
-from fabricusd.errors import FabricError, one_line
-from fabricusd.ranges import RANGES
+from fabricusd.cli.arguments.draft import add_colors, add_figure, add_sources, given_draft
+from fabricusd.cli.arguments.yarn import add_yarns, settle_densities, spun
+from fabricusd.cli.terminal.stdout import write_utf8
+from fabricusd.errors import FabricError, did_you_mean
 
 if TYPE_CHECKING:
     from fabricusd.fabric import Fabric, Thread
-    from fabricusd.weaves import Draft
 
-LONGEST_ORDER = 16384
-"""Most threads of one colour in a row; equal to the most threads of a draft."""
+SOURCES = ("preset", "weave", "source", "wif", "image", "figure", "tartan", "stripes")
+"""Options of which at least one is needed."""
+
+NOT_OF_PRESETS = (
+    "tartan", "stripes", "palette", "thread", "warp_color", "weft_color", "thickness", "invert",
+    "yarn", "warp_yarn", "weft_yarn",
+)  # fmt: skip
+"""Options that a preset, whose threads and weave are what they are, cannot follow."""
 
 EPILOG = """WEAVE is a name (plain, basket 2/2, twill 2/1 S, satin 8 step 3, herringbone 2/2 8,
 houndstooth, ...) or an expression in the end i and the pick j (mod(2*i + j, 5) < 4).
@@ -25,19 +30,18 @@ example:
   fabricusd new --preset velvet -o velvet.usda
   fabricusd new --weave "twill 2/2 Z" --warp-color "#1f2a4d" --weft-color "#e8e0d0" -o denim.usda
   fabricusd new --weave "twill 2/2" --warp-color "4*#111" "4*#eee" -o houndstooth.usda
+  fabricusd new --tartan "B24 W4 B24 R2 K24" --ends-per-cm 22 --picks-per-cm 22 -o tartan.usda
+  fabricusd new --figure rose.png --figure-ends 480 --ends-per-cm 60 --picks-per-cm 40 -o rose.usda
+  fabricusd new --weave "twill 3/1" --warp-yarn "Ne 7" --weft-yarn "Ne 8" --ends-per-inch 68 \\
+      --picks-per-inch 44 --weight 14oz --warp-color "#1f2a4d" --weft-color "#ddd" -o denim14.usda
   fabricusd new --from 8452.wif --thread linen_plain -o draft.usda"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The source of the weave, its threads, and where to write."""
-    source = parser.add_mutually_exclusive_group(required=True)
+    source = parser.add_mutually_exclusive_group()
     source.add_argument("--preset", metavar="NAME", help="a fabric that comes with fabricusd")
-    source.add_argument("--weave", metavar="WEAVE", help="a named weave or an expression")
-    source.add_argument(
-        "--from", dest="source", metavar="FILE", help="a WIF draft or an image, told by its suffix"
-    )
-    source.add_argument("--wif", metavar="FILE", help="a WIF draft, with any suffix")
-    source.add_argument("--image", metavar="FILE", help="an image, black where the warp is on top")
+    add_sources(source)
     source.add_argument("--list-presets", action="store_true", help="list the presets and exit")
     parser.add_argument(
         "-o",
@@ -46,28 +50,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=".usda, .usdc, .usd or .wif file (default: print USD text)",
     )
     parser.add_argument("--name", help="name of the prim (default: from the output file)")
+    add_colors(parser)
     parser.add_argument(
         "--thread",
         metavar="FABRIC[:THREAD]",
-        help="make the threads scatter like those of this fabric file or preset",
-    )
-    for which, noun in (("warp", "ends"), ("weft", "picks")):
-        parser.add_argument(
-            f"--{which}-color",
-            nargs="+",
-            metavar="COLOR",
-            help=f"colours of the {noun} in order: #rrggbb, linear r,g,b, or COUNT*COLOR",
-        )
-        density = f"{noun}_per_cm"
-        parser.add_argument(
-            f"--{noun}-per-cm", type=number(density), metavar="N", help=f"density of the {which}"
-        )
-    parser.add_argument(
-        "--thickness", type=number("thickness"), metavar="MM", help="thickness of the threads"
+        help="make the threads scatter like those of this fabric file or preset; their size stays "
+        "(default: a plain spun thread)",
     )
     parser.add_argument(
         "--invert", action="store_true", help="in an image, white means warp on top"
     )
+    add_yarns(parser)
+    add_figure(parser)
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
     parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
 
@@ -79,12 +73,19 @@ def run(options: argparse.Namespace) -> int:
 
         print("\n".join(preset_names()))
         return 0
+    if all(getattr(options, source) is None for source in SOURCES):
+        raise FabricError(
+            "",
+            "there is nothing to make a fabric from; give one of --preset, --weave, --from, --wif, "
+            "--image, --figure, --tartan, --stripes, or --list-presets",
+        )
     if options.output == "-":
         options.output = None
+    settle_densities(options)
     fabric, notes = _fabric(options)
-    fabric = _changed(fabric, options)
+    fabric, spinning = spun(_changed(fabric, options), options)
     _write(fabric, options)
-    for note in notes:
+    for note in (*notes, *spinning):
         if not options.quiet:
             print(f"fabricusd: {note}", file=sys.stderr)
     return 0
@@ -99,9 +100,11 @@ def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
         if options.preset not in preset_names():
             raise FabricError(
                 "",
-                f"there is no preset {quoted(options.preset)}; see 'fabricusd new --list-presets'",
+                f"there is no preset {quoted(options.preset)}"
+                f"{did_you_mean(options.preset, preset_names())}; see 'fabricusd new "
+                "--list-presets'",
             )
-        for option in ("thread", "warp_color", "weft_color", "thickness", "invert"):
+        for option in NOT_OF_PRESETS:
             # Compare by identity, since 0 == False.
             if not any(getattr(options, option) is unset for unset in (None, False)):
                 raise FabricError(
@@ -112,7 +115,7 @@ def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
 
     from fabricusd.weaves import losses, to_fabric
 
-    draft = _draft(options)
+    draft = given_draft(options)
     for which, density in (("warp", options.ends_per_cm), ("weft", options.picks_per_cm)):
         if density is not None:
             told = {f"{which}_spacing": 0.01 / density, f"{which}_spacings": ()}
@@ -125,69 +128,25 @@ def _flag(option: str) -> str:
     return f"--{option.replace('_', '-')}"
 
 
-def _draft(options: argparse.Namespace) -> Draft:
-    from fabricusd.weaves import parse_weave, with_colors
-    from fabricusd.weaves.readers import DraftOptions, read_draft, reader_name, suffixes
-
-    warp = _color_order(options.warp_color, "--warp-color")
-    weft = _color_order(options.weft_color, "--weft-color")
-    if options.weave is not None:
-        if options.invert:
-            raise FabricError("--invert", "can only be used with an image")
-        draft = parse_weave(options.weave)
-        return with_colors(draft, warp, weft) if warp or weft else draft
-    told = DraftOptions(warp=warp, weft=weft, invert=options.invert)
-    if options.source is None:
-        reader = "wif" if options.wif is not None else "image"
-        return read_draft(getattr(options, reader), told, reader)
-    if not reader_name(options.source):
-        raise FabricError(
-            f"--from '{options.source}'",
-            f"is not a draft; its name must end in {', '.join(suffixes())}",
-        )
-    return read_draft(options.source, told)
-
-
-def _color_order(items: list[str] | None, where: str) -> list[tuple[float, float, float]]:
-    """`4*#111 4*#eee` -> eight linear colours."""
-    from fabricusd.weaves import parse_color
-
-    order: list[tuple[float, float, float]] = []
-    for item in items or ():
-        count, star, color = item.rpartition("*")
-        # Python refuses to convert numbers of thousands of digits.
-        whole = count.isdecimal() and len(count) < 10
-        if star and not (whole and 1 <= int(count) <= LONGEST_ORDER):
-            said = one_line(count, 40)
-            raise FabricError(
-                where, f"has the count '{said}'; it must be from 1 to {LONGEST_ORDER}"
-            )
-        rgb = parse_color(color, where)
-        for value in rgb:
-            RANGES["color"].require(where, value)
-        order += [rgb] * (int(count) if star else 1)
-    return order
-
-
 def _base_thread(options: argparse.Namespace) -> Thread:
     from dataclasses import replace
 
     from fabricusd.schema.anysource import load_any
     from fabricusd.weaves import DEFAULT_THREAD
 
-    thread = DEFAULT_THREAD
-    if options.thread:
-        file, _, wanted = options.thread.partition(":")
-        fabric, _notes = load_any(file)
-        if wanted and wanted not in fabric.threads:
-            raise FabricError(
-                f"--thread '{options.thread}'",
-                f"is not a thread of {file}; it must be one of {', '.join(fabric.threads)}",
-            )
-        thread = fabric.threads[wanted or next(iter(fabric.threads))]
-    if options.thickness is not None:
-        thread = replace(thread, thickness=options.thickness * 1e-3)
-    return thread
+    if not options.thread:
+        return DEFAULT_THREAD
+    file, _, wanted = options.thread.partition(":")
+    fabric, _notes = load_any(file)
+    if wanted and wanted not in fabric.threads:
+        raise FabricError(
+            f"--thread '{options.thread}'",
+            f"is not a thread of {file}{did_you_mean(wanted, fabric.threads)}; it must be one of "
+            f"{', '.join(fabric.threads)}",
+        )
+    thread = fabric.threads[wanted or next(iter(fabric.threads))]
+    # How it scatters is a matter of the fibre; how thick it is, of this cloth.
+    return replace(thread, thickness=0.0, linear_density=0.0)
 
 
 def _changed(fabric: Fabric, options: argparse.Namespace) -> Fabric:
@@ -201,7 +160,12 @@ def _changed(fabric: Fabric, options: argparse.Namespace) -> Fabric:
     name = options.name
     if not name and not options.preset:
         name = Path(
-            options.output or options.source or options.wif or options.image or fabric.name
+            options.output
+            or options.source
+            or options.wif
+            or options.image
+            or options.figure
+            or ("tartan" if options.tartan else fabric.name)
         ).stem
     if name:
         from fabricusd.schema.names import prim_name

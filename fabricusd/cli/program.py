@@ -9,7 +9,7 @@ import sys
 from typing import NoReturn
 
 from fabricusd.cli.main import main, refused
-from fabricusd.cli.stdout import drop_stdout
+from fabricusd.cli.terminal.stdout import drop_stdout
 
 GARBAGE = (100_000, 20, 100)
 """Thresholds of Python's garbage collector. Importing USD and numba creates hundreds of thousands

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fabricusd.cli.arguments.number import number
+from fabricusd.cli.arguments.staging import add_staging, given_staging
 from fabricusd.cli.arguments.units import add_units
 from fabricusd.errors import FabricError, one_line
 from fabricusd.ranges import RANGES, require_picture
@@ -27,6 +28,8 @@ the render and keeps the samples taken so far.
 example:
   fabricusd render garment.usda -o review.exr
   fabricusd render towel.obj --fabric silk_shot -o towel.exr --spp 256
+  fabricusd render coat.usda -o turn.png --studio --frame Coat --orbit 24 --quick
+  fabricusd render coat.usda -o sky.exr --dome sky.exr --dome-rotation 90 --background "#fff"
   fabricusd render shot.usda -o shot.exr --frames 1-24 --noise 0.02 --aov normal --aov depth"""
 
 MOST_FRAMES = 100_000
@@ -38,15 +41,24 @@ MOST_TOLD = 50
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to render, how well, and where to write it."""
     parser.add_argument("scene", metavar="SCENE", help="USD file, or a mesh file with --fabric")
-    parser.add_argument("-o", "--output", metavar="OUT", required=True, help=".exr or .png file")
+    parser.add_argument(
+        "out", metavar="OUT", nargs="?", help=".exr or .png file; -o OUT is the same"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        help=".exr or .png file (no default)",
+    )
     parser.add_argument(
         "--fabric",
         metavar="FILE[:/PRIM]",
-        help="fabric file, draft or preset for meshes without a fabric",
+        help="fabric file, draft or preset for meshes without a fabric (default: they are grey)",
     )
     add_units(parser)
     _add_picture(parser)
     _add_quality(parser)
+    add_staging(parser)
     parser.add_argument("--seed", type=number("seed"), default=0, help="random seed (default: 0)")
     parser.add_argument(
         "--workers", type=number("workers"), metavar="N", help="CPU threads (default: all)"
@@ -63,38 +75,69 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _add_picture(parser: argparse.ArgumentParser) -> None:
     """What the picture shows and holds."""
     parser.add_argument(
-        "--camera", metavar="PATH", help="prim path of the camera (default: the first one)"
+        "--camera",
+        "-cam",
+        metavar="NAME",
+        help="prim path of the camera, or its name if no other has it (default: the first one)",
     )
     parser.add_argument(
         "--width",
+        "--imageWidth",
+        "-w",
         type=number("width"),
         default=960,
         help="pixels across, which the camera's horizontal aperture fills (default: 960)",
     )
     parser.add_argument(
-        "--height", type=number("height"), default=540, help="pixels down (default: 540)"
+        "--height", type=number("height"), help="pixels down (default: 9/16 of the width)"
     )
     parser.add_argument(
         "--aov",
         action="append",
         default=[],
         metavar="LAYER",
-        help="also write this layer, or 'all' (repeatable)",
+        help="also write this layer of the .exr, or 'all' (repeatable; default: beauty alone)",
     )
     parser.add_argument(
-        "--frames", metavar="A-B", help="time codes to render: 7, 1-10, 1-10x2, or a list of these"
+        "--frames",
+        "-f",
+        metavar="A-B",
+        help="time codes to render: 7, 1-10, 1-10x2, 1:10, or a list of these (default: the first)",
     )
     parser.add_argument(
         "--exposure",
         type=number("exposure"),
         default=0.0,
         metavar="STOPS",
-        help="exposure of the .png (default: 0)",
+        help="exposure of the .png, in stops (default: 0)",
+    )
+    parser.add_argument(
+        "--view",
+        default="neutral",
+        metavar="VIEW",
+        help="how the .png shows the light: neutral (Khronos PBR Neutral: colours as they are, "
+        "highlights rolled off), srgb (clipped), aces, or 'ocio CONFIG[:VIEW]' in quotes, with the "
+        "file or name of an OpenColorIO config (default: neutral)",
     )
 
 
 def _add_quality(parser: argparse.ArgumentParser) -> None:
     """How much work to spend, and at which level of detail."""
+    preset = parser.add_mutually_exclusive_group()
+    preset.add_argument(
+        "--quick",
+        action="store_true",
+        help="--spp 16, denoised where Open Image Denoise is installed, unless told otherwise",
+    )
+    preset.add_argument(
+        "--final", action="store_true", help="--noise 0.02 --spp 2048, unless told otherwise"
+    )
+    parser.add_argument(
+        "--denoise",
+        action="store_true",
+        help="show the .png without noise, by Open Image Denoise; the .exr keeps the noisy beauty "
+        "beside a layer 'denoised'",
+    )
     parser.add_argument(
         "--spp", type=number("spp"), metavar="N", help="samples per pixel (default: 64)"
     )
@@ -102,7 +145,8 @@ def _add_quality(parser: argparse.ArgumentParser) -> None:
         "--noise",
         type=number("noise"),
         metavar="E",
-        help="stop sampling a pixel at this relative error",
+        help="stop sampling a pixel at this relative error, 0.05 for 5 %% (default: sample all "
+        "alike)",
     )
     parser.add_argument(
         "--max-bounces",
@@ -133,24 +177,32 @@ def _add_quality(parser: argparse.ArgumentParser) -> None:
         "--max-error",
         type=number("max_error"),
         metavar="E",
-        help="choose --shadow, --noise and the level for an error of at most this",
+        help="choose --shadow, --noise and the level for a relative error of at most this "
+        "(default: as "
+        "they are given)",
     )
     parser.add_argument(
-        "--complexity", choices=("auto", "low", "medium", "high", "veryhigh"), default="auto",
-        help="refinement of subdivision surfaces; low: none; auto: as fine as the picture shows",
+        "--complexity", "-c", choices=("auto", "low", "medium", "high", "veryhigh"), default="auto",
+        help="refinement of subdivision surfaces; low: none; auto: as fine as the picture shows "
+        "(default: auto)",
     )  # fmt: skip
 
 
 def run(options: argparse.Namespace) -> int:
     """Render, and report what was left out."""
+    _settle(options)
     require_picture(options.width, options.height)
+    from fabricusd.images.view import parse_view
     from fabricusd.reference import AOVS, read_scene, render
     from fabricusd.scene.size import mesh_words
+    from fabricusd.scene.staging import put
 
+    options.view = parse_view(options.view)
+    staging = given_staging(options)
     frames = None if options.frames is None else parse_frames(options.frames)
     output = Path(options.output)
     if options.no_clobber:
-        _refuse_existing(output, frames)
+        _refuse_existing(output, tuple(range(1, options.orbit + 1)) or frames)
     fabric = None
     if options.fabric:
         from fabricusd.schema.anysource import load_any
@@ -166,6 +218,7 @@ def run(options: argparse.Namespace) -> int:
             width=options.width,
             units=options.units,
         )
+        put(staging, scene, options.width / options.height)
         _tell(scene.notes, options)
         triangles = sum(len(mesh.triangles) for mesh in scene.meshes)
         words = f"{len(scene.meshes)} meshes, {triangles} triangles, {len(scene.lights)} lights"
@@ -184,6 +237,7 @@ def run(options: argparse.Namespace) -> int:
             max_bounces=options.max_bounces, max_translucent=options.max_translucent,
             level=options.level, shadow=options.shadow, limits=options.limits, aovs=layers,
             frames=frames, seed=options.seed, workers=options.workers, exposure=options.exposure,
+            view=options.view, staging=staging, denoise=options.denoise,
             complexity=options.complexity, units=options.units, progress=progress,
         )  # fmt: skip
     finally:
@@ -203,8 +257,27 @@ def run(options: argparse.Namespace) -> int:
     return 1 if too_noisy or not result.met else 0
 
 
+def _settle(options: argparse.Namespace) -> None:
+    """Settle what one option says for another: OUT, the height, --quick and --final."""
+    if options.out is not None and options.output is not None:
+        raise FabricError("-o", f"names a second picture, '{options.output}'; give one")
+    options.output = options.output or options.out
+    if options.output is None:
+        raise FabricError("OUT", "is missing; name the picture: -o OUT.exr")
+    if options.height is None:
+        options.height = max(round(options.width * 9 / 16), 1)
+    if options.quick:
+        from fabricusd.reference.denoise import has_denoiser
+
+        options.spp = options.spp or (None if options.noise else 16)
+        options.denoise = options.denoise or has_denoiser()
+    if options.final and options.max_error is None:
+        options.noise = options.noise or 0.02
+        options.spp = options.spp or 2048
+
+
 def _refuse_existing(output: Path, frames: tuple[float, ...] | None) -> None:
-    from fabricusd.reference.render import frame_files, written_files
+    from fabricusd.reference.picture_files import frame_files, written_files
 
     for _, target in frame_files(output, frames):
         for path in written_files(target):
@@ -263,7 +336,7 @@ def parse_frames(text: str) -> tuple[float, ...]:
     number = r"(-?[0-9.]+)"
     codes: list[float] = []
     for part in text.split(","):
-        found = re.fullmatch(rf"{number}(?:-{number})?(?:x([0-9.]+))?", part.strip())
+        found = re.fullmatch(rf"{number}(?:[-:]{number})?(?:x([0-9.]+))?", part.strip())
         try:
             if found is None:
                 raise ValueError

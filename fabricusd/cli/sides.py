@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from fabricusd.cli.arguments.number import number
-from fabricusd.cli.stdout import write_utf8
+from fabricusd.cli.terminal.stdout import write_utf8
 
 EPILOG = """The repeat is traced as tubes. The result is a layer that overrides the attributes
 fabric:sides:* of the fabric: sublayer it, or copy the lines into the fabric. Measure again after a

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, did_you_mean
 from fabricusd.kernels.real import INLINE, LEAN
 from fabricusd.reference.rays.wave import (
     ALBEDO,
@@ -76,7 +76,9 @@ def require_aovs(names: tuple[str, ...]) -> None:
     """Raise `FabricError` for a layer that does not exist."""
     for name in names:
         if name not in AOVS:
-            raise FabricError("aov", f"is '{name}'; it must be one of {', '.join(AOVS)}")
+            raise FabricError(
+                "aov", f"is '{name}'{did_you_mean(name, AOVS)}; it must be one of {', '.join(AOVS)}"
+            )
 
 
 class Film:

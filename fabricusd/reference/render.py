@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,28 +16,26 @@ from fabricusd.appearance.shadow.methods import METHODS
 from fabricusd.appearance.weave.footprint import DEFAULT, Limits
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
-from fabricusd.files import require_writable
-from fabricusd.images.files import write_exr, write_png
+from fabricusd.images.view import View, parse_view
 from fabricusd.ranges import RANGES, require_picture, require_ranges
 from fabricusd.reference.defaults import default_lights
-from fabricusd.reference.film import AOVS, Film, require_aovs
+from fabricusd.reference.denoise import GUIDES, denoised, require_denoiser
+from fabricusd.reference.film import Film, require_aovs
 from fabricusd.reference.integrator import Tracer
+from fabricusd.reference.picture_files import DENOISED, picture_targets, write_picture
 from fabricusd.reference.rays.camera import build_lens, default_camera
 from fabricusd.reference.rays.wave import ALPHA, Wave
 from fabricusd.reference.start.compile_ahead import EVERY_PICTURE, compile_ahead
 from fabricusd.reference.told import asked_for, note_losses, versions
-from fabricusd.reference.view_transform import view
 from fabricusd.run.workers import Batches, pixels_along_z_curve, worker_count
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.scene import Camera, Scene
+from fabricusd.scene.staging import Staging, over_background, put
 from fabricusd.stop import Stop
 
 BATCH = 1 << 13
 """Number of paths in a batch: large enough to amortise the start of a stage, small enough for the
 cache."""
-
-MOST_TRIED = 100
-"""Number of frames whose output files are checked before rendering starts."""
 
 PASS = 16
 """Samples per pixel in one pass over the picture; no pixel gets more before all have had these."""
@@ -106,6 +104,9 @@ def render(
     workers: int | None = None,
     pixel_filter: str = "tent",
     exposure: float = 0.0,
+    view: str | View = "neutral",
+    staging: Staging = Staging(),  # noqa: B008
+    denoise: bool = False,
     estimator: str = "mis",
     complexity: str = "auto",
     units: str | None = None,
@@ -124,6 +125,9 @@ def render(
         `max_bounces` 0
     frames : time codes; None for the stage's default time
     exposure : of the PNG, in stops, added to the camera's own
+    view : of the PNG, see `images.view`: "neutral", "srgb", "aces" or "ocio CONFIG[:VIEW]"
+    staging : the dome, the background, the studio and the camera of a review
+    denoise : add the layer `denoised`, which the PNG then shows; needs the extra `denoise`
     complexity : how finely subdivision surfaces are refined: "low" (their cages), "medium", "high"
         or "veryhigh" as in usdrecord and usdview, or "auto" for what the picture can show
     units : of an .obj or .ply, see `read_scene`
@@ -131,25 +135,24 @@ def render(
     Raises `FabricError` if the scene cannot be rendered at all. Whatever had to be left out is in
     the result's `notes`. On Ctrl-C, the samples taken so far are written, and `complete` is False.
     """
-    _require_settings(width, height, spp, noise, max_bounces, max_translucent, seed, workers)
-    require_ranges(exposure=exposure)
-    if shadow not in METHODS:
-        raise FabricError("shadow", f"is '{shadow}'; it must be one of {', '.join(METHODS)}")
-    layers = tuple(dict.fromkeys(("beauty", *aovs)))
-    require_aovs(layers)
-    for code in frames or ():
-        RANGES["frame"].require("frames", code)
-    targets = _targets(out, frames)
+    _require_settings(
+        width, height, spp, noise, max_bounces, max_translucent, seed, workers, exposure, shadow
+    )
+    shown = view if isinstance(view, View) else parse_view(view, "view")
+    layers = _layers(aovs, denoise)
+    targets = picture_targets(out, _numbers(frames, staging.orbit))
     compile_ahead(EVERY_PICTURE)
     begun = time.perf_counter()
     frame_results: list[RenderResult] = []
     paths: tuple[str, ...] = ()
     with Stop() as stop:
-        for number, (time_code, target) in enumerate(targets):
+        for number, (code, target) in enumerate(targets):
+            time_code = None if staging.orbit else code
             loaded = scene if isinstance(scene, Scene) else read_scene(
                 scene, fabric=fabric, camera=camera, time_code=time_code, complexity=complexity,
                 width=width, units=units,
             )  # fmt: skip
+            loaded = _staged(loaded, staging, width / height, number)
             result = render_scene(
                 loaded, width=width, height=height, spp=spp, noise=noise, max_bounces=max_bounces,
                 max_translucent=max_translucent, level=level, shadow=shadow, limits=limits,
@@ -158,15 +161,60 @@ def render(
                 progress=progress and _of_frame(progress, number, len(targets), begun),
             )  # fmt: skip
             stops = exposure + (loaded.camera.exposure if loaded.camera else 0.0)
-            result.metadata.update(asked_for(scene, time_code, stops))
-            if target is not None:
-                paths += _write(target, result, stops)
+            _finish(result, staging, denoise)
+            result.metadata.update(asked_for(scene, time_code, stops, shown))
+            paths += write_picture(target, result.layers, result.metadata, stops, shown)
             # Keep only the last frame's layers: those of all frames would fill the memory.
             frame_results = [replace(r, layers={}) for r in frame_results] + [result]
             stop.release()
             if stop.asked or not result.complete:
                 break
     return _together(frame_results, paths, complete=len(frame_results) == len(targets))
+
+
+def _layers(aovs: tuple[str, ...], denoise: bool) -> tuple[str, ...]:
+    """The layers to render: those asked for, and the guides of the denoiser, if there is one."""
+    if denoise:
+        require_denoiser()
+    layers = tuple(dict.fromkeys(("beauty", *aovs, *(GUIDES if denoise else ()))))
+    require_aovs(layers)
+    return layers
+
+
+def _numbers(frames: tuple[float, ...] | None, orbit: int) -> tuple[float, ...] | None:
+    """The numbers of the pictures: time codes, or places on an orbit; None for one picture."""
+    for code in frames or ():
+        RANGES["frame"].require("frames", code)
+    if orbit and frames:
+        raise FabricError("orbit", "cannot be had with frames; it must be one of both")
+    return tuple(range(1, orbit + 1)) or frames
+
+
+def _staged(scene: Scene, staging: Staging, aspect: float, number: int) -> Scene:
+    """`scene` as `staging` asks for it, for picture `number` from 0 of an orbit.
+
+    A scene in memory stays the caller's.
+    """
+    own = replace(
+        scene, lights=[*scene.lights], meshes=[*scene.meshes], materials=[*scene.materials]
+    )
+    if staging.dome is None and not staging.studio:
+        _light(own)
+    put(staging, own, aspect, turn=math.tau * number / (staging.orbit or 1))
+    return own
+
+
+def _finish(result: RenderResult, staging: Staging, denoise: bool) -> None:
+    """Lay the picture over its background, and denoise it."""
+    layers = result.layers
+    if denoise:
+        layers[DENOISED] = denoised(layers)
+    if staging.background is not None:
+        alpha = layers["beauty"][..., 3:4]
+        layers["beauty"] = over_background(layers["beauty"], staging.background)
+        if denoise:
+            smooth = np.concatenate((layers[DENOISED], alpha), axis=-1)
+            layers[DENOISED] = over_background(smooth, staging.background)[..., :3]
 
 
 def _of_frame(progress: Progress, number: int, frames: int, begun: float) -> Progress:
@@ -207,56 +255,17 @@ def _require_settings(
     max_translucent: int | None,
     seed: int,
     workers: int | None,
+    exposure: float = 0.0,
+    shadow: str = METHODS[0],
 ) -> None:
     require_picture(width, height)
-    require_ranges(max_bounces=max_bounces, seed=seed)
+    require_ranges(max_bounces=max_bounces, seed=seed, exposure=exposure)
+    if shadow not in METHODS:
+        raise FabricError("shadow", f"is '{shadow}'; it must be one of {', '.join(METHODS)}")
     optional = {
         "spp": spp, "noise": noise, "workers": workers, "max_translucent": max_translucent,
     }  # fmt: skip
     require_ranges(**{name: value for name, value in optional.items() if value is not None})
-
-
-def _targets(
-    out: str | os.PathLike[str] | None, frames: tuple[float, ...] | None
-) -> list[tuple[float | None, Path | None]]:
-    """(time code, file) of each picture. Raises FabricError for a file that cannot be written."""
-    if out is None:
-        return [(code, None) for code in frames or (None,)]
-    path = Path(out)
-    if path.suffix.lower() not in (".exr", ".png"):
-        raise FabricError(str(path), "is not a picture format; it must end in .exr or .png")
-    targets = frame_files(path, frames)
-    for _, target in targets[:MOST_TRIED]:
-        for file in written_files(target):
-            require_writable(file)
-    return [*targets]
-
-
-def frame_files(path: Path, frames: tuple[float, ...] | None) -> list[tuple[float | None, Path]]:
-    """(time code, file) of each picture: `path` itself, or numbered before its suffix."""
-    if not frames:
-        return [(None, path)]
-    return [
-        (code, path.with_name(f"{path.stem}.{code:04.10g}{path.suffix}"))
-        if code != int(code)
-        else (code, path.with_name(f"{path.stem}.{int(code):04d}{path.suffix}"))
-        for code in frames
-    ]
-
-
-def written_files(target: Path) -> list[Path]:
-    """All files that are written for one picture: an EXR has a PNG beside it."""
-    return list(dict.fromkeys([target, target.with_suffix(".png")]))
-
-
-def _write(target: Path, result: RenderResult, exposure: float) -> tuple[str, ...]:
-    """Write the picture's files and return their names."""
-    picture = view(result.layers["beauty"][..., :3], exposure)
-    files = written_files(target)
-    if target.suffix.lower() == ".exr":
-        write_exr(target, result.layers, AOVS, result.metadata)
-    write_png(files[-1], picture)
-    return tuple(str(file) for file in files)
 
 
 def render_scene(
@@ -345,11 +354,16 @@ def render_scene(
     )
 
 
-def _furnished(scene: Scene, width: int, height: int) -> Camera:
-    """The scene's camera, or one that sees the whole scene. Adds lights to a scene without any."""
+def _light(scene: Scene) -> None:
+    """Add lights to a scene without any, with a note."""
     if not scene.lights:
         scene.lights = default_lights(scene)
         scene.note("the scene", "has no light; a sky and a key light are added")
+
+
+def _furnished(scene: Scene, width: int, height: int) -> Camera:
+    """The scene's camera, or one that sees the whole scene. Adds lights to a scene without any."""
+    _light(scene)
     if scene.camera is None:
         scene.note("the scene", "has no camera; one that sees all of it from the front is used")
     return scene.camera or default_camera(scene, width, height)

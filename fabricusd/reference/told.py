@@ -10,6 +10,7 @@ import numba
 import numpy as np
 
 import fabricusd
+from fabricusd.images.view import View
 from fabricusd.reference.integrator import Tracer
 from fabricusd.reference.nothing_seen import reason_for_nothing
 from fabricusd.reference.rays.camera import Lens
@@ -44,9 +45,9 @@ def note_losses(
         scene.note("the picture", reason_for_nothing(tracer, lens, *size))
 
 
-def asked_for(source: Any, time_code: float | None, stops: float) -> dict[str, Any]:
+def asked_for(source: Any, time_code: float | None, stops: float, view: View) -> dict[str, Any]:
     """The metadata that tell a picture's source and how its PNG was made."""
-    known: dict[str, Any] = {"fabricusd:exposure": stops}
+    known: dict[str, Any] = {"fabricusd:exposure": stops, "fabricusd:view": str(view)}
     if not isinstance(source, Scene):
         known["fabricusd:scene"] = os.fspath(source)
     if time_code is not None:

@@ -29,7 +29,7 @@ def read_scene(
     """Read the scene of a USD or mesh file, in metres.
 
     fabric : for every mesh file and every surface without a material of its own
-    camera : path of a camera in a USD file
+    camera : path of a camera in a USD file, or its name where no other camera has it
     complexity : how finely subdivision surfaces are refined: "low" to "veryhigh", or "auto" for
         what a picture of `width` pixels can show. By default they are not refined, because textures
         are baked and materials are bound on the faces for which the UVs were laid out

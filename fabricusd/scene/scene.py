@@ -104,6 +104,7 @@ class Light:
     angle : float - diameter of a distant light [rad]
     image : (h, w, 3) float32 or None - a dome's latitude-longitude picture, which `radiance` scales
     camera_visible : bool - whether the camera sees the light; indirect rays always do
+    hidden : bool - whether the camera does not see a dome, which it otherwise sees
     """
 
     path: str
@@ -116,6 +117,7 @@ class Light:
     angle: float = 0.0
     image: NDArray[np.float32] | None = None
     camera_visible: bool = False
+    hidden: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

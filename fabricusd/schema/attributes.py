@@ -18,6 +18,7 @@ from fabricusd.sides import Sides
 DEGREE = math.pi / 180.0
 MILLIMETRE = 1e-3
 PER_CENTIMETRE = 100.0
+TEX = 1e-6
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ THREAD = (
     Attribute("thread:gammaVolume", "double", Thread, "gamma_volume", DEGREE, "degrees"),
     Attribute("thread:surfaceGain", "double", Thread, "surface_gain"),
     Attribute("thread:thickness", "double", Thread, "thickness", MILLIMETRE, "mm"),
+    Attribute("thread:linearDensity", "double", Thread, "linear_density", TEX, "tex"),
     Attribute("thread:color", "color3d", Thread, "color"),
     Attribute("thread:unevenness:cv", "double", Thread, "unevenness_cv"),
     Attribute("thread:unevenness:length", "double", Thread, "unevenness_length", MILLIMETRE, "mm"),

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import math
 import textwrap
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
 
 from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage
 from fabricusd.fabric import Fabric, TangentCurve, Thread, ThreadSet
+from fabricusd.weaves.cloth import weight, yarn_of
+from fabricusd.weaves.floats import longest_float
+from fabricusd.weaves.yarn import DEFAULT_FIBRE, FIBRES, PACKING, count_words
+
+PEIRCE = (
+    f"Peirce's {DEFAULT_FIBRE} yarn ({FIBRES[DEFAULT_FIBRE] / 1000:.3g} g/cm3, packing {PACKING:g})"
+)
+"""The yarn that a thread of unknown count is taken for."""
 
 INCHES_PER_METRE = 1 / 0.0254
 
@@ -32,7 +40,8 @@ def in_words(fabric: Fabric, width: int = 80) -> str:
         "",
         _set_line("warp", "end", fabric.warp, area_warp, fabric),
         _set_line("weft", "pick", fabric.weft, area_weft, fabric),
-        f"  gap   {100 * float(share.gap):.3g} % of the cloth",
+        f"  gap   {_percent(float(share.gap))} % of the cloth",
+        f"  weight: {_weight(fabric)}",
         f"  floats: {_floats(weave.cells)}",
         f"  seen from behind: {fabric.back.name if fabric.back else 'this weave, mirrored'}"
         + ("; opaque" if fabric.opaque else ""),
@@ -42,7 +51,7 @@ def in_words(fabric: Fabric, width: int = 80) -> str:
         "",
     ]
     for index, (name, thread) in enumerate(fabric.threads.items()):
-        lines += _thread_lines(index, name, thread, width)
+        lines += _thread_lines(index, name, thread, fabric, width)
     return "\n".join(lines)
 
 
@@ -53,6 +62,26 @@ def _stated(fabric: Fabric) -> str:
     if len(stated) in (0, len(names)):
         return "stated" if stated else "the presets' median"
     return f"{', '.join(stated)} stated; otherwise the presets' median"
+
+
+def _percent(share: float) -> str:
+    # Rounding leaves a gap of 1e-16 where there is none.
+    return f"{100 * share:.3g}" if share > 1e-9 else "0"
+
+
+def _weight(fabric: Fabric) -> str:
+    """The cloth's weight, its crimp, and what both rest on."""
+    heavy = weight(fabric)
+    if heavy is None:
+        return "not known: no curve tells the length of a pile"
+    words = (
+        f"{heavy}; crimp of the curves {100 * heavy.warp_crimp:.3g} and "
+        f"{100 * heavy.weft_crimp:.3g} %"
+    )
+    used = {k for threads in (fabric.warp, fabric.weft) for k in threads.sequence}
+    if all(fabric.thread_list[k].linear_density for k in used):
+        return words
+    return f"{words}; counts in brackets are those of {PEIRCE} as thick"
 
 
 def _plural(number: int, noun: str) -> str:
@@ -84,26 +113,6 @@ def _sequence(sequence: tuple[int, ...], names: list[str], longest: int = 8) -> 
     return ", ".join(words) + more
 
 
-def longest_float(cells: np.ndarray[Any, np.dtype[np.bool_]], axis: int) -> int | None:
-    """Longest run of warp on top along axis 1, or of weft on top along axis 0; None where endless.
-
-    Runs go on across the repeat's border.
-    """
-    on_top = cells if axis == 1 else ~cells.T
-    broken = on_top[~on_top.all(axis=1)]
-    if len(broken) < len(on_top):
-        return None
-    longest = 0
-    # A stripe of rows at a time: the run starts and ends of a whole jacquard would take a gigabyte.
-    for first in range(0, len(broken), 128):
-        stripe = broken[first : first + 128]
-        twice = np.zeros((stripe.shape[0], 2 * stripe.shape[1] + 1), np.bool_)
-        twice[:, 1:] = np.tile(stripe, (1, 2))
-        breaks = np.flatnonzero(~twice)
-        longest = max(longest, int(np.diff(np.append(breaks, twice.size)).max()) - 1)
-    return longest
-
-
 def _floats(cells: np.ndarray[Any, np.dtype[np.bool_]]) -> str:
     words = []
     for label, axis, noun in (("warp", 1, "pick"), ("weft", 0, "end")):
@@ -115,7 +124,7 @@ def _floats(cells: np.ndarray[Any, np.dtype[np.bool_]]) -> str:
     return ", ".join(words)
 
 
-def _thread_lines(index: int, name: str, thread: Thread, width: int) -> list[str]:
+def _thread_lines(index: int, name: str, thread: Thread, fabric: Fabric, width: int) -> list[str]:
     degrees = math.degrees
     thick = f"{thread.thickness * 1e3:.3g} mm" if thread.thickness else "as thick as its pitch"
     albedo = ", ".join(f"{a:.3g}" for a in thread.albedo)
@@ -123,6 +132,7 @@ def _thread_lines(index: int, name: str, thread: Thread, width: int) -> list[str
     lines = [
         f"  {index} {name}: {thick}, albedo ({albedo}), ior {thread.ior:.4g}, "
         f"isotropic {thread.isotropic:.3g}{model}",
+        f"    yarn: {_count(index, thread, fabric)}",
         f"    lobes: surface {degrees(thread.gamma_surface):.3g}, "
         f"volume {degrees(thread.gamma_volume):.3g} degrees; {curve_words(thread.curve)}",
     ]
@@ -133,6 +143,17 @@ def _thread_lines(index: int, name: str, thread: Thread, width: int) -> list[str
             thread.documentation, width, initial_indent="    ", subsequent_indent="    "
         )
     return lines
+
+
+def _count(index: int, thread: Thread, fabric: Fabric) -> str:
+    """The thread's count, in brackets where it is derived from the thickness."""
+    if thread.linear_density:
+        return count_words(thread.linear_density)
+    sets = [threads for threads in (fabric.warp, fabric.weft) if index in threads.sequence]
+    return (
+        "; ".join(dict.fromkeys(f"({count_words(yarn_of(thread, threads))})" for threads in sets))
+        or "not used"
+    )
 
 
 def curve_words(curve: TangentCurve) -> str:
@@ -193,6 +214,7 @@ def as_dict(fabric: Fabric) -> dict[str, Any]:
         },
         **sets,
         "gap": float(share.gap),
+        "weight": _weight_dict(fabric),
         "model": fabric.model,
         "surface_law": fabric.surface_law,
         "opaque": fabric.opaque,
@@ -204,6 +226,12 @@ def as_dict(fabric: Fabric) -> dict[str, Any]:
     }
 
 
+def _weight_dict(fabric: Fabric) -> dict[str, float] | None:
+    """Masses per area [kg/m2] and crimps; None for pile."""
+    heavy = weight(fabric)
+    return None if heavy is None else {**asdict(heavy), "total": heavy.total}
+
+
 def _thread_dict(thread: Thread) -> dict[str, Any]:
     return {
         "albedo": list(thread.albedo),
@@ -213,6 +241,7 @@ def _thread_dict(thread: Thread) -> dict[str, Any]:
         "gamma_volume": math.degrees(thread.gamma_volume),
         "surface_gain": thread.surface_gain,
         "thickness": thread.thickness,
+        "linear_density": thread.linear_density,
         "model": thread.model or "inherit",
         "curve": {
             "positions": list(thread.curve.positions),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pxr import Sdf, Tf, Usd, UsdUtils
 
-from fabricusd.errors import FabricError, one_line, reads
+from fabricusd.errors import FabricError, did_you_mean, one_line, reads
 from fabricusd.files import readable_file
 from fabricusd.schema.access import kind_of, type_of
 
@@ -53,7 +53,8 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
     path, _ = split_source(source)
     missing = "does not exist"
     if not path.suffix:
-        missing = f"is neither a file nor a preset; presets are {', '.join(preset_names())}"
+        hint = did_you_mean(str(path), preset_names())
+        missing = f"is neither a file nor a preset{hint}; presets are {', '.join(preset_names())}"
     readable_file(path, missing=missing)
     with usd_errors(str(path)):
         if Sdf.FileFormat.FindByExtension(str(path)) is None:

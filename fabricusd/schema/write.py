@@ -45,11 +45,17 @@ def require_layer_name(path: str) -> None:
         raise FabricError(path, f"has another suffix than {', '.join(EXTENSIONS)}")
 
 
-def export(layer: Sdf.Layer, path: str | os.PathLike[str], *, clobber: bool = True) -> None:
-    """Write any layer to `path`, whole or not at all; FabricError where it cannot be."""
+def export(
+    layer: Sdf.Layer, path: str | os.PathLike[str], *, clobber: bool = True, format: str = ""
+) -> None:
+    """Write any layer to `path`, whole or not at all; FabricError where it cannot be.
+
+    format : "usda" or "usdc", of a .usd file; "" for what USD chooses
+    """
     target = os.fspath(path)
     with usd_errors(target, "written"), whole_file(target, clobber=clobber) as temporary:
-        if not layer.Export(str(temporary)):
+        told = {"format": format} if format and target.lower().endswith(".usd") else {}
+        if not layer.Export(str(temporary), "", told):
             raise FabricError(target, "cannot be written")
 
 

@@ -13,9 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.errors import FabricError, one_line
+from fabricusd.ranges import RANGES
 from fabricusd.srgb import linear_from_srgb, srgb_from_linear
 
 RGB = tuple[float, float, float]
+
+LONGEST_ORDER = 16384
+"""Most threads of one colour in a row; equal to the most threads of a draft."""
 
 
 def palette_from_codes(codes: ArrayLike, low: float = 0, high: float = 255) -> tuple[RGB, ...]:
@@ -47,6 +51,25 @@ def parse_color(text: str, where: str = "colour") -> RGB:
     if not all(math.isfinite(x) and x >= 0 for x in (r, g, b)):
         raise FabricError(where, f"is '{one_line(text, 40)}'; {accepted}")
     return (r, g, b)
+
+
+def color_order(items: Sequence[str], where: str) -> tuple[RGB, ...]:
+    """`4*#111 4*#eee` -> linear colours of eight threads; raises FabricError, naming `where`."""
+    order: list[RGB] = []
+    for item in items:
+        count, star, color = item.rpartition("*")
+        # Python refuses to convert numbers of thousands of digits.
+        whole = count.isdecimal() and len(count) < 10
+        if star and not (whole and 1 <= int(count) <= LONGEST_ORDER):
+            said = one_line(count, 40)
+            raise FabricError(
+                where, f"has the count '{said}'; it must be from 1 to {LONGEST_ORDER}"
+            )
+        rgb = parse_color(color, where)
+        for value in rgb:
+            RANGES["color"].require(where, value)
+        order += [rgb] * (int(count) if star else 1)
+    return tuple(order)
 
 
 def describe_code(code: Sequence[int] | NDArray[np.uint8]) -> str:

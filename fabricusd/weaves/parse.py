@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, did_you_mean
 from fabricusd.weaves.draft import Draft, quoted
 from fabricusd.weaves.expression import parse_expression
 from fabricusd.weaves.named import WEAVES, forms, parse_named
@@ -21,8 +20,7 @@ def parse_weave(text: str) -> Draft:
         return parse_named(text)
     if re.search(r"[()<>=%]", text):
         return parse_expression(text)
-    near = difflib.get_close_matches(words[0], WEAVES, n=1) if words else []
-    hint = f" (did you mean {near[0]}?)" if near else ""
+    hint = did_you_mean(words[0], WEAVES) if words else ""
     raise FabricError(
         f"weave {quoted(text)}",
         f"is not known{hint}; it must be one of {forms()}, or an expression such as "

@@ -31,10 +31,20 @@ OPTIONS = {
     ("render", "--exposure"): ("100000", "-101"),
     ("render", "--seed"): (str(2**63), "1.5"),
     ("render", "--workers"): ("0", "-1", "1025", "100000"),
+    ("render", "--dome-rotation"): ("361", "-361"),
+    ("render", "--orbit"): ("0", "-1", "3601", "1.5"),
     ("bake", "--workers"): ("0", "-1", "1025", "100000"),
     ("new", "--ends-per-cm"): ("0", "-3", "10001"),
     ("new", "--picks-per-cm"): ("0", "-3", "10001"),
     ("new", "--thickness"): ("-0.1", "1001"),
+    ("dress", "--grain"): ("361", "-361"),
+    ("dress", "--scale"): ("-1", "1e7"),
+    ("new", "--ends-per-inch"): ("0", "-3", "25401"),
+    ("new", "--picks-per-inch"): ("0", "-3", "25401"),
+    ("new", "--packing"): ("0", "-0.1", "1.1"),
+    ("new", "--figure-ends"): ("0", "-1", "16385", "1.5"),
+    ("new", "--figure-picks"): ("0", "-1", "16385", "1.5"),
+    ("new", "--longest-float"): ("1", "-1", "16385", "1.5"),
     ("compare", "--max-flip"): ("-0.1", "1001"),
     ("compare", "--max-error"): ("-0.1", "1001"),
     ("compare", "--significance"): ("0", "-0.1", "0.6"),
@@ -44,6 +54,7 @@ OPTIONS = {
 ARGUMENTS = {
     "render": ["x.obj", "-o", "out.exr"],
     "bake": ["x.obj", "--fabric", "velvet", "-o", "out"],
+    "dress": ["x.obj", "--fabric", "velvet", "-o", "out.usda"],
     "new": ["--weave", "plain", "-o", "out.usda"],
     "compare": ["a.png", "b.png", "-o", "out.png"],
     "sides": ["linen_plain", "-o", "out.usda"],
@@ -131,8 +142,11 @@ def test_the_table_has_every_option_that_takes_a_number():
     assert found - OTHERS == set(OPTIONS)
 
 
-OTHERS = {("bake", option) for option in ("--resolution", "--texels-per-thread", "--max-error")}
-"""Options with a `type` whose values `tests/bake` judges."""
+OTHERS = {
+    *(("bake", option) for option in ("--resolution", "--texels-per-thread", "--max-error")),
+    ("render", "--imageWidth"),
+}
+"""Options with a `type` whose values `tests/bake` judges, and another name of one above."""
 
 
 BOUNDS = {
@@ -209,11 +223,11 @@ def test_so_many_workers_are_refused_where_they_are_counted():
 
 
 def test_a_camera_of_any_exposure_makes_a_picture():
-    from fabricusd.reference.view_transform import view
+    from fabricusd.images.view import encode
 
     for stops in (1e5, -1e5, 1e308, float("inf"), -float("inf")):
-        code = view(np.array([[[0.5, 3e38, 0.0]]], np.float32), stops)
-        assert code.tolist() == ([[[255, 255, 0]]] if stops > 0 else [[[0, 0, 0]]])
+        code = encode(np.array([[[0.5, 3e38, 0.0]]], np.float32), stops)
+        assert code.tolist() == ([[[255, 255, 255]]] if stops > 0 else [[[0, 0, 0]]])
 
 
 def test_options_are_described_with_a_type_that_argparse_can_name():

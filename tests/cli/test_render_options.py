@@ -24,7 +24,7 @@ def test_frames_are_time_codes(text):
     assert parse_frames(text) == FRAMES[text]
 
 
-@pytest.mark.parametrize("text", ["", "x", "1-", "3-1", "1-2x0", "inf", "1:3", "1-2-3", "1.2.3"])
+@pytest.mark.parametrize("text", ["", "x", "1-", "3-1", "1-2x0", "inf", "1::3", "1-2-3", "1.2.3"])
 def test_frames_that_are_none_are_refused_with_the_text(text):
     with pytest.raises(FabricError, match="--frames is"):
         parse_frames(text)

@@ -284,6 +284,17 @@ def test_a_camera_that_is_not_there_is_an_error_that_names_those_that_are(tmp_pa
     UsdGeom.Camera.Define(stage, "/front")
     with pytest.raises(FabricError, match=r"/side is not a camera; cameras are: /front"):
         read(stage, camera="/side")
+    with pytest.raises(FabricError, match=r":frnt is not a camera \(did you mean 'front'\?\)"):
+        read(stage, camera="frnt")
+
+
+def test_a_camera_is_found_by_its_name_where_no_other_has_it(tmp_path):
+    stage = new_stage(tmp_path)
+    for path in ("/one/close", "/two/close", "/two/wide"):
+        UsdGeom.Camera.Define(stage, path)
+    assert read(stage, camera="wide").camera.path == "/two/wide"
+    with pytest.raises(FabricError, match="is the name of 2 cameras; give a path: /one/close, /t"):
+        read(stage, camera="close")
 
 
 FILES = {

@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import given
 
 from fabricusd.schema import load
-from fabricusd.schema.describe import curve_words, in_words, longest_float
+from fabricusd.schema.describe import curve_words, in_words
+from fabricusd.weaves.floats import longest_float
 from tests.strategies import weaves
 
 

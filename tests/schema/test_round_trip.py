@@ -64,6 +64,7 @@ OTHER_VALUES = {
     "thread:albedo": (0.1, 0.2, 0.3), "thread:color": (0.3, 0.2, 0.1), "thread:ior": 1.7,
     "thread:isotropic": 0.9, "thread:gammaSurface": 3.0, "thread:gammaVolume": 6.0,
     "thread:surfaceGain": 0.125, "thread:model": "thesis", "thread:thickness": 0.75,
+    "thread:linearDensity": 20.0,
     "thread:curve:positions": [0.0, 0.0, 1.0], "thread:curve:angles": [-10.0, 20.0, 30.0],
     # Lengths come first: without them, what varies along the thread is refused.
     "thread:unevenness:length": 5.0, "thread:unevenness:cv": 0.2, "thread:unevenness:count": 0.1,

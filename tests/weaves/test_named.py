@@ -117,7 +117,7 @@ def test_houndstooth_has_four_dark_and_four_light_threads_both_ways() -> None:
 BAD = {
     "nothing": ("", "weave '' is not known"),
     "unknown": ("velvet", "weave 'velvet' is not known; it must be one of plain"),
-    "misspelt": ("twil 2/1", "did you mean twill"),
+    "misspelt": ("twil 2/1", "did you mean 'twill'"),
     "extra word": ("plain 2", "'2' is not expected here"),
     "one run": ("twill 2", "pairs of over and under"),
     "zero run": ("twill 2/0", "'0' is not a whole number of at least 1"),

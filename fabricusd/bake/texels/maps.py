@@ -20,7 +20,7 @@ from fabricusd.appearance.weave.lookup import NO_THREAD, thread_number
 from fabricusd.bake.layout.garment import Lay
 from fabricusd.bake.texels import moment_indices as m
 from fabricusd.bake.texels.recipe import Recipe
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, did_you_mean
 
 Moments = NDArray[np.float32]
 
@@ -166,7 +166,9 @@ def chosen_maps(
     unknown = [n for n in names if n not in REGISTRY]
     if unknown:
         raise FabricError(
-            f"map '{unknown[0]}'", f"is unknown; it must be one of {', '.join(REGISTRY)}"
+            f"map '{unknown[0]}'",
+            f"is unknown{did_you_mean(unknown[0], REGISTRY)}; it must be one of "
+            f"{', '.join(REGISTRY)}",
         )
     for n in names:
         if REGISTRY[n].needs_light and not light:

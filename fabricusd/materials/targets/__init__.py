@@ -49,7 +49,7 @@ TARGETS = (
     ),
     Target(
         name="usdz-web", metavar="FILE", module="package_web",
-        help="the same for readers that know no EXR (three.js, AR): 8-bit PNG textures",
+        help="also package it for readers that know no EXR (three.js, AR): 8-bit PNG textures",
     ),
     Target(
         name="asset", metavar="FOLDER", module="asset",

@@ -43,7 +43,9 @@ def build_lights(lights: list[Light], centre: NDArray[np.float64]) -> Lights:
     dome = _merge_domes(domes)
     if domes:
         # One row stands for all domes: their pictures are merged.
-        rows.append(_row(Light(path="", kind=DOME, radiance=(0.0, 0.0, 0.0)), centre))
+        hidden = all(light.hidden for light in domes)
+        merged = Light(path="", kind=DOME, radiance=(0.0, 0.0, 0.0), hidden=hidden)
+        rows.append(_row(merged, centre))
     if rows:
         table = np.ascontiguousarray(rows, np.float32)
         table[:, CHANCE] = 1 / len(rows)

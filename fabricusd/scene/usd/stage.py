@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 import fabricusd.schema  # registers the schema
-from fabricusd.errors import FabricError, one_line
+from fabricusd.errors import FabricError, did_you_mean, one_line
 from fabricusd.fabric import Binding
 from fabricusd.scene.scene import Camera, Scene
 from fabricusd.scene.surface.fineness import Fineness
@@ -65,7 +65,8 @@ def read_usd_scene(
     """Everything that is visible on the stage at `time_code`, or at its earliest time for None.
 
     binding : the fabric of meshes without a material of their own
-    camera : path of the camera's prim; None takes the first camera on the stage
+    camera : path of the camera's prim, or its name where no other camera has it; None takes the
+        first camera on the stage
     fineness : of subdivision surfaces; its camera is set to the one that is found
     """
     stage, notes = _open(path)
@@ -280,13 +281,30 @@ class _Reader:
         for root, place in placed(prim, self.time, self.scene):
             self._visit(root, cache, world @ place, (*inside, prim.GetPath()))
 
+    def _camera_prim(self, path: Path, name: str) -> Usd.Prim:
+        """The camera at the path `name`, or the only camera whose prim has that name."""
+        prim = self.stage.GetPrimAtPath(name) if Sdf.Path.IsValidPathString(name) else None
+        if prim and not prim.IsPseudoRoot() and prim.IsA(UsdGeom.Camera):
+            return prim
+        namesakes = [camera for camera in self.cameras if camera.GetName() == name]
+        if len(namesakes) == 1:
+            return namesakes[0]
+        paths = [str(camera.GetPath()) for camera in self.cameras]
+        if namesakes:
+            several = ", ".join(str(camera.GetPath()) for camera in namesakes)
+            raise FabricError(
+                f"{path}:{name}", f"is the name of {len(namesakes)} cameras; give a path: {several}"
+            )
+        names = [camera.GetName() for camera in self.cameras]
+        hint = did_you_mean(name, paths if "/" in name else names)
+        raise FabricError(
+            f"{path}:{name}", f"is not a camera{hint}; cameras are: {', '.join(paths) or 'none'}"
+        )
+
     def _camera(self, path: Path, name: str | None) -> Camera | None:
         """The camera `name`, or the first camera that sees anything; None where there is none."""
         if name is not None:
-            prim = self.stage.GetPrimAtPath(name) if Sdf.Path.IsValidPathString(name) else None
-            if not prim or not prim.IsA(UsdGeom.Camera):
-                known = ", ".join(str(p.GetPath()) for p in self.cameras) or "none"
-                raise FabricError(f"{path}:{name}", f"is not a camera; cameras are: {known}")
+            prim = self._camera_prim(path, name)
             found = self._read_camera(prim)
             if found is None:
                 own = [n for n in self.scene.notes if n.startswith(f"{prim.GetPath()} ")]

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from pxr import Sdf, Usd
 
+from fabricusd.errors import did_you_mean
 from fabricusd.fabric import describe_limits, within_limits
 from fabricusd.schema import attributes
 from fabricusd.schema.access import (
@@ -88,7 +89,8 @@ def property_known(prim: Usd.Prim) -> Iterator[Fault]:
     known = {name for definition in definitions(prim) for name in definition}
     for name in prim.GetAuthoredPropertyNames():
         if name.startswith(("fabric:", "thread:")) and name not in known:
-            yield name, f"is not in the schema of {type_of(prim)}; it is not read"
+            hint = did_you_mean(name, known)
+            yield name, f"is not in the schema of {type_of(prim)}{hint}; it is not read"
 
 
 @rule(FABRIC, BINDING)

@@ -181,6 +181,20 @@ def threads_used(prim: Usd.Prim) -> Iterator[Fault]:
 
 
 @rule(FABRIC, severity="warning", sound=True)
+def gap_is_asked_for(prim: Usd.Prim) -> Iterator[Fault]:
+    """Cloth closes, up to 3 % of gap, unless a coverage asks for more or the cloth is opaque."""
+    from fabricusd.schema.rules.closed import unasked_gap
+
+    problem = unasked_gap(build_side(prim))
+    if problem:
+        yield (
+            "",
+            f"{problem}; make the threads thicker or denser, or set fabric:warp:coverage and "
+            "fabric:weft:coverage if the gap is meant",
+        )
+
+
+@rule(FABRIC, severity="warning", sound=True)
 def albedo_is_safe(prim: Usd.Prim) -> Iterator[Fault]:
     """The fabric reflects at most the light that it receives, in every view."""
     from fabricusd.appearance.albedo import QUICK, WORST_VIEWS, albedo_by_view, safe_albedo

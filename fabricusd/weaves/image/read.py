@@ -25,6 +25,7 @@ from fabricusd.weaves.color import (
     palette_from_codes,
 )
 from fabricusd.weaves.draft import LIMIT, Draft
+from fabricusd.weaves.floats import LOOM_FLOAT, long_float_words
 from fabricusd.weaves.image.file import CodeImage
 from fabricusd.weaves.image.threads import find_threads
 
@@ -77,12 +78,12 @@ def read_image(
             y, x = (int(n) for n in np.unravel_index(wrong, image.shape))
             code = f"#{image.pixel(x, y):06x}"
             raise FabricError(f"{where} pixel ({x}, {y})", f"is {code}; it must be black or white")
-        warp_on_top = _looked_up(image, found, np.asarray(light if invert else dark))
+        cells = _cells(_looked_up(image, found, np.asarray(light if invert else dark)))
         return Draft(
-            weave=Weave(_cells(warp_on_top), name),
+            weave=Weave(cells, name),
             title=name,
             source=Path(path).name,
-            warnings=noticed,
+            warnings=(*noticed, *_too_long(cells)),
         )
     if len(colors) > MOST_COLORS:
         raise FabricError(
@@ -96,14 +97,26 @@ def read_image(
         _indices(weft_colors, colors, "weft"),
         lightest_first=invert,
     )
+    cells = _cells(threads.warp_on_top)
     return Draft(
-        weave=Weave(_cells(threads.warp_on_top), name),
+        weave=Weave(cells, name),
         palette=palette_from_codes(colors),
         warp_colors=tuple(threads.columns.tolist()),
         weft_colors=tuple(threads.rows[::-1].tolist()),
         title=name,
         source=Path(path).name,
-        warnings=(*noticed, *threads.warnings),
+        warnings=(*noticed, *threads.warnings, *_too_long(cells)),
+    )
+
+
+def _too_long(cells: NDArray[np.bool_]) -> tuple[str, ...]:
+    """A warning of floats that no loom would make, as artwork has that is taken for a drawdown."""
+    words = long_float_words(cells)
+    if not words:
+        return ()
+    return (
+        f"The floats are long: {words}. A loom ties them after {LOOM_FLOAT} at most; if this is "
+        "artwork and not a drawdown, use --figure.",
     )
 
 

@@ -51,8 +51,8 @@ R = np.float32
 
 
 def fill(row: NDArray[np.float64], light: Light, axes: Axes) -> None:
-    """Make the dome visible to the camera; its other data lies in the `Dome`."""
-    row[VISIBLE] = 1.0
+    """Make the dome visible to the camera, or not; its other data lies in the `Dome`."""
+    row[VISIBLE] = 0.0 if light.hidden else 1.0
 
 
 def irradiance(row: NDArray[np.float32], dome: Dome, places: NDArray[np.float32]) -> float:
@@ -85,7 +85,8 @@ def meet(light, dome, size, block):
         pdf = dome.cells[0, DENSITY] * light[CHANCE]
         red, green, blue = dome.cells[0, 0], dome.cells[0, 1], dome.cells[0, 2]
         for x in range(size):
-            weight = weight_of(block, x, pdf) if block[REACH + x] >= ENDLESS else R(0)
+            hidden = block[REACH + x] < ENDLESS or block[FIRST + x] > light[VISIBLE]
+            weight = R(0) if hidden else weight_of(block, x, pdf)
             block[SEEN_R + x] += weight * red
             block[SEEN_G + x] += weight * green
             block[SEEN_B + x] += weight * blue
@@ -95,7 +96,7 @@ def meet(light, dome, size, block):
             dome, block[D_X + x], block[D_Y + x], block[D_Z + x]
         )
     for x in range(size):
-        if block[REACH + x] < ENDLESS:
+        if block[REACH + x] < ENDLESS or block[FIRST + x] > light[VISIBLE]:
             continue
         column, row = block[COLUMN + x], block[ROW + x]
         weight = R(1)
