@@ -5,11 +5,12 @@ python docs/make_geometry.py
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from fabricusd.appearance import surface
+from fabricusd.appearance import laws, surface
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.geometry import tubes
@@ -45,7 +46,7 @@ reflect more than they get, so their light scatters once; `conserving` threads l
 it leaves.
 """
 
-LAW = """## The law of each preset at level `far`
+LAW = """## The laws at level `far`
 
 {pairs} pairs of directions a preset, {count} paths each: a third anywhere within 80° of the
 normal, a third near the mirror direction, a third lit from 3 to 15° above the cloth. *error* is
@@ -57,14 +58,19 @@ The last four columns are the tubes' own uncertainty: the noise, and how far the
 absolute change over mean) when surface light leaves anywhere, when sections are .7 as high, and
 when light goes by the width that a thread shows.
 
-| preset | held out: error | bias | ΔE | all: error | ΔE | grazing | noise | exit | height | width |
-|---|---|---|---|---|---|---|---|---|---|---|"""
+Laws are those of `fabric:surfaceLaw`, each with the shadow `horizon`; *no shadow* is the law without
+it. The preset wears the law with a star.
+
+| preset | law | held out: error | bias | ΔE | no shadow: error | all: error | ΔE | grazing | noise | exit | height | width |
+|---|---|---|---|---|---|---|---|---|---|---|---|---|"""
 
 SKY = """
 ## A white sky
 
 Reflected of a white sky by the preset as it is, brightest channel, mean over azimuths of
-{azimuths}; tubes against the law. Tubes: {count} paths a view, standard error below {error:.3f}.
+{azimuths}: tubes, law `masked`, law `projected` with the shadow `horizon`. Tubes: {count} paths a view,
+standard error below {error:.3f}. Laws with an absolute shadow stop at 1, where tubes of published
+threads go beyond.
 
 | preset | {columns} |
 |---|{rule}"""
@@ -88,14 +94,18 @@ REFUSED = """
 |---|---|"""
 
 
-def law_row(name: str, found: Table) -> str:
-    """One preset's law against its tubes."""
-    value = surface.evaluate(load(name), found.wi, found.wo, level="far")
+def law_row(name: str, law: str, found: Table) -> str:
+    """One preset under one law, against its tubes."""
+    preset = load(name)
+    fabric = replace(preset, surface_law=law)
+    value = surface.evaluate(fabric, found.wi, found.wo, level="far", shadow="horizon")
+    open_ = judge(found, surface.evaluate(fabric, found.wi, found.wo, level="far"))
     held, whole = judge(found, value), judge(found, value, np.ones(len(value), bool))
     grazing = judge(found, value, np.arange(len(value)) % 3 == 2)
     return (
-        f"| {name} | {held.error:.2f} | {held.bias:+.2f} | {held.delta_e:.1f} | {whole.error:.2f} "
-        f"| {whole.delta_e:.1f} | {grazing.error:.2f} | {whole.noise:.3f} "
+        f"| {name} | {law}{'*' if law == preset.surface_law else ''} "
+        f"| {held.error:.2f} | {held.bias:+.2f} | {held.delta_e:.1f} | {open_.error:.2f} "
+        f"| {whole.error:.2f} | {whole.delta_e:.1f} | {grazing.error:.2f} | {whole.noise:.3f} "
         f"| {float(found.exit):.2f} | {float(found.height):.2f} | {float(found.width):.2f} |"
     )
 
@@ -114,14 +124,11 @@ def hemisphere(rings: int = 24, azimuths: int = 48) -> np.ndarray:
     return np.stack((r * np.cos(turn), r * np.sin(turn), z), axis=1)
 
 
-def law_shares(fabric: Fabric, side: int, seen: np.ndarray) -> np.ndarray:
+def law_shares(fabric: Fabric, side: int, seen: np.ndarray, shadow: str = "none") -> np.ndarray:
     """(v, 3) of a white sky at `far` from `seen` (v, 3): from its side (1), from the other (-1)."""
     sky = hemisphere() * (1, 1, side)
     return np.array(
-        [
-            surface.evaluate(fabric, sky, np.tile(wo, (len(sky), 1))).mean(axis=0) * 2 * np.pi
-            for wo in seen
-        ]
+        [surface.evaluate(fabric, sky, wo, shadow=shadow).mean(axis=0) * 2 * np.pi for wo in seen]
     )
 
 
@@ -147,7 +154,7 @@ def main() -> None:
     """Write the page."""
     found = {name: table(name) for name in table_names()}
     lines = [HEAD, LAW.format(pairs=PAIRS, count=COUNT)]
-    lines += [law_row(name, t) for name, t in found.items()]
+    lines += [law_row(name, law, t) for name, t in found.items() for law in laws.REGISTRY]
     error = max(float(t.sky_error.max()) for t in found.values())
     columns = " | ".join(f"{p:g}°" for p in POLAR)
     lines.append(
@@ -157,11 +164,14 @@ def main() -> None:
         )
     )  # fmt: skip
     for name, t in found.items():
-        truth, law = by_angle(t.sky), by_angle(law_shares(load(name), 1, views()))
-        brightest = truth.mean(axis=0).argmax()
-        cells = [
-            f"{a:.2f} {b:.2f}" for a, b in zip(truth[:, brightest], law[:, brightest], strict=True)
+        worn = [
+            by_angle(law_shares(replace(load(name), surface_law=law), 1, views(), shadow))
+            for law, shadow in (("masked", "none"), ("projected", "horizon"))
         ]
+        truth = by_angle(t.sky)
+        bright = truth.mean(axis=0).argmax()
+        columns_of = [x[:, bright] for x in (truth, *worn)]
+        cells = [" ".join(f"{x:.2f}" for x in row) for row in zip(*columns_of, strict=True)]
         lines.append(f"| {name} | {' | '.join(cells)} |")
     lines.append(SHARES.format(shades=", ".join(f"{s:g}" for s in SHADES)))
     for name, t in found.items():
