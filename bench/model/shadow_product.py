@@ -24,7 +24,7 @@ from fabricusd.appearance.shadow.methods import compile_shadow, shadowing
 from fabricusd.appearance.weave.compiled import compile_fabric
 from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.chart.panels.shadows import WOVEN
-from fabricusd.fabric import Fabric
+from fabricusd.fabric import Fabric, even
 from fabricusd.schema import load
 
 VARIANTS = (
@@ -116,7 +116,7 @@ def main() -> None:
     print("| preset | " + " | ".join(VARIANTS) + " | off far |")
     print("|---|" + "---|" * (1 + len(VARIANTS)))
     for name in WOVEN:
-        found = compare(load(name), options.pairs, options.places)
+        found = compare(even(load(name)), options.pairs, options.places)
         true = found[:, 0]
         errors = np.abs(found[:, 1:] - true[:, None]).mean(axis=0) / true.mean()
         means = found[:, 1:].mean(axis=0) / true.mean()
