@@ -126,11 +126,11 @@ and rayon, .15 for spun silk, .17 to .18 for wool, .20 to .22 for linen. Filamen
 raw silk varies by .06 from thread to thread. Shantung has its slubs in the weft.
 
 ## In a bake
-A repeat no longer repeats. Maps are looked up in the cell table all the same: a texel takes the
-entry of the place at which even threads look as they do there, and its colours take the shades of
-the threads under its centre. `thread_id` tells the thread that is there, and `weave_coordinate` the
-place on the even cloth. At coarser levels, texels at the border of a UV shell have the mean shade.
-A BTF is made to be repeated, and is even.
+A repeat no longer repeats. The finest level is looked up in the cell table all the same: a texel
+takes the entry of the place at which even threads look as they do there, and its colours take the
+shades of the threads under its centre. Coarser levels are means of it. `thread_id` tells the thread
+that is there, and `weave_coordinate` the place on the even cloth. A BTF is made to be repeated, and
+is even.
 
 ## What is missing
 Fibres that stand off the yarn, and fibres on its surface: from 40 pixels a thread on, spun yarn

@@ -17,6 +17,7 @@ import numpy as np
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.chart.cloth_picture import difference, ideal_spectrum, picture, view_of
 from fabricusd.chart.level_errors import LIGHTS, TO_EYE, zoom
+from fabricusd.fabric import even
 from fabricusd.schema import load, preset_names
 
 REPEATS = (0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6, 0.8)
@@ -31,7 +32,7 @@ def main() -> None:
     print("| preset, level | " + " | ".join(f"{r:g}" for r in REPEATS) + " |")
     print("|---" * (1 + len(REPEATS)) + "|")
     for name in names:
-        fabric = load(name)
+        fabric = even(load(name))
         widths = np.array(REPEATS) * max(true_repeat(fabric))
         far, weave, inside = [], [], []
         for light in LIGHTS:

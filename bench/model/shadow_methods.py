@@ -28,7 +28,7 @@ from fabricusd.chart.panels.shadows import (
     rms,
     shares,
 )
-from fabricusd.fabric import Fabric
+from fabricusd.fabric import Fabric, even
 from fabricusd.schema import load
 
 Array = np.ndarray
@@ -92,7 +92,7 @@ def by_table(count: int) -> None:
     for azimuths, texels in TABLES:
         row = []
         for name in WOVEN:
-            fabric = load(name)
+            fabric = even(load(name))
             uv = places_on_threads(fabric, count)
             e, a = rng.uniform(2, 70, len(uv)), rng.uniform(0, 360, len(uv))
             wi = np.array([light(*pair) for pair in zip(e, a, strict=True)])
@@ -111,7 +111,7 @@ def speed(count: int) -> None:
     print("| preset | none | peak | horizon | traced | table |")
     print("|---|---|---|---|---|---|")
     for name in WOVEN:
-        fabric = load(name)
+        fabric = even(load(name))
         uv = places_on_threads(fabric, count)
         wi = np.tile(light(20, 30), (len(uv), 1)).astype(np.float32)
         cloth, row = compile_fabric(fabric), []
@@ -140,7 +140,7 @@ def figure(path: Path) -> None:
     size = 320
     image, axes = plt.subplots(len(chosen), 4, figsize=(10, 5.4), layout="constrained")
     for row, name in zip(axes, chosen, strict=True):
-        fabric = load(name)
+        fabric = even(load(name))
         ends, picks = fabric.weave.cells.shape
         u, v = np.meshgrid(
             (np.arange(size) + 0.5) / size * ends, (np.arange(size) + 0.5) / size * picks
@@ -168,7 +168,7 @@ def main() -> None:
     parser.add_argument("--figure", type=Path, help="draw the maps of g to this file")
     options = parser.parse_args()
     for name in WOVEN:
-        fabric = load(name)
+        fabric = even(load(name))
         uv = places_on_threads(fabric, options.places)
         found = all_shares(fabric, uv)
         by_elevation(name, uv, found)

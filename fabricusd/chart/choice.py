@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from fabricusd.fabric import even
 from fabricusd.files import whole_file
 from fabricusd.reference.choice import BOUNDS
 
@@ -30,7 +31,7 @@ def write_table(path: Path, quick: bool = True) -> None:
             found.setdefault(row.group, {})[row.method] = (cost, error)
     # On pile, every method returns 1.
     found["velvet"] = {m: (found[shadows.WOVEN[0]][m][0], 0.0) for m in METHODS}
-    levels = {name: coarsest(load(name), BOUNDS) for name in preset_names()}
+    levels = {name: coarsest(even(load(name)), BOUNDS) for name in preset_names()}
     text = json.dumps({"shadows": found, "levels": levels}, indent=1)
     with whole_file(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")

@@ -23,7 +23,7 @@ from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.chart.cloth_picture import difference, ideal_spectrum, picture, view_of
 from fabricusd.chart.draw import pyplot, save
 from fabricusd.chart.scenes import cloth, facing
-from fabricusd.fabric import PILE_ANGLE, Fabric
+from fabricusd.fabric import PILE_ANGLE, Fabric, even
 from fabricusd.files import whole_file
 from fabricusd.reference.render import render_scene
 from fabricusd.scene.light_kinds import SPHERE
@@ -65,7 +65,7 @@ def mirror_at_grazing() -> Case:
     away = np.geomspace(0.01, 45.0, 60)
     theta = np.radians(90.0 - away)
     wi, wo = _up(theta), _up(-theta)
-    thread = next(iter(load("linen_plain").threads.values()))
+    thread = next(iter(even(load("linen_plain")).threads.values()))
     return Case(
         where="theta_i, theta_o → ±90°", axis="degrees from the thread's axis",
         unit="f_s [1/sr]", x=away,
@@ -88,7 +88,7 @@ def along_the_thread() -> Case:
         length = np.sqrt(np.maximum(1.0 - (wi[:, 0] / np.linalg.norm(wi, axis=1)) ** 2, 0.0))
         azimuth = np.degrees(np.arccos(np.clip(0.8 * off / length, -9, 9)))
     exact = np.degrees(plain_lobes.angles(wi).phi)
-    thread = next(iter(load("linen_plain").threads.values()))
+    thread = next(iter(even(load("linen_plain")).threads.values()))
     assert np.isfinite(thread_value(thread, wi / np.linalg.norm(wi, axis=1)[:, None], wo)).all()
     return Case(
         where="w parallel to t or b", axis="distance from the thread's axis",
@@ -140,7 +140,10 @@ def white_furnace() -> Case:
     degrees = np.linspace(0.0, 88.0, 12)
     values = {
         model: np.array(
-            [_albedo(plain.white(replace(load("linen_plain"), model=model)), d) for d in degrees]
+            [
+                _albedo(plain.white(replace(even(load("linen_plain")), model=model)), d)
+                for d in degrees
+            ]
         )
         for model in ("microcylinder", "conserving")
     }
@@ -171,7 +174,7 @@ def steep_curves() -> Case:
 def far_uv() -> Case:
     """The place inside a thread, at UVs farther and farther from 0."""
     offsets = np.asarray(2.0 ** np.arange(0, 40), np.float64)
-    fabric = load("linen_plain")
+    fabric = even(load("linen_plain"))
     place = np.array([[0.6180, 0.3]])
     exact = float(lookup(fabric, place).across[0])
     ours, single = np.empty(len(offsets)), np.empty(len(offsets))
@@ -193,7 +196,7 @@ def far_uv() -> Case:
 def middle_distance() -> Case:
     """Moiré of point samples and of `auto`, 4×4 samples, crepe."""
     widths = np.array([0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 9.0, 17.0])
-    fabric = load("silk_crepe_de_chine")
+    fabric = even(load("silk_crepe_de_chine"))
     point, filtered, real = [], [], []
     for width in widths:
         view = view_of(fabric, float(width))
@@ -224,7 +227,7 @@ def growing_energy() -> Case:
             ]
         )
         for model in ("microcylinder", "conserving")
-        for cloth in [replace(load("linen_plain"), model=model)]
+        for cloth in [replace(even(load("linen_plain")), model=model)]
     }
     return Case(
         where="A too large", axis="A", unit="energy after 8 bounces", x=scale,
@@ -237,7 +240,7 @@ def growing_energy() -> Case:
 def below_the_cloth() -> Case:
     """A viewer that sinks below the surface of velvet."""
     elevation = np.linspace(20.0, -20.0, 81)
-    fabric = load("velvet")
+    fabric = even(load("velvet"))
     wo = _up(np.radians(90.0 - elevation))
     wi = np.tile(_up(np.radians([50.0]), 2.0), (len(wo), 1))
     value = sum(
@@ -273,7 +276,7 @@ def upright_threads() -> Case:
 def light_at_the_surface() -> Case:
     """A ball of light that sinks into the cloth, from a metre away until its centre is below it."""
     heights = np.concatenate(([0.001, 0.003, 0.006, 0.009], np.geomspace(0.0101, 1.0, 20)))
-    radius, linen = 0.01, load("linen_plain")
+    radius, linen = 0.01, even(load("linen_plain"))
     side = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     corners = np.array([[0, 1, 2], [0, 2, 3]])
     plane = Mesh(

@@ -11,7 +11,7 @@ import pytest
 from fabricusd.chart.highlights import dwells, found, predicted
 from fabricusd.chart.scenes import RADIUS, facing, sun
 from fabricusd.chart.sheets import cylinders, filament, wrap_degrees
-from fabricusd.fabric import Fabric, TangentCurve
+from fabricusd.fabric import Fabric, TangentCurve, even
 from fabricusd.reference.render import render_scene
 from fabricusd.scene.scene import Scene
 from fabricusd.schema import load
@@ -41,7 +41,7 @@ def places(name: str, fabric: Fabric, wrap: str, to_light: np.ndarray) -> tuple[
 @pytest.mark.parametrize(("name", "count"), [(SATIN, 3), (CREPE, 2)])
 @pytest.mark.parametrize("turn", [0, 20])
 def test_highlights_round_the_cylinder_are_as_many_as_predicted_and_there(name, count, turn):
-    fabric, to_light = load(name), lit_from(turn)
+    fabric, to_light = even(load(name)), lit_from(turn)
     wanted = predicted(filament(name, fabric).curve, to_light)
     seen = places(name, fabric, "horizontal", to_light)
     assert len(wanted) == len(seen) == count

@@ -12,12 +12,13 @@ import pytest
 
 from fabricusd.appearance.weave.footprint import weights
 from fabricusd.chart.level_errors import LIGHTS, TO_EYE, WIDTHS, Zoom, coarsest, zoom
+from fabricusd.fabric import even
 from fabricusd.reference.choice import choose_limits, read_limits
 from fabricusd.schema import load, preset_names
 
 PIXELS_PER_THREAD = 1.0 / WIDTHS
 NAMES = ("linen_plain", "polyester_satin_charmeuse")
-FABRICS = {name: load(name) for name in NAMES}
+FABRICS = {name: even(load(name)) for name in NAMES}
 LIGHT_NOISE = 0.1
 """Variance over mean^2 that the drawing of lights leaves to a sample, whatever the level."""
 
@@ -98,7 +99,7 @@ def test_with_a_bound_no_frame_differs_from_the_next_by_more_than_twice_the_boun
 @pytest.mark.exhaustive
 def test_the_shipped_limits_are_those_that_are_measured():
     name = "silk_shot"
-    found = coarsest(load(name), (0.1, 0.02))
+    found = coarsest(even(load(name)), (0.1, 0.02))
     for level, limits in found.items():
         for bound, limit in limits:
             assert read_limits()[name][level][bound] == pytest.approx(limit, rel=1e-3)

@@ -8,6 +8,7 @@ import pytest
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.footprint import FAR, weights
 from fabricusd.chart.cloth_picture import SIZE, difference, ideal_spectrum, picture, view_of
+from fabricusd.fabric import even
 from fabricusd.schema import load, preset_names
 
 
@@ -50,7 +51,7 @@ def test_a_brighter_picture_is_shifted():
 
 
 def test_points_of_a_fine_weave_are_all_moire_and_many_points_hardly():
-    view = view_of(load("linen_plain"), 3.0)
+    view = view_of(even(load("linen_plain")), 3.0)
     ideal = ideal_spectrum(view)
     point, many = (difference(picture(view, "weave", n), ideal) for n in (1, 8))
     assert view.threads_per_pixel == pytest.approx(3.0, rel=0.02)
@@ -60,7 +61,7 @@ def test_points_of_a_fine_weave_are_all_moire_and_many_points_hardly():
 
 def test_a_close_view_is_nearly_its_spectrum():
     """The spectrum is taken from the repeat, the picture from the view: they must agree."""
-    view = view_of(load("silk_crepe_de_chine"), 0.1)
+    view = view_of(even(load("silk_crepe_de_chine")), 0.1)
     found = difference(picture(view, "weave", 4), ideal_spectrum(view))
     contrast = np.sqrt((np.abs(ideal_spectrum(view)) ** 2).sum()) / abs(ideal_spectrum(view)[0, 0])
     assert found.total < 0.3 * contrast
@@ -71,7 +72,7 @@ def test_a_close_view_is_nearly_its_spectrum():
 @pytest.mark.parametrize("name", preset_names())
 def test_auto_shows_of_a_repeat_what_a_picture_can_hold(name):
     """All of it from four pixels a repeat on; below two no moire, and nothing that is missing."""
-    fabric = load(name)
+    fabric = even(load(name))
     repeat = max(true_repeat(fabric))
     assert weights(fabric, [[repeat / 4.0] * 2])[0, FAR] == 0.0
     view = view_of(fabric, repeat / 1.8)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from pxr import Sdf, Usd
 
-from fabricusd.fabric import MODELS, Binding, Fabric, Thread, ThreadSet
+from fabricusd.fabric import MODELS, SURFACE_LAWS, Binding, Fabric, Thread, ThreadSet
 from fabricusd.schema import PLUGIN_PATH, attributes, load, save
 from fabricusd.schema.generate import generate
 from fabricusd.schema.plugin import VALIDATORS
@@ -134,7 +134,8 @@ def test_every_attribute_has_a_fallback_and_every_token_its_allowed_values(owner
     assert attribute.GetFallbackValue() is not None
     if attribute.GetTypeName() == "token" and prop != "fabric:binding:uvSet":
         allowed = list(attribute.GetMetadata("allowedTokens"))
-        assert allowed == (["inherit"] if owner == "WovenThread" else []) + list(MODELS)
+        names = SURFACE_LAWS if prop == "fabric:surfaceLaw" else MODELS
+        assert allowed == (["inherit"] if owner == "WovenThread" else []) + list(names)
 
 
 @pytest.mark.parametrize(

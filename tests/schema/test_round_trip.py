@@ -58,7 +58,7 @@ OTHER_VALUES = {
     "fabric:warp:density": 7.0, "fabric:weft:density": 9.0,
     "fabric:warp:coverage": 0.25, "fabric:weft:coverage": 0.5,
     "fabric:weave:rows": ["110", "011"], "fabric:weave:name": "odd",
-    "fabric:model": "conserving", "fabric:opaque": True, "fabric:maskingWidth": 12.5,
+    "fabric:model": "conserving", "fabric:surfaceLaw": "facets", "fabric:opaque": True, "fabric:maskingWidth": 12.5,
     "fabric:sides:gap": [0.1], "fabric:sides:surface": [0.2], "fabric:sides:reflected": [0.3],
     "fabric:sides:transmitted": [0.4], "fabric:sides:forward": [0.5],
     "thread:albedo": (0.1, 0.2, 0.3), "thread:color": (0.3, 0.2, 0.1), "thread:ior": 1.7,

@@ -103,7 +103,7 @@ class Place:
         )
         repeat = true_repeat(self.sheet.garment.lays[self.lay].fabric)
         _centres(
-            self.recipe, self.blur, *self._raster(), np.array(repeat, np.float64),
+            self.recipe, *self._raster(), np.array(repeat, np.float64),
             found.weave, found.sets, found.threads, found.shades,
         )  # fmt: skip
         return found
@@ -112,15 +112,6 @@ class Place:
     def recipe(self) -> Recipe:
         """Of the lay's fabric."""
         return self.sheet.recipes[self.lay]
-
-    @property
-    def blur(self) -> np.float32:
-        """Extent of a texel on the cloth [m]; 0 at the finest level, whose maps are sharp."""
-        if self.level == 0:
-            return np.float32(0)
-        step = texel_step(self.sheet, self.lay, 1 << self.level)
-        pitch = self.recipe.cloth.pitch.astype(np.float64)
-        return np.float32(np.sqrt(abs(np.linalg.det(step)) * pitch.prod()))
 
     def phases(self, counts: tuple[int, int]) -> NDArray[np.int32]:
         """(h, w) entries of a cell table with `counts` phases along U and V."""
@@ -179,6 +170,23 @@ class ComputedLayer:
         )  # fmt: skip
         return cls(place, found, owned)
 
+    @classmethod
+    def of_uneven(cls, place: Place, table: CellTable, owned: NDArray[np.float32]) -> ComputedLayer:
+        """Take the moments of uneven threads from a table of even ones: each texel those of the
+        place at which even threads look as they do there, with the shades of its own threads.
+
+        Coarser levels are means of these: where threads are thick, more texels show them.
+        """
+        level, shades = table.levels[0], place.centres.shades.reshape(2, -1)
+        found = level.moments[:, place.phases(level.counts).ravel()]
+        parts = [found[m.SHARE + m.PARTS * k : m.SHARE + m.PARTS * (k + 1)] for k in range(2)]
+        seen = np.stack([part.sum(axis=0) for part in parts])
+        both = (seen * shades).sum(axis=0) / np.maximum(seen.sum(axis=0), np.float32(1e-6))
+        found[m.VOLUME : m.VOLUME + 3] *= both
+        for k in range(2):
+            found[m.TINT + 3 * k : m.TINT + 3 * k + 3] *= shades[k]
+        return cls(place, found.reshape(MOMENTS, *owned.shape), owned)
+
     def values(self, one: TextureMap, mine: NDArray[np.bool_] | None) -> NDArray[Any]:
         """(n, channels) of a map."""
         moments = self.moments.reshape(MOMENTS, -1) if mine is None else self.moments[:, mine]
@@ -225,11 +233,8 @@ class TableLayer:
             return one.function(self.place.texels(self.own, mine))
         lay, sheet = self.place.lay, self.place.sheet
         chosen: Any = slice(None) if mine is None else mine
-        if one.shaded and self.place.recipe.uneven:
-            found = np.ascontiguousarray(one.function(self._shaded(chosen)), one.kind)
-        else:
-            known = self.cell.values(one, sheet.recipes[lay], sheet.garment.lays[lay])
-            found = _gathered(known, self.phases[chosen].ravel())
+        known = self.cell.values(one, sheet.recipes[lay], sheet.garment.lays[lay])
+        found = _gathered(known, self.phases[chosen].ravel())
         if self.own.shape[1]:
             rows = self.rows[chosen].ravel()
             cut = rows != LOOKED_UP
@@ -238,19 +243,6 @@ class TableLayer:
             )
             found[cut] = one.function(texels)
         return found
-
-    def _shaded(self, chosen: Any) -> Texels:
-        """Texels of the table whose threads have their own shades at the texels' centres."""
-        place = self.place
-        found = self.cell.moments[:, self.phases[chosen].ravel()]
-        shades = place.centres.shades[:, chosen].reshape(2, -1)
-        parts = [found[m.SHARE + m.PARTS * k : m.SHARE + m.PARTS * (k + 1)] for k in range(2)]
-        seen = np.stack([part.sum(axis=0) for part in parts])
-        both = (seen * shades).sum(axis=0) / np.maximum(seen.sum(axis=0), np.float32(1e-6))
-        found[m.VOLUME : m.VOLUME + 3] *= both
-        for k in range(2):
-            found[m.TINT + 3 * k : m.TINT + 3 * k + 3] *= shades[k]
-        return Texels.of_moments(found, place.recipe, place.sheet.garment.lays[place.lay])
 
     def halved(self) -> TableLayer:
         """The next coarser level."""
@@ -279,6 +271,8 @@ def layer_of(place: Place, owned: NDArray[np.float32]) -> Layer:
     table = place.sheet.tables[place.lay]
     if table is None:
         return ComputedLayer.finest(place, owned)
+    if place.recipe.uneven:
+        return ComputedLayer.of_uneven(place, table, owned)
     return TableLayer(place, table, owned)
 
 
@@ -324,17 +318,17 @@ def _phases(start, step, repeat, along, down, out):  # type: ignore[no-untyped-d
 
 @njit(**LEAN)
 def _centres(  # type: ignore[no-untyped-def]
-    made, blur, start, step, repeat, weave, sets, threads, shades
+    made, start, step, repeat, weave, sets, threads, shades
 ):
     """Fill the arrays of `Centres`.
 
-    start, step : as for `moments.texels`; repeat : (2,) float64; blur : `Place.blur`
+    start, step : as for `moments.texels`; repeat : (2,) float64
     """
     for j in range(sets.shape[0]):
         for i in range(sets.shape[1]):
             u = start[0] + step[0, 0] * (i + 0.5) + step[0, 1] * (j + 0.5)
             v = start[1] + step[1, 0] * (i + 0.5) + step[1, 1] * (j + 0.5)
-            u, v, warp, weft = moments.laid_at(made, u, v, blur)
+            u, v, warp, weft = moments.laid_at(made, u, v, np.float32(0))
             shades[WEFT, j, i], shades[WARP, j, i] = weft.shade, warp.shade
             at_u, at_v = u, v
             u -= repeat[0] * np.floor(u / repeat[0])

@@ -90,7 +90,6 @@ class TextureMap:
     exact : stored as float32 instead of half; each level is point-sampled at its texels' centres
     needs_light : baked only if a light is given
     spare : baked only if it is requested by name
-    shaded : whether it depends on the albedo, which varies along uneven threads
     of_light_through : baked only if it is requested by name or a fabric of the bake scatters light
         to its other side
     kind_of : the meaning of the numbers, which determines how they are compared and how they are
@@ -110,7 +109,6 @@ class TextureMap:
     exact: bool = False
     needs_light: bool = False
     spare: bool = False
-    shaded: bool = False
     of_light_through: bool = False
     kind_of: str = "share"
     unit: str = ""
@@ -200,7 +198,7 @@ def weave_coordinate(t: Texels) -> NDArray[Any]:
     return t.weave
 
 
-@texture_map("base_color", "R G B", (0.5,), color=True, shaded=True)
+@texture_map("base_color", "R G B", (0.5,), color=True)
 def base_color(t: Texels) -> NDArray[Any]:
     """Reflectance of the threads' volume term seen from above, without the gaps"""
     return t.mean(m.VOLUME, 3)
@@ -219,7 +217,7 @@ def back_base_color(t: Texels) -> NDArray[Any]:
     return t.mean(m.BACK_VOLUME, 3, m.BACK_COVER)
 
 
-@texture_map("albedo", "R G B", (0.5,), color=True, shaded=True, weight=_whole)
+@texture_map("albedo", "R G B", (0.5,), color=True, weight=_whole)
 def albedo(t: Texels) -> NDArray[Any]:
     """Reflectance of the cloth seen from above, surface and volume terms; gaps are black"""
     return np.asarray((t.moments[m.VOLUME : m.VOLUME + 3] + t.moments[m.SURFACE]).T)
@@ -406,7 +404,7 @@ def _of_set(which: int, noun: str) -> None:
         f"Mean and standard deviation of the {noun}'s tangent angle [rad], over all parts"
     )
     by_angle: dict[str, Any] = {"kind_of": "angle", "unit": "rad"}
-    texture_map(f"{noun}_thread", "R G B A", kind_of="number", shaded=True, weight=covered)(thread)
+    texture_map(f"{noun}_thread", "R G B A", kind_of="number", weight=covered)(thread)
     texture_map(f"{noun}_share", "R G B A", weight=_whole)(share)
     texture_map(f"{noun}_angle", "R G B A", weight=share, **by_angle)(angle)
     texture_map(f"{noun}_spread", "R G B A", weight=share, **by_angle)(spread)

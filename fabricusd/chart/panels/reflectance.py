@@ -20,7 +20,7 @@ from fabricusd.appearance.weave.place import Places
 from fabricusd.appearance.weave.quadrature import CELLS, POINTS, Rule
 from fabricusd.chart.panel import Panel, Row
 from fabricusd.chart.timing import in_turns, typical
-from fabricusd.fabric import Fabric
+from fabricusd.fabric import Fabric, even
 from fabricusd.schema import load
 
 Floats = NDArray[np.float64]
@@ -70,7 +70,7 @@ def _run(quick: bool) -> list[Row]:
     count, rounds = (4096, 5) if quick else (65536, 7)
     rows = []
     for name in QUICK_PRESETS if quick else PRESETS:
-        fabric = load(name)
+        fabric = even(load(name))
         for model in ("microcylinder",) if quick else ("microcylinder", "thesis"):
             one = replace(fabric, model=model)
             far = f"{name}, far, {model}"
@@ -81,7 +81,7 @@ def _run(quick: bool) -> list[Row]:
         rows += _group(weave, truth, weave_methods(fabric, hit, quick), rounds)
     # These kernels take longer to compile than all the rest takes to run.
     for name in () if quick else QUICK_PRESETS:
-        one = replace(load(name), model="conserving")
+        one = replace(even(load(name)), model="conserving")
         truth = _plain_conserving(one, _checked(), REFERENCE_NODES)()
         methods = conserving_methods(one, count // 8)
         rows += _group(f"{name}, far, conserving", truth, methods, rounds)

@@ -16,7 +16,7 @@ from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.chart.panel import Panel, Row
 from fabricusd.chart.panels.reflectance import places
 from fabricusd.chart.timing import in_turns, typical
-from fabricusd.fabric import Fabric
+from fabricusd.fabric import Fabric, even
 from fabricusd.schema import load
 
 Floats = NDArray[np.float64]
@@ -79,7 +79,7 @@ def run(quick: bool, names: Sequence[str] = ()) -> list[Row]:
     numba.set_num_threads(1)
     try:
         names = names or ((WOVEN[0], WOVEN[2]) if quick else WOVEN)
-        return [row for name in names for row in _rows(load(name), quick)]
+        return [row for name in names for row in _rows(even(load(name)), quick)]
     finally:
         numba.set_num_threads(before)
 

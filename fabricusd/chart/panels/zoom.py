@@ -19,7 +19,7 @@ from fabricusd.chart.cloth_picture import View, difference, ideal_spectrum, pict
 from fabricusd.chart.panel import Panel, Row
 from fabricusd.chart.panels.reflectance import places
 from fabricusd.chart.timing import in_turns, typical
-from fabricusd.fabric import Fabric
+from fabricusd.fabric import Fabric, even
 from fabricusd.schema import load
 
 Floats = NDArray[np.float64]
@@ -40,7 +40,7 @@ def run(quick: bool) -> list[Row]:
     """A group of rows for each preset and each width of a pixel in threads."""
     rows = []
     for name in PRESETS:
-        fabric = load(name)
+        fabric = even(load(name))
         cost = sample_costs(fabric, 4096 if quick else 65536, 3 if quick else 7)
         for width in QUICK_WIDTHS if quick else WIDTHS:
             views = [view_of(fabric, width, light) for light in LIGHTS[: 1 if quick else None]]

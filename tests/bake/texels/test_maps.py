@@ -28,8 +28,10 @@ from fabricusd.bake.texels.moments import texels
 from fabricusd.bake.texels.recipe import recipe
 from fabricusd.bake.texels.sheet import sheets_of, texel_start, texel_step
 from fabricusd.errors import FabricError
+from fabricusd.fabric import even
 from fabricusd.quality.colors import delta_e_2000
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load as load_preset
+from fabricusd.schema import preset_names
 from tests.bake.meshes import quad_scene
 
 PUBLISHED = (
@@ -40,6 +42,11 @@ PUBLISHED = (
     "silk_shot",
     "velvet",
 )
+
+
+def load(name):
+    """A preset of even threads, which every repeat repeats."""
+    return even(load_preset(name))
 
 
 def baked(fabric, threads=8.0, resolution=128, names=None, **options):
@@ -294,3 +301,40 @@ def test_a_texel_of_the_table_is_the_mean_over_its_own_area():
             assert error[COVER] < 0.05
             assert error[SHARE : SHARE + 8].max() < 0.08
             assert error[HORIZON:].max() < 0.08
+
+
+def test_uneven_threads_are_baked_as_the_lookup_finds_them():
+    """By the cell table, which knows even threads only, and texel by texel."""
+    fabric = load_preset("linen_plain")
+    names = ["thread_id", "opacity", "albedo", "warp_thread"]
+    maps, sheet = baked(fabric, threads=200.0, resolution=2048, names=names)
+    assert sheet.tables[0] is not None
+    size = sheet.block_side
+    x, y = (k.ravel() + 0.5 for k in np.meshgrid(np.arange(size), np.arange(size)))
+    uv = texel_start(sheet, 0, 0.0, 0.0) + np.stack((x, y), axis=1) @ texel_step(sheet, 0).T
+    hit = lookup(fabric, uv)
+    number = np.where(hit.gap, NO_THREAD, hit.thread + len(fabric.threads) * (hit.set == 1))
+    assert (maps["thread_id"][0].ravel() == number).mean() > 0.999
+    regular, _ = baked(even(fabric), threads=200.0, resolution=2048, names=names)
+    assert (regular["thread_id"][0].ravel() == number).mean() < 0.97
+    one_by_one = replace(sheet, tables=(None,))
+    exact, _, _ = bake_block(one_by_one, chosen_maps(names, light=False), 0, 0)
+    true = {t.name: a for t, a in zip(chosen_maps(names, light=False), exact, strict=True)}
+    for name in ("albedo", "warp_thread", "opacity"):
+        for level in (0, 3):
+            off, apart = (
+                float(np.std(a[name][level].astype(float) - true[name][level]))
+                for a in (maps, regular)
+            )
+            assert off < 0.5 * apart, (name, level)
+
+
+def test_a_bake_of_uneven_threads_keeps_the_colour_of_even_ones():
+    for name in ("linen_plain", "rayon_shantung"):
+        fabric = load_preset(name)
+        uneven, regular = (
+            baked(f, threads=64.0, resolution=256, names=["albedo", "opacity"])[0]
+            for f in (fabric, even(fabric))
+        )
+        for key in ("albedo", "opacity"):
+            assert uneven[key][-1][0, 0] == pytest.approx(regular[key][-1][0, 0], rel=0.015), key
