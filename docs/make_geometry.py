@@ -58,18 +58,19 @@ The last four columns are the tubes' own uncertainty: the noise, and how far the
 absolute change over mean) when surface light leaves anywhere, when sections are .7 as high, and
 when light goes by the width that a thread shows.
 
-Laws are those of `fabric:surfaceLaw`, each with the shadow `horizon`; *no shadow* is the law without
-it. The preset wears the law with a star.
+Laws are those of `fabric:surfaceLaw`, each with the shadow `horizon`; *no shadow* is the error of
+the law without it. The preset wears the law with a star.
 
-| preset | law | held out: error | bias | ΔE | no shadow: error | all: error | ΔE | grazing | noise | exit | height | width |
+| preset | law | held out: error | bias | ΔE | no shadow | all | ΔE | grazing | noise | exit | height | \
+width |
 |---|---|---|---|---|---|---|---|---|---|---|---|---|"""
 
 SKY = """
 ## A white sky
 
 Reflected of a white sky by the preset as it is, brightest channel, mean over azimuths of
-{azimuths}: tubes, law `masked`, law `projected` with the shadow `horizon`. Tubes: {count} paths a view,
-standard error below {error:.3f}. Laws with an absolute shadow stop at 1, where tubes of published
+{azimuths}: tubes, law `masked`, law `projected` with the shadow `horizon`. Tubes: {count} paths
+a view, standard error below {error:.3f}. Laws with an absolute shadow stop at 1, where tubes of published
 threads go beyond.
 
 | preset | {columns} |

@@ -58,7 +58,8 @@ OTHER_VALUES = {
     "fabric:warp:density": 7.0, "fabric:weft:density": 9.0,
     "fabric:warp:coverage": 0.25, "fabric:weft:coverage": 0.5,
     "fabric:weave:rows": ["110", "011"], "fabric:weave:name": "odd",
-    "fabric:model": "conserving", "fabric:surfaceLaw": "facets", "fabric:opaque": True, "fabric:maskingWidth": 12.5,
+    "fabric:surfaceLaw": "projected",
+    "fabric:model": "conserving", "fabric:opaque": True, "fabric:maskingWidth": 12.5,
     "fabric:sides:gap": [0.1], "fabric:sides:surface": [0.2], "fabric:sides:reflected": [0.3],
     "fabric:sides:transmitted": [0.4], "fabric:sides:forward": [0.5],
     "thread:albedo": (0.1, 0.2, 0.3), "thread:color": (0.3, 0.2, 0.1), "thread:ior": 1.7,
@@ -79,6 +80,7 @@ def test_every_property_of_the_schema_is_written_and_read():
     fabric = Fabric(threads={"A": Thread(), "B": Thread()}, opaque=True, back=Fabric(name="Back"))
     sides = Sides(**{f.name: (0.45,) for f in fields(Sides)})
     fabric = replace(fabric, weave=replace(fabric.weave, name="plain"), sides=sides)
+    fabric = replace(fabric, surface_law="unmasked")
     prim = write_fabric(stage, "/Cloth", fabric)
     for one in (prim, prim.GetChild("A")):
         schema = set(one.GetPrimDefinition().GetPropertyNames())
