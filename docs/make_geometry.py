@@ -61,8 +61,8 @@ when light goes by the width that a thread shows.
 Laws are those of `fabric:surfaceLaw`, each with the shadow `horizon`; *no shadow* is the error of
 the law without it. The preset wears the law with a star.
 
-| preset | law | held out: error | bias | ΔE | no shadow | all | ΔE | grazing | noise | exit | height | \
-width |
+| preset | law | held out: error | bias | ΔE | no shadow | all | ΔE | grazing | noise | exit \
+| height | width |
 |---|---|---|---|---|---|---|---|---|---|---|---|---|"""
 
 SKY = """
@@ -70,8 +70,8 @@ SKY = """
 
 Reflected of a white sky by the preset as it is, brightest channel, mean over azimuths of
 {azimuths}: tubes, law `masked`, law `projected` with the shadow `horizon`. Tubes: {count} paths
-a view, standard error below {error:.3f}. Laws with an absolute shadow stop at 1, where tubes of published
-threads go beyond.
+a view, standard error below {error:.3f}. Laws with an absolute shadow stop at 1, where tubes of
+published threads go beyond.
 
 | preset | {columns} |
 |---|{rule}"""

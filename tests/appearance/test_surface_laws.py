@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -69,9 +70,17 @@ def test_kernels_are_the_plain_formula(name: str, law: str) -> None:
             assert value[k] == pytest.approx(one[0], rel=2e-2, abs=1e-4 * expected.mean())
 
 
-@pytest.mark.parametrize("shadow", ["none", "peak", "horizon"])
-@pytest.mark.parametrize("law", PUBLISHED)
-@pytest.mark.parametrize("name", WOVEN)
+SEEN_TO = {("linen_plain", "masked", "peak"), ("silk_shot", "projected", "horizon")}
+"""Cases of the next test that every run looks at; the others take minutes."""
+
+
+@pytest.mark.parametrize(
+    ("name", "law", "shadow"),
+    [
+        pytest.param(*case, marks=() if case in SEEN_TO else pytest.mark.exhaustive)
+        for case in itertools.product(WOVEN, PUBLISHED, ("none", "peak", "horizon"))
+    ],
+)
 def test_far_is_the_mean_of_weave_and_thread_under_the_shadow_that_is_on(
     name: str, law: str, shadow: str
 ) -> None:
