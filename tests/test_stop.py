@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import signal
-import sys
 
 import pytest
 
 from fabricusd.images.files import read_exr_layers
+from fabricusd.reference import picture_files
 from fabricusd.reference.render import render
 from fabricusd.scene.scene import Scene
 from fabricusd.stop import SIGNALS, Stop
@@ -79,15 +79,13 @@ def test_an_interrupt_in_a_frames_last_moments_leaves_out_the_next_ones(tmp_path
     stage = new_stage(tmp_path)
     square(stage)
     stage.GetRootLayer().Save()
-    module = sys.modules[render.__module__]
-
-    write = module.write_png
+    write = picture_files.write_png
 
     def interrupted(*given, **named):
         signal.raise_signal(signal.SIGINT)
         write(*given, **named)
 
-    monkeypatch.setattr(module, "write_png", interrupted)
+    monkeypatch.setattr(picture_files, "write_png", interrupted)
     r = render(
         tmp_path / "scene.usda", tmp_path / "x.exr", width=8, height=8, spp=1, frames=(1, 2, 3)
     )

@@ -20,7 +20,7 @@ from fabricusd.bake.texels.maps import chosen_maps
 from fabricusd.bake.texels.recipe import recipe
 from fabricusd.bake.texels.sheet import sheets_of
 from fabricusd.errors import FabricError
-from fabricusd.fabric import Fabric
+from fabricusd.fabric import Fabric, even
 from fabricusd.schema import load, save_all
 from tests.bake.meshes import quad_scene, write_quad
 
@@ -28,8 +28,15 @@ THROUGH = ("transmission_color", "back_base_color")
 SKY = 4096
 
 
+GAPS_SCATTER = pytest.mark.xfail(
+    strict=True,
+    reason="light that is stopped in a gap scatters as by the whole repeat, which bakes and looks of "
+    "cloth with large gaps do not know yet",
+)
+
+
 def conserving(preset: str = "linen_plain") -> Fabric:
-    return replace(load(preset), model="conserving")
+    return replace(even(load(preset)), model="conserving")
 
 
 def share(fabric: Fabric, below: bool) -> np.ndarray:
@@ -71,7 +78,7 @@ def test_maps_of_light_through_are_baked_where_light_comes_through():
     assert more == names | set(THROUGH)
 
 
-@pytest.mark.parametrize("preset", ["linen_plain", "silk_shot"])
+@pytest.mark.parametrize("preset", [pytest.param("linen_plain", marks=GAPS_SCATTER), "silk_shot"])
 def test_texels_relight_conserving_cloth_from_both_sides(preset):
     fabric = conserving(preset)
     one = garments(quad_scene(fabric, 8.0))[0]

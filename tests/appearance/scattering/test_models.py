@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fabricusd.appearance.published import tables
+from fabricusd.appearance.published.columns import NODE_HALF
 from fabricusd.appearance.scattering import columns, lobes, models, table, terms
 from fabricusd.appearance.scattering.model import CONSERVING, PUBLISHED
 from fabricusd.appearance.weave.quadrature import CELLS, MOST_NODES, POINTS, Rule, default_rule
@@ -87,6 +88,6 @@ def test_lobes_without_a_mean_are_integrated_by_points_alone(monkeypatch):
     monkeypatch.setattr(tables, "has_cell_lobes", lambda fabric: False)
     made = tables.surface_tables(narrow)
     assert 0 < len(made.nodes) <= MOST_NODES
-    assert not made.nodes[:, tables.NODE_HALF].any()
+    assert not made.nodes[:, NODE_HALF].any()
     with pytest.raises(FabricError, match="the form of the rule must be points"):
         tables.surface_tables(narrow, rule=Rule(CELLS, 0.1))

@@ -64,10 +64,15 @@ def test_round_threads_fall_to_the_axis_at_their_edges() -> None:
     assert round_[warp, 0].mean() / flat[warp, 0].mean() == pytest.approx(math.pi / 4, rel=1e-2)
 
 
-def test_a_thread_of_unknown_thickness_is_as_thick_as_it_looks() -> None:
-    compiled = compile_fabric(cloth(PLAIN, HUMP, thickness=0.0), precision=np.float64)
-    half = 0.5 * coverage(cloth(PLAIN, HUMP)).width
-    np.testing.assert_allclose(compiled.half_height[:, 0], half * [2e-3, 1e-3])
+def test_a_thread_of_unknown_thickness_is_as_thick_as_it_looks_or_as_fits() -> None:
+    flat = cloth(PLAIN, TangentCurve(), thickness=0.0)
+    one_way = replace(flat, weave=Weave(np.ones((1, 1), bool)), weft=ThreadSet(coverage=0.0))
+    compiled = compile_fabric(one_way, precision=np.float64)
+    assert compiled.half_height[WARP, 0] == pytest.approx(0.5 * 0.4e-3)
+    crossed = compile_fabric(cloth(PLAIN, HUMP, thickness=0.0), precision=np.float64)
+    looks = 0.5 * coverage(cloth(PLAIN, HUMP)).width * [2e-3, 1e-3]
+    assert (crossed.half_height[:, 0] < looks).all()
+    assert (crossed.half_height[:, 0] > 0.1 * looks).all()
 
 
 @given(fabrics(back=False))

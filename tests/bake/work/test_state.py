@@ -55,7 +55,7 @@ def textures_alone(job, monkeypatch):
     """What is not made of the state is left out or made once, since it takes most of the time."""
     scene, linen, _, _ = job
     known = module._job(scene, SMALL, linen, None, None)
-    recipes = module._recipes(known.found, SMALL)
+    recipes = module._recipes(known)
     sheets = module._sheets(known.found[0], recipes, known.tiles[0], 64, SMALL.margin)
     for name, value in (
         ("_job", known), ("_recipes", recipes), ("_sheets", sheets), ("refuse_overlaps", None),
