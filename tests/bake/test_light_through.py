@@ -30,8 +30,8 @@ SKY = 4096
 
 GAPS_SCATTER = pytest.mark.xfail(
     strict=True,
-    reason="light that is stopped in a gap scatters as by the whole repeat, which bakes and looks of "
-    "cloth with large gaps do not know yet",
+    reason="light that is stopped in a gap scatters as by the whole repeat, which bakes and looks "
+    "of cloth with large gaps do not know yet",
 )
 
 
