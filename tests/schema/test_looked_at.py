@@ -130,10 +130,6 @@ def green_over_red(scene, **settings):
     return float(color[1] / color[0])
 
 
-OF_EACH_SET = "shadows keep the light of each set, not the hue of both: docs/decisions/004"
-
-
-@pytest.mark.xfail(reason=OF_EACH_SET, strict=True)
 @pytest.mark.parametrize("level", ["weave", "thread"])
 def test_shot_silk_has_one_hue_at_every_level_with_shadows(shot, level):
     scene = shot / "a_silk_shot_4.usda"
@@ -141,7 +137,6 @@ def test_shot_silk_has_one_hue_at_every_level_with_shadows(shot, level):
     assert green_over_red(scene, level=level) == pytest.approx(far, rel=0.05)
 
 
-@pytest.mark.xfail(reason=OF_EACH_SET, strict=True)
 def test_shot_silk_keeps_its_hue_as_the_camera_comes_near(shot):
     hues = [green_over_red(shot / "dolly_silk_shot.usda", frames=(k,)) for k in (1, 3, 5, 8)]
     assert max(hues) / min(hues) < 1.05

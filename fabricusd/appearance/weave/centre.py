@@ -41,17 +41,20 @@ def centre_line(
         return height_at(curve, s / n) * n * pitch, angle_at(curve, s / n)
     first, last = -math.tan(curve.angles[-1]), -math.tan(curve.angles[0])
     rim = 0.5 * (1.0 - cross_width)
-    for start in np.flatnonzero(on_top & ~np.roll(on_top, 1)):
-        turned = np.roll(on_top, -int(start))
-        run = int(np.argmin(turned))
-        hidden = int(np.argmax(np.append(turned[run:], True)))
-        length, below = seen_length(run, cross_width), hidden - 1.0 + cross_width
-        t = np.mod(s - (start - rim), n)
-        shown = t < length
-        q = t[shown] / length
-        psi[shown], z[shown] = angle_at(curve, q), height_at(curve, q) * length * pitch
-        under = (t >= length) & (t < length + below)
-        q = (t[under] - length) / below
-        z[under] = below * pitch * ((q**3 - 2 * q**2 + q) * first + (q**3 - q**2) * last)
-        psi[under] = -np.arctan((3 * q**2 - 4 * q + 1) * first + (3 * q**2 - 2 * q) * last)
+    starts = np.flatnonzero(on_top & ~np.roll(on_top, 1))
+    ends = np.flatnonzero(on_top & ~np.roll(on_top, -1))
+    # From the start of each run to its last cell, and on to the next start.
+    run = np.mod(np.roll(ends, -1) - starts if ends[0] < starts[0] else ends - starts, n) + 1
+    hidden = np.mod(np.roll(starts, -1) - starts - 1, n) + 1 - run
+    of = np.searchsorted(starts, np.mod(s + rim, n), side="right") - 1
+    t = np.mod(s - (starts[of] - rim), n)
+    length = np.array([seen_length(x, cross_width) for x in run])[of]
+    below = (hidden - 1.0 + cross_width)[of]
+    shown = t < length
+    q = t[shown] / length[shown]
+    psi[shown], z[shown] = angle_at(curve, q), height_at(curve, q) * length[shown] * pitch
+    under = ~shown
+    q = (t[under] - length[under]) / below[under]
+    z[under] = below[under] * pitch * ((q**3 - 2 * q**2 + q) * first + (q**3 - q**2) * last)
+    psi[under] = -np.arctan((3 * q**2 - 4 * q + 1) * first + (3 * q**2 - 2 * q) * last)
     return z, psi

@@ -129,19 +129,17 @@ class _Crossing:
     """One of each kind of crossing.
 
     warp_over : bool; kind : (2,) - types of the two threads, WEFT first
-    place : (2,) float - of the crossing along each thread [cells]
     span : (2,) float - half the width of each thread [cells of the other]
     pitch : (2,) float - of each set [m]
-    height, angle : per set (n RINGS,) float - of the thread's centre line
+    lines : per set (n,) places along the thread from the crossing [cells], and of the centre line
+        there the heights [m] and angles
     """
 
     warp_over: bool
     kind: tuple[int, int]
-    place: tuple[float, float]
     span: Floats
     pitch: Floats
-    height: tuple[Floats, Floats]
-    angle: tuple[Floats, Floats]
+    lines: tuple[tuple[Floats, Floats, Floats], tuple[Floats, Floats, Floats]]
 
     def surface(self, which: int, half: Floats, tall: float, reach: float) -> Floats:
         """(ACROSS along, ACROSS across) height of the side that faces the other thread [m].
@@ -151,18 +149,16 @@ class _Crossing:
         not bend more sharply than they are thick.
         """
         place = np.linspace(-reach, reach, ACROSS)
-        count = len(self.height[which]) // RINGS
         crossing = float(self.pitch[1 - which])
-        ring = (np.arange(count * RINGS) + 0.5) / RINGS
-        s = (self.place[which] + place * self.span[1 - which])[:, None]
+        s = (place * self.span[1 - which])[:, None]
         side = -1.0 if self.warp_over == (which == WARP) else 1.0
         h = side * min(float(half[which, self.kind[which]]), 0.5 * tall) * np.sqrt(1.0 - place**2)
-        height, angle = self.height[which], self.angle[which]
+        ring, height, angle = self.lines[which]
         at = s
         for _ in range(SETTLED):
-            at = s - h / crossing * np.sin(np.interp(at, ring, angle, period=count))
-        psi = np.interp(at, ring, angle, period=count)
-        return np.asarray(np.interp(at, ring, height, period=count) + h * np.cos(psi))
+            at = s - h / crossing * np.sin(np.interp(at, ring, angle))
+        psi = np.interp(at, ring, angle)
+        return np.asarray(np.interp(at, ring, height) + h * np.cos(psi))
 
 
 def _room(
@@ -190,39 +186,48 @@ def _crossings(fabric: Fabric) -> list[_Crossing]:
     ends, picks = true_repeat(fabric)
     weave, width = fabric.weave, coverage(fabric).width
     pitch = np.array([s.pitch for s in sets(fabric)])
-    lines: dict[tuple[int, int], tuple[Floats, Floats]] = {}
+    # A side is looked for as far from the crossing as it is wide, and as a side leans.
+    tallest = float(_round(fabric).max())
+    around = [int(np.ceil(1.0 + tallest / pitch[1 - which])) for which in (WEFT, WARP)]
 
     def line(which: int, number: int) -> tuple[Floats, Floats]:
-        if (which, number) not in lines:
-            sequence = sets(fabric)[which].sequence
-            thread = fabric.thread_list[sequence[number % len(sequence)]]
-            if which == WARP:
-                on_top = np.resize(weave.cells[number % weave.ends], picks)
-            else:
-                on_top = np.resize(~weave.cells[:, number % weave.picks], ends)
-            lines[which, number] = centre_line(
-                thread.curve, on_top, pitch[1 - which], width[1 - which]
-            )
-        return lines[which, number]
+        sequence = sets(fabric)[which].sequence
+        thread = fabric.thread_list[sequence[number % len(sequence)]]
+        if which == WARP:
+            on_top = np.resize(weave.cells[number % weave.ends], picks)
+        else:
+            on_top = np.resize(~weave.cells[:, number % weave.picks], ends)
+        return centre_line(thread.curve, on_top, pitch[1 - which], width[1 - which])
 
-    found = []
-    for end, pick in _different(fabric, ends, picks):
-        warp, weft = line(WARP, end), line(WEFT, pick)
-        found.append(
-            _Crossing(
-                warp_over=bool(weave.cells[end % weave.ends, pick % weave.picks]),
-                kind=(
-                    fabric.weft.sequence[pick % len(fabric.weft.sequence)],
-                    fabric.warp.sequence[end % len(fabric.warp.sequence)],
-                ),
-                place=(end + 0.5, pick + 0.5),
-                span=0.5 * APART * width,
-                pitch=pitch,
-                height=(weft[0], warp[0]),
-                angle=(weft[1], warp[1]),
-            )
+    places = _different(fabric, ends, picks)
+    windows: dict[tuple[int, int], tuple[Floats, Floats, Floats]] = {}
+    # A line of a figured cloth has thousands of cells: one at a time is held whole.
+    for which, numbers, along in ((WARP, *places.T), (WEFT, *places.T[::-1])):
+        for number in np.unique(numbers):
+            whole = line(which, int(number))
+            for at in np.flatnonzero(numbers == number):
+                windows[which, int(at)] = _window(whole, int(along[at]), around[which])
+    return [
+        _Crossing(
+            warp_over=bool(weave.cells[end % weave.ends, pick % weave.picks]),
+            kind=(
+                fabric.weft.sequence[pick % len(fabric.weft.sequence)],
+                fabric.warp.sequence[end % len(fabric.warp.sequence)],
+            ),
+            span=0.5 * APART * width,
+            pitch=pitch,
+            lines=(windows[WEFT, at], windows[WARP, at]),
         )
-    return found
+        for at, (end, pick) in enumerate(places)
+    ]
+
+
+def _window(line: tuple[Floats, Floats], cell: int, around: int) -> tuple[Floats, Floats, Floats]:
+    """The rings within `around` cells of one: their places from its centre [cells], their heights
+    and angles."""
+    rings = np.arange(-around * RINGS, (around + 1) * RINGS)
+    height, angle = (x.take(cell * RINGS + rings, mode="wrap") for x in line)
+    return (rings + 0.5) / RINGS - 0.5, height, angle
 
 
 def _different(fabric: Fabric, ends: int, picks: int) -> NDArray[np.int64]:

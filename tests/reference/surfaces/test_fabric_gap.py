@@ -1,5 +1,6 @@
 """What passes between the threads, as paths and shadow rays are told."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +9,8 @@ from numba import njit
 
 from fabricusd.appearance.conserving.by_side import by_side
 from fabricusd.appearance.conserving.grid import entry_angles
-from fabricusd.appearance.law import CONSERVING_ONLY, PUBLISHED_ONLY
+from fabricusd.appearance.law import CONSERVING_ONLY, surface_law
+from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.kernels.real import LEAN
 from fabricusd.reference.rays.triangles import RECORD, N, T
 from fabricusd.reference.surfaces.fabric_gap import TABLE, gap_along, gap_table
@@ -17,8 +19,8 @@ from fabricusd.schema import load
 LINEN = load("linen_plain")
 
 
-def _law(gap, kind=CONSERVING_ONLY):
-    return SimpleNamespace(kind=kind, conserving=SimpleNamespace(gap=gap))
+def _law(gap):
+    return SimpleNamespace(kind=CONSERVING_ONLY, conserving=SimpleNamespace(gap=gap))
 
 
 @njit(**LEAN)
@@ -49,7 +51,18 @@ def test_cloth_that_passes_the_same_from_everywhere_or_nothing_has_no_table():
     gap = np.full(TABLE, 0.2)
     assert gap_table(_law(gap), opaque=False) == pytest.approx(gap)
     assert gap_table(_law(gap), opaque=True) is None
-    assert gap_table(_law(gap, PUBLISHED_ONLY), opaque=False) is None
+    # Laws that do not close gaps with the view: what passes is the gap, from everywhere.
+    assert gap_table(surface_law(replace(LINEN, surface_law="masked")), opaque=False) is None
     assert gap_table(_law(0.0 * gap), opaque=False) is None
     # Pile has another table, of one number.
     assert gap_table(_law(np.full((25, 72), 0.2)), opaque=False) is None
+
+
+def test_published_cloth_whose_gaps_close_with_the_view_has_its_openness():
+    table = gap_table(surface_law(replace(LINEN, surface_law="projected")), opaque=False)
+    assert table is not None
+    assert table.shape == TABLE
+    gap = coverage(LINEN).gap
+    assert table.max() == pytest.approx(gap, abs=0.02)
+    # Towards the horizon threads cover the gaps.
+    assert table[-1].max() < 0.05 * gap
