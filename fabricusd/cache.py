@@ -7,16 +7,21 @@ out of date; at most, nobody asks for it any more. Losing the whole cache costs 
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import tempfile
 import time
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import platformdirs
+from numpy.typing import NDArray
 
 VARIABLE = "FABRICUSD_CACHE_DIR"
 KERNELS = "kernels"
@@ -76,6 +81,35 @@ def cache_folder(kind: str, key: str) -> Path:
     with suppress(OSError):
         (folder / _USED).touch()
     return folder
+
+
+def kept(kind: str, key: Iterable[object], make: Callable[[], NDArray[Any]]) -> NDArray[Any]:
+    """The array that `make` returns, from the cache if it was made before.
+
+    key : what the array depends on: arrays, and objects whose `repr` says all that matters
+    """
+    digest = hashlib.blake2b(digest_size=10)
+    for part in key:
+        if isinstance(part, np.ndarray):
+            digest.update(f"{part.dtype} {part.shape}".encode())
+            digest.update(np.ascontiguousarray(part).data)
+        else:
+            digest.update(repr(part).encode())
+    path = cache_folder(kind, digest.hexdigest()) / "array.npy"
+    # Whatever is wrong with the file, the array can be made again.
+    with suppress(OSError, ValueError, EOFError):
+        return np.asarray(np.load(path, allow_pickle=False))
+    made = make()
+    with suppress(OSError):
+        handle, partial = tempfile.mkstemp(dir=path.parent)
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                np.save(stream, made)
+            os.replace(partial, path)
+        except BaseException:
+            os.unlink(partial)
+            raise
+    return made
 
 
 def entries() -> list[Entry]:

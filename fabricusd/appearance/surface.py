@@ -339,7 +339,7 @@ def _weave_chunk(R, cloth, shadow, tables, uv, wi, wo, out, first, last):
     block = np.empty(POINT_ROWS * BLOCK, R)
     for begin in range(first, last, BLOCK):
         size = min(BLOCK, last - begin)
-        look_up_block(R, cloth, shadow.table, uv, begin, size, ints, reals)
+        look_up_block(R, cloth, shadow, uv, begin, size, ints, reals)
         horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
         mean_block(R, cloth, shadow, wi, begin, size, ints, reals)
         # Level `weave` does not read the position across: any row will do.

@@ -11,6 +11,7 @@ spaced in the diamond angle, which needs no arctangent. `horizon_lookup` reads t
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -18,12 +19,18 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP
 from fabricusd.appearance.shadow.height import Origin, steepest
+from fabricusd.appearance.shadow.neighbourhoods import MOST_KINDS, neighbourhoods
 from fabricusd.appearance.weave.compiled import CompiledFabric
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.lookup import crown_on, find, height_on
+from fabricusd.cache import kept
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
+from fabricusd.kernels.cache import fingerprint
 from fabricusd.kernels.real import KERNEL, PART
+
+NO_KINDS = np.zeros((0, 0), np.int32)
+"""`Horizon.kinds` of a table that has an entry for each cell."""
 
 AZIMUTHS = 16
 TEXELS = 8
@@ -32,8 +39,11 @@ TEXELS = 8
 ACROSS = 6
 """Places across a thread over which a texel's horizon is averaged."""
 
-MOST_BYTES = 2**25
-"""Size of the largest horizon table: 360 x 360 cells at the default size."""
+KEPT_CELLS = 512
+"""Cells from which on a table is kept on disk: fewer are computed within half a second."""
+
+CHUNK = 256
+"""Cells that are filled before an interrupt is heard: a fraction of a second."""
 
 SOFTNESS = math.radians(8.0)
 """Width [rad] of the edge of a shadow from the table. Light leaves a thread all over its lit side,
@@ -43,6 +53,22 @@ LOWEST = math.tan(math.radians(0.25))
 """Slope below which a horizon counts as level: that of a quarter of a degree, half the sun's
 disc."""
 
+FEWER_ACROSS, LARGE_LOWEST = 3, math.tan(math.radians(1.0))
+"""ACROSS and LOWEST of tables by neighbourhood, whose entries are not exact: a quarter of the
+time."""
+
+
+class Horizon(NamedTuple):
+    """A horizon table.
+
+    table : (I, J, slots, along, azimuths) uint8 - sine of the horizon's elevation, with 255 for 1;
+        of a repeat of more than MOST_KINDS cells (1, n, slots, along, azimuths), by kind of cell
+    kinds : (I, J) int32 - the kind of each cell, see `neighbourhoods`; (0, 0) for the former
+    """
+
+    table: NDArray[np.uint8]
+    kinds: NDArray[np.int32]
+
 
 def horizon_table(
     fabric: Fabric,
@@ -50,30 +76,44 @@ def horizon_table(
     highest: float,
     azimuths: int,
     texels: int,
-) -> NDArray[np.uint8] | None:
-    """(I, J, slots, along, azimuths) sine of the horizon's elevation, with 255 for 1.
-
-    The result is None if the table of the repeat would be larger than MOST_BYTES.
+) -> Horizon:
+    """The horizons of `fabric`.
 
     cloth : `fabric` in float64
 
     The table has the period of the threads' *shapes*: types that differ in colour only do not
-    lengthen it.
+    lengthen it. A table that takes more than a moment is kept in the user's cache.
     """
     if azimuths < 16 or azimuths % 4:
         raise FabricError("azimuths", f"is {azimuths}; it must be a multiple of 4, at least 16")
     if texels < 2 or texels % 2:
         raise FabricError("texels", f"is {texels}; it must be an even number of at least 2")
     repeat = shape_repeat(fabric)
-    slots = cloth.runs.shape[2]
-    if math.prod((*repeat, slots, texels, azimuths)) > MOST_BYTES:
-        return None
-    table = np.zeros((*repeat, slots, texels, azimuths), np.uint8)
-    if highest > 0:
+    shape = (cloth.runs.shape[2], texels, azimuths)
+    most = MOST_KINDS // shape[0]
+    if math.prod(repeat) <= most:
+        kinds, lead, across, lowest = NO_KINDS, repeat, ACROSS, LOWEST
         cells = np.argwhere(np.ones(repeat, bool))
-        entries = table.reshape(-1, *table.shape[2:])
-        _fill(cloth, highest, diamond_directions(azimuths), cells, entries)
-    return table
+    else:
+        around = neighbourhoods(fabric, cloth, repeat, most)
+        kinds, cells, lead = around.kinds, around.first, (1, len(around.first))
+        across, lowest = FEWER_ACROSS, LARGE_LOWEST
+    if highest <= 0:
+        return Horizon(np.zeros((*lead, *shape), np.uint8), kinds)
+
+    directions = diamond_directions(azimuths)
+
+    def entries() -> NDArray[np.uint8]:
+        made = np.zeros((len(cells), *shape), np.uint8)
+        for begin in range(0, len(cells), CHUNK):
+            part = slice(begin, begin + CHUNK)
+            _fill(cloth, highest, directions, across, lowest, cells[part], made[part])
+        return made
+
+    if len(cells) < KEPT_CELLS:
+        return Horizon(entries().reshape(*lead, *shape), kinds)
+    key = (fingerprint(), *(x for x in cloth), cells, highest, shape)
+    return Horizon(kept("horizons", key, entries).reshape(*lead, *shape), kinds)
 
 
 def shape_repeat(fabric: Fabric) -> tuple[int, int]:
@@ -106,24 +146,24 @@ def diamond_directions(azimuths: int) -> NDArray[np.float64]:
 
 
 @njit(parallel=True, **KERNEL)
-def _fill(cloth, highest, directions, cells, entries):
+def _fill(cloth, highest, directions, across, lowest, cells, entries):
     """Compute the mean horizon across every texel of `cells` (n, 2), in every direction."""
     count, slots, rows = entries.shape[:3]
     for cell in prange(count):
         for slot in range(slots):
             for row in range(rows):
                 _fill_texel(
-                    cloth, highest, directions, cells[cell, 0], cells[cell, 1], slot,
-                    (row + 0.5) / rows, entries[cell, slot, row],
+                    cloth, highest, directions, across, lowest, cells[cell, 0], cells[cell, 1],
+                    slot, (row + 0.5) / rows, entries[cell, slot, row],
                 )  # fmt: skip
 
 
 @njit(**KERNEL)
-def _fill_texel(cloth, highest, directions, i, j, slot, along, out):
+def _fill_texel(cloth, highest, directions, across, lowest, i, j, slot, along, out):
     azimuths = out.size
     total, count = np.zeros(azimuths), 0
-    for column in range(ACROSS):
-        u, v, seen = _texel_centre(cloth, i, j, slot, along, (column + 0.5) / ACROSS)
+    for column in range(across):
+        u, v, seen = _texel_centre(cloth, i, j, slot, along, (column + 0.5) / across)
         which, thread, s, w, _, length = find(np.float64, cloth, u, v)
         if not seen or which == GAP or cloth.pile[thread] != 0:
             continue
@@ -132,8 +172,8 @@ def _fill_texel(cloth, highest, directions, i, j, slot, along, out):
         h = height_on(np.float64, cloth, which, thread, s, length) + crown
         origin = Origin(u, v, which, crown, h)
         for a in range(azimuths):
-            k = steepest(cloth, highest, origin, directions[a, 0], directions[a, 1], LOWEST, False)
-            total[a] += k / math.sqrt(1.0 + k * k) if k > LOWEST else 0.0
+            k = steepest(cloth, highest, origin, directions[a, 0], directions[a, 1], lowest, False)
+            total[a] += k / math.sqrt(1.0 + k * k) if k > lowest else 0.0
     for a in range(azimuths):
         out[a] = np.uint8(255.0 * total[a] / max(count, 1) + 0.5)
 

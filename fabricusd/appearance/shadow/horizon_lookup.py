@@ -44,22 +44,22 @@ def _between(R, table, i, j, slot, row, first, second, c):
 
 
 @njit(**INLINE)
-def split_table(table, u, v):
-    """Cell of the table at weave coordinates (float64); the first cell if they are not finite or
-    lie beyond FARTHEST."""
+def entry_at(table, kinds, u, v):
+    """Entry of the table at weave coordinates (float64); that of the first cell if they are not
+    finite or lie beyond FARTHEST."""
     sound = abs(u) <= FARTHEST and abs(v) <= FARTHEST
-    return (
-        wrap(np.floor(u) if sound else 0.0, table.shape[0]),
-        wrap(np.floor(v) if sound else 0.0, table.shape[1]),
-    )
+    end, pick = np.floor(u) if sound else 0.0, np.floor(v) if sound else 0.0
+    if kinds.size == 0:
+        return wrap(end, table.shape[0]), wrap(pick, table.shape[1])
+    return 0, int(kinds[wrap(end, kinds.shape[0]), wrap(pick, kinds.shape[1])])
 
 
 @njit(**INLINE)
-def horizon_at(R, cloth, table, u, v, which, x, y):
+def horizon_at(R, cloth, table, kinds, u, v, which, x, y):
     """Sine of the horizon's elevation towards (x, y), seen from (u, v) on the thread of `which`:
     the mean across the thread."""
     i, j, _, _, p, q = split(R, cloth, u, v)
-    in_u, in_v = split_table(table, u, v)
+    in_u, in_v = entry_at(table, kinds, u, v)
     top = int(cloth.grid[i, j])
     along, over = (q, p) if top == WARP else (p, q)
     width = cloth.width[top]

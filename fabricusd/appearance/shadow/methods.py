@@ -5,8 +5,8 @@ Each method computes `g(x, wi)` in [0, 1], `docs/model.md` section 5, from the s
 
 none    : 1; the effect of neighbouring threads is left to the masking term
 peak    : the nearest of the highest points is the horizon in every direction, [Bisker2011] 5.2.3
-horizon : a table of the horizon by place on the thread and azimuth, [Max1988]; repeats too large
-          for a table are traced instead
+horizon : a table of the horizon by place on the thread and azimuth, [Max1988]; for large repeats
+          by neighbourhood, see `neighbourhoods`
 traced  : the height field is marched along the ray; the reference for the other methods
 
 The value of the cloth is multiplied by `shade`. Under a surface law that is `absolute` it is `g`,
@@ -38,6 +38,7 @@ from fabricusd.appearance.shadow.height import (
 from fabricusd.appearance.shadow.horizon import (
     AZIMUTHS,
     LOWEST,
+    NO_KINDS,
     SOFTNESS,
     TEXELS,
     diamond_directions,
@@ -117,8 +118,7 @@ class Shadow(NamedTuple):
     crest_first, crest_last : (k, q) real - intervals of each type's run that are as high as its
         peak; an interval is empty if its last position is less than its first
     crest_height : (k,) real - height there, in run lengths
-    table : (I, J, slots, along, azimuths) uint8 - sine of the horizon's elevation times
-        255, see `horizon`; a single zero for the other methods
+    table, kinds : of `horizon.Horizon`; a single zero and (0, 0) for the other methods
     texels : the same memory as a one-dimensional array
     mean : (stretches, columns + 1, GROUPS) real, flat - `mean.groups_of`, horizons in softnesses;
         one entry for `none`
@@ -135,6 +135,7 @@ class Shadow(NamedTuple):
     crest_last: NDArray[Any]
     crest_height: NDArray[Any]
     table: NDArray[np.uint8]
+    kinds: NDArray[np.int32]
     texels: NDArray[np.uint8]
     mean: NDArray[Any]
     mean_columns: int
@@ -162,8 +163,8 @@ def compile_shadow(
         `horizon.SOFTNESS` for `horizon` and PEAK_SOFTNESS for `peak`
     azimuths, texels : size of the horizon table: directions, and texels along a thread in one cell
 
-    A repeat that is too large for a horizon table, such as a figured cloth of hundreds of ends and
-    picks, is traced instead: `method` is then TRACED, which is slower and more exact.
+    The horizon table of a large repeat, such as a figured cloth of hundreds of ends and picks, has
+    an entry for each neighbourhood: see `horizon.Horizon`.
     """
     if method not in METHODS:
         raise FabricError("shadow", f"is '{method}'; it must be one of {', '.join(METHODS)}")
@@ -171,13 +172,9 @@ def compile_shadow(
         raise FabricError("softness", f"is {softness}; it must be above 0")
     cloth = compile_fabric(fabric, precision=np.float64)
     highest = highest_point(fabric, cloth)
-    table = np.zeros((1, 1, 1, 1, 1), np.uint8)
+    table, kinds = np.zeros((1, 1, 1, 1, 1), np.uint8), NO_KINDS
     if method == "horizon":
-        found_table = horizon_table(fabric, cloth, highest, azimuths, texels)
-        if found_table is None:
-            method = "traced"
-        else:
-            table = found_table
+        table, kinds = horizon_table(fabric, cloth, highest, azimuths, texels)
     found = [crest(t.curve) for t in fabric.thread_list]
     first = np.ones((len(found), max(len(c) for c in found)))
     last = np.zeros_like(first)
@@ -192,6 +189,7 @@ def compile_shadow(
         crest_last=last,
         crest_height=np.array([peak(t.curve) for t in fabric.thread_list]),
         table=table,
+        kinds=kinds,
         texels=table.reshape(-1),
         mean=np.ones(1),
         mean_columns=_COLUMNS[METHODS.index(method)],
@@ -281,7 +279,7 @@ def lit(R, cloth, shadow, u, v, hit, x, y, z):
     if flat <= R(1e-6) * z:
         return R(1)
     if shadow.method == HORIZON:
-        sine = horizon_at(R, cloth, shadow.table, u, v, which, x, y)
+        sine = horizon_at(R, cloth, shadow.table, shadow.kinds, u, v, which, x, y)
         return soft_edge(R, above_horizon(R, sine, flat, z), shadow.softness)
     axis = height_on(R, cloth, which, thread, hit.s, hit.length)
     if shadow.method == PEAK:
@@ -428,7 +426,7 @@ def _horizons_at(R, cloth, shadow, u, v, directions, out):
     for c in range(directions.shape[0]):
         x, y = directions[c, 0], directions[c, 1]
         if shadow.method == HORIZON:
-            out[c] = horizon_at(R, cloth, shadow.table, u, v, which, x, y)
+            out[c] = horizon_at(R, cloth, shadow.table, shadow.kinds, u, v, which, x, y)
         else:
             slope = steepest(cloth, shadow.highest, origin, x, y, LOWEST, False)
             out[c] = slope / math.sqrt(R(1) + slope * slope) if slope > LOWEST else R(0)
@@ -460,7 +458,7 @@ def lit_all(R, cloth, shadow, shaded, uv, wi, out):
             _one_by_one(R, cloth, shadow, shaded, uv, begin, wi, found)
         else:
             ints, reals = np.empty(INT_ROWS * BLOCK, np.int32), np.empty(REAL_ROWS * BLOCK, R)
-            look_up_block(R, cloth, shadow.table, uv, begin, size, ints, reals)
+            look_up_block(R, cloth, shadow, uv, begin, size, ints, reals)
             horizon_block(R, cloth, shadow, wi, begin, size, ints, reals)
             if shaded:
                 mean_block(R, cloth, shadow, wi, begin, size, ints, reals)

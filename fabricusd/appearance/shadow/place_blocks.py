@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.frame import WARP, WEFT
-from fabricusd.appearance.shadow.horizon_lookup import split_table
+from fabricusd.appearance.shadow.horizon_lookup import entry_at
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.lookup import (
     angle_on,
@@ -31,7 +31,7 @@ TOP, OF_SET, OF_THREAD, FREE = 4 * BLOCK, 5 * BLOCK, 6 * BLOCK, 7 * BLOCK
 """The set on top of the cell; the visible set, or GAP; the visible thread; and 1 in gaps and on
 pile, which nothing shadows."""
 TABLE_I, TABLE_J = 8 * BLOCK, 9 * BLOCK
-"""The cell of the horizon table."""
+"""The entry of the horizon table, as `horizon_lookup.entry_at`."""
 FIRST, SECOND = 10 * BLOCK, 11 * BLOCK
 """Filled by `horizon_blocks.choose_texels`."""
 _WARP_THREAD, _WEFT_THREAD = 12 * BLOCK, 13 * BLOCK
@@ -47,15 +47,16 @@ REAL_ROWS = 11
 
 
 @njit(**PART)
-def look_up_block(R, cloth, table, uv, begin, size, ints, reals):
-    """`weave.find` at `size` places uv (n, 2) float64 from `begin` on, and their cells of `table`.
+def look_up_block(R, cloth, shadow, uv, begin, size, ints, reals):
+    """`weave.find` at `size` places uv (n, 2) float64 from `begin` on, and the entries of the
+    horizon table there.
 
     ints : (INT_ROWS*BLOCK,) int32; reals : (REAL_ROWS*BLOCK,)
 
     `methods.horizon_block` fills the rows FIRST, SECOND, SHARES and LIT.
     """
     _cells(R, cloth, uv, begin, size, ints, reals)
-    _cells_of_table(cloth, table, uv, begin, size, ints)
+    _entries(cloth, shadow.table, shadow.kinds, uv, begin, size, ints)
     _gather(R, cloth, size, ints, reals)
     _place(R, cloth, size, ints, reals)
     for k in range(size):
@@ -98,15 +99,16 @@ def _places_in_sequence(cloth, which, uv, begin, size, ints, row, cell_row):
 
 
 @njit(**INLINE)
-def _cells_of_table(cloth, table, uv, begin, size, ints):
-    """Compute the cells of the horizon table: those of the grid, unless the table is larger."""
-    if table.shape[0] == cloth.grid.shape[0] and table.shape[1] == cloth.grid.shape[1]:
+def _entries(cloth, table, kinds, uv, begin, size, ints):
+    """Compute the entries of the horizon table: mostly, those of the cells of the grid."""
+    same = table.shape[0] == cloth.grid.shape[0] and table.shape[1] == cloth.grid.shape[1]
+    if kinds.size == 0 and same:
         for k in range(size):
             ints[TABLE_I + k], ints[TABLE_J + k] = ints[CELL_I + k], ints[CELL_J + k]
     else:
         for k in range(size):
             p = index(begin, k)
-            ints[TABLE_I + k], ints[TABLE_J + k] = split_table(table, uv[p, 0], uv[p, 1])
+            ints[TABLE_I + k], ints[TABLE_J + k] = entry_at(table, kinds, uv[p, 0], uv[p, 1])
 
 
 @njit(**INLINE)

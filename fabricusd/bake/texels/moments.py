@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabricusd.appearance.shadow.horizon_lookup import entry_at
 from fabricusd.appearance.shadow.methods import lit
 from fabricusd.appearance.weave.coverage import GAP, WARP
 from fabricusd.appearance.weave.lookup import crown_on, find, move_along, wrap
@@ -236,7 +237,7 @@ def _add_horizon(made, u, v, which, out):  # type: ignore[no-untyped-def]
     if table.shape[4] != AZIMUTHS:
         return
     end, pick = math.floor(u), math.floor(v)
-    a, b = wrap(end, table.shape[0]), wrap(pick, table.shape[1])
+    a, b = entry_at(table, made.kinds, u, v)
     p, q = R(u - end), R(v - pick)
     cloth = made.cloth
     top = int(cloth.grid[wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])])

@@ -25,7 +25,7 @@ class Recipe(NamedTuple):
 
     cloth, shadow : compiled for float32; `shadow` is evaluated for the direction `light`
     yarn : of the threads; uneven : int - 1 if they vary, and the yarn is to be read
-    table : horizon table of `compile_shadow(..., "horizon")`
+    table, kinds : horizon table of `compile_shadow(..., "horizon")`
     rows, heights : see `angle_rows`
     rounded : int - 1 if threads are round across their width
     light : (3,) float32 - unit vector to the light in the weave's frame; zero for none
@@ -39,6 +39,7 @@ class Recipe(NamedTuple):
     uneven: int
     shadow: Shadow
     table: NDArray[np.uint8]
+    kinds: NDArray[np.int32]
     rows: NDArray[np.float32]
     heights: NDArray[np.float32]
     rounded: int
@@ -76,6 +77,7 @@ def recipe(
         uneven=0,
         shadow=shadow,
         table=horizon.table,
+        kinds=horizon.kinds,
         rows=angle_rows(fabric),
         heights=height_rows(fabric),
         rounded=int(level == "thread"),

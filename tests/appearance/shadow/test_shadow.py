@@ -282,16 +282,6 @@ def test_colours_alone_do_not_lengthen_the_table() -> None:
     assert shape_repeat(fabric) == (2, 6)
 
 
-@pytest.mark.exhaustive
-def test_a_repeat_too_large_for_a_table_is_marched() -> None:
-    vast = replace(PRESETS["linen_plain"], weave=Weave(np.eye(4096, dtype=bool)))
-    shadow = compile_shadow(vast, "horizon")
-    assert METHODS[shadow.method] == "traced"
-    assert shadow.table.size == 1
-    g = shadowing(vast, lights(50, 15), places(vast, 50, 16), "horizon")
-    assert ((g == 0) | (g == 1)).all()
-
-
 @pytest.fixture(scope="module")
 def linen() -> tuple[CompiledFabric, Shadow]:
     fabric = PRESETS["linen_plain"]
