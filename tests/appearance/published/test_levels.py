@@ -26,7 +26,7 @@ from fabricusd.appearance.weave.place import NOWHERE, Hit, Place, Places
 from fabricusd.appearance.weave.quadrature import POINTS, Rule, curve_nodes
 from fabricusd.fabric import MODELS
 from tests.appearance.directions import VIEWS, direction, random_directions
-from tests.appearance.presets import PRESETS, often, with_model
+from tests.appearance.presets import EVERY_RUN, PRESETS, often, with_model
 
 R = np.float64
 PUBLISHED = models.names(LAW)
@@ -77,10 +77,10 @@ def test_the_mean_of_conserving_weave_over_shared_nodes_is_far(name):
 
 
 def cases():
-    """Every preset with every model; with `conserving` the linen alone, the others take long."""
+    """Of `often`, with `conserving` the linen alone: the others take long."""
     for name in PRESETS:
         for model in MODELS:
-            long = model == "conserving" and name != "linen_plain"
+            long = name not in EVERY_RUN or (model == "conserving" and name != "linen_plain")
             yield pytest.param(name, model, marks=[pytest.mark.exhaustive] if long else [])
 
 
