@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import pytest
 
 from fabricusd.fabric import DEGREE, Fabric, TangentCurve, Thread, ThreadSet, Weave
 
@@ -151,3 +153,21 @@ def with_model(fabric: Fabric, model: str) -> Fabric:
         model=model,
         threads={k: replace(t, model="") for k, t in fabric.threads.items()},
     )
+
+
+EVERY_RUN = ("linen_plain", "polyester_satin_charmeuse", "velvet")
+"""Presets that `make test` looks at where all of them would take long: a plain weave with gaps, a
+satin without any, pile."""
+
+
+def often(rows: Iterable[Any]) -> list[Any]:
+    """Parameters for `parametrize`: those of a preset that is not in EVERY_RUN are `exhaustive`.
+
+    rows : names of presets, or tuples that begin with one
+    """
+    found = []
+    for row in rows:
+        values = row if isinstance(row, tuple) else (row,)
+        marks = () if values[0] in EVERY_RUN else pytest.mark.exhaustive
+        found.append(pytest.param(*values, marks=marks))
+    return found

@@ -47,8 +47,21 @@ def test_every_law_has_a_module_and_facets_another_room() -> None:
     assert len({law.tables for law in laws.REGISTRY.values()}) == len(PUBLISHED)
 
 
-@pytest.mark.parametrize("law", PUBLISHED)
-@pytest.mark.parametrize("name", ["linen_plain", "silk_shot", "velvet"])
+COMPARED = [(name, law) for name in ("linen_plain", "silk_shot", "velvet") for law in PUBLISHED]
+COMPARED_TO = {("silk_shot", "projected"), ("velvet", "masked")}
+"""Cases of the next test that every run looks at besides linen's."""
+
+
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [
+        pytest.param(
+            *case,
+            marks=() if case[0] == "linen_plain" or case in COMPARED_TO else pytest.mark.exhaustive,
+        )
+        for case in COMPARED
+    ],
+)
 def test_kernels_are_the_plain_formula(name: str, law: str) -> None:
     # So dark that no view is brighter than white, which the plain formula does not look at.
     fabric = scaled(replace(PRESETS[name], surface_law=law), 0.2)
@@ -61,7 +74,8 @@ def test_kernels_are_the_plain_formula(name: str, law: str) -> None:
     shares = {(s.is_warp, id(s.thread)): s for s in plain.shares(fabric)}
     for level in ("weave", "thread"):
         value = surface.evaluate(fabric, wi, wo, uv, level, max_error=2e-3)
-        for k in np.flatnonzero(~hit.gap):
+        # The plain formula takes a tenth of a second for each place.
+        for k in np.flatnonzero(~hit.gap)[::2]:
             share = shares[bool(hit.set[k] == 1), id(fabric.thread_list[hit.thread[k]])]
             width = hit.across[k : k + 1] if level == "thread" else None
             one = plain.point(

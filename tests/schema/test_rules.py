@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from pxr import Usd, UsdValidation
 
 from fabricusd import FabricError
 from fabricusd.schema import check, load, preset_names
+from fabricusd.schema.findings import Finding
 from fabricusd.schema.rules.rules import RULES
 from fabricusd.schema.validators import PLUGIN_NAME
 
@@ -22,9 +24,15 @@ OF_FABRICS = [
 ]
 
 
+@cache
+def found_in(sample: Path) -> tuple[Finding, ...]:
+    """What `check` finds in a sample, read once for all the tests here."""
+    return tuple(check(str(sample)))
+
+
 @pytest.mark.parametrize("rule", RULES, ids=NAMES)
 def test_a_rule_finds_the_fault_in_the_sample_named_after_it(rule):
-    findings = check(str(BAD / f"{rule.function.__name__}.usda"))
+    findings = found_in(BAD / f"{rule.function.__name__}.usda")
     assert rule.name in {finding.rule for finding in findings}
 
 
@@ -38,7 +46,7 @@ def test_a_rule_finds_nothing_in_the_samples_of_other_faults(rule):
     for sample in BAD.glob("*.usda"):
         if sample.stem == rule.function.__name__ or sample.stem in together.get(rule.name, ()):
             continue
-        assert rule.name not in {finding.rule for finding in check(str(sample))}, sample.name
+        assert rule.name not in {finding.rule for finding in found_in(sample)}, sample.name
 
 
 def test_there_is_one_bad_sample_for_each_rule():
@@ -139,7 +147,7 @@ def test_a_fabric_value_out_of_range_is_named_with_its_place(attribute, text, tm
 
 def test_every_problem_says_what_would_be_accepted():
     for sample in BAD.glob("*.usda"):
-        for finding in check(str(sample)):
+        for finding in found_in(sample):
             if finding.severity == "error":
                 assert "must" in finding.problem, finding
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -68,23 +69,37 @@ class Facets(NamedTuple):
 def white_facets(fabric: Fabric, draws: int = 0) -> Facets:
     """The facets of `fabric` as if all of its threads were white and `conserving`.
 
-    Opaque cloth is measured as if it transmitted light. draws : points per entry; 0 takes the
-    default
+    Opaque cloth is measured as if it transmitted light. The arrays are read-only: fabrics that
+    differ in colour alone, and both precisions of a law, share them. draws : points per entry; 0
+    takes the default
     """
+    return _kept_facets(_white(fabric), draws)
+
+
+@lru_cache(maxsize=8)
+def _kept_facets(fabric: Fabric, draws: int) -> Facets:
     pile = any(is_pile(t.curve) for t in fabric.thread_list)
     rows, columns, default = PILE_TABLE if pile else WOVEN_TABLE
     entries = rows * columns
     sent = np.zeros((entries, 2, 2, 1 if pile else entries), np.float32)
     surface = np.zeros(entries, np.float32)
     _measure(np.float32, white_tables(fabric), draws or default, columns, sent, surface)
+    sent.flags.writeable = surface.flags.writeable = False
     return Facets((rows, columns), sent, surface)
 
 
 def white_tables(fabric: Fabric) -> ConservingTables:
     """Float32 tables of `fabric` with white `conserving` threads only."""
-    threads = {k: replace(t, albedo=(1, 1, 1), model="") for k, t in fabric.threads.items()}
-    white = replace(fabric, threads=threads, model="conserving")
-    return single_tables(white, precision=np.float32)
+    return single_tables(_white(fabric), precision=np.float32)
+
+
+def _white(fabric: Fabric) -> Fabric:
+    """`fabric` with white `conserving` threads, and without what its facets do not depend on."""
+    threads = {
+        k: replace(t, albedo=(1, 1, 1), color=(0.5, 0.5, 0.5), model="")
+        for k, t in fabric.threads.items()
+    }
+    return replace(fabric, name="White", threads=threads, model="conserving", back=None)
 
 
 def surface_shares(fabric: Fabric, w: Floats) -> Floats:

@@ -19,7 +19,7 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import TangentCurve
 from fabricusd.kernels.real import KERNEL
 from fabricusd.sides import Sides
-from tests.appearance.presets import PRESETS, with_model
+from tests.appearance.presets import PRESETS, often, with_model
 
 CLOTHS = {name: with_model(fabric, "conserving") for name, fabric in PRESETS.items()}
 WHITE = {name: plain.white(fabric) for name, fabric in CLOTHS.items()}
@@ -87,7 +87,7 @@ def _view(degrees, azimuth):
     return np.array([s * math.cos(phi), s * math.sin(phi), math.cos(theta)])
 
 
-@pytest.mark.parametrize("name", CLOTHS)
+@pytest.mark.parametrize("name", often(CLOTHS))
 def test_single_scattering_agrees_with_the_plain_version(name):
     wi, wo = _directions(1, 400), _directions(2, 400)
     rule = Rule(POINTS, 0.1)
@@ -101,7 +101,7 @@ def test_single_scattering_agrees_with_the_plain_version(name):
 
 
 @pytest.mark.parametrize("multiple_too", [False, True], ids=["single", "multiple"])
-@pytest.mark.parametrize("name", CLOTHS)
+@pytest.mark.parametrize("name", often(CLOTHS))
 def test_cloth_is_reciprocal(name, multiple_too):
     tables = _tables(name, multiple_too)
     wi, wo = _directions(3, 3000), _directions(4, 3000)
@@ -110,7 +110,7 @@ def test_cloth_is_reciprocal(name, multiple_too):
     np.testing.assert_allclose(forward, back, rtol=1e-12, atol=1e-15)
 
 
-@pytest.mark.parametrize("name", CLOTHS)
+@pytest.mark.parametrize("name", often(CLOTHS))
 def test_single_scattering_is_passive_to_the_horizon(name):
     tables = _tables(name, False)
     sampling = conserving_mixture(WHITE[name], tables)
@@ -120,7 +120,7 @@ def test_single_scattering_is_passive_to_the_horizon(name):
         assert 0 < given_back <= 1 - _gap(tables, view) + 1e-4, degrees
 
 
-@pytest.mark.parametrize("name", CLOTHS)
+@pytest.mark.parametrize("name", often(CLOTHS))
 def test_white_cloth_gives_everything_back(name):
     # MODEL section 7: reflected + transmitted + gap = 1.
     tables = _tables(name)
@@ -207,7 +207,7 @@ def test_opaque_cloth_lets_nothing_through():
     assert np.all(_value(tables, below, below) > 0)
 
 
-@pytest.mark.parametrize("name", WOVEN)
+@pytest.mark.parametrize("name", often(WOVEN))
 def test_thin_cloth_passes_light_both_ways_alike(name):
     tables = _tables(name)
     up, down = _view(30, 40)[None], -_view(50, 80)[None]
@@ -218,7 +218,7 @@ def test_thin_cloth_passes_light_both_ways_alike(name):
 
 
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
-@pytest.mark.parametrize("name", CLOTHS)
+@pytest.mark.parametrize("name", often(CLOTHS))
 def test_no_pair_of_directions_holds_a_bad_value(name, precision):
     tables = multiple.conserving_tables(CLOTHS[name], precision=precision, multiple=False)
     sides = _tables(name).sides.astype(precision)
@@ -234,7 +234,7 @@ def test_no_pair_of_directions_holds_a_bad_value(name, precision):
     assert np.all(value >= 0)
 
 
-@pytest.mark.parametrize("name", CLOTHS)
+@pytest.mark.parametrize("name", often(CLOTHS))
 def test_float32_agrees_with_float64(name):
     single = multiple.conserving_tables(CLOTHS[name], precision=np.float32, multiple=False)
     double = multiple.conserving_tables(CLOTHS[name], multiple=False)

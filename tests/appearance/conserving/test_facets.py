@@ -43,3 +43,20 @@ def test_a_constant_factor_sends_what_no_factor_sends_times_its_square():
     np.testing.assert_allclose(2.0 * (matrix @ np.full(len(matrix), 2.0)), 4.0 * matrix.sum(axis=1))
     theta, phi = entry_angles(*found.shape)
     assert theta.shape == phi.shape == found.shape
+
+
+def test_cloths_that_differ_in_colour_alone_share_their_facets_and_others_do_not():
+    fabric = PRESETS["silk_shot"]
+
+    def changed(**change):
+        return replace(
+            fabric, name="other", back=fabric,
+            threads={k: replace(t, **change) for k, t in fabric.threads.items()},
+        )  # fmt: skip
+
+    found = facets.white_facets(fabric, draws=16)
+    assert facets.white_facets(changed(albedo=(0.3, 0.2, 0.1)), draws=16).sent is found.sent
+    assert not found.sent.flags.writeable
+    for change in ({"ior": 1.6}, {"gamma_surface": 0.3}, {"isotropic": 0.6}):
+        other = facets.white_facets(changed(**change), draws=16)
+        assert np.abs(other.sent - found.sent).max() > 0

@@ -30,7 +30,7 @@ from fabricusd.appearance.weave.quadrature import (
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEGREE, TangentCurve
 from tests.appearance.directions import random_directions
-from tests.appearance.presets import PRESETS, with_model
+from tests.appearance.presets import PRESETS, often, with_model
 
 PUBLISHED = models.names(LAW)
 CASES = [(n, m) for n in PRESETS for m in PUBLISHED]
@@ -50,7 +50,7 @@ def narrow(fabric, degrees):
     return with_threads(fabric, gamma_surface=degrees * DEGREE, gamma_volume=2 * degrees * DEGREE)
 
 
-@pytest.mark.parametrize(("name", "model"), CASES)
+@pytest.mark.parametrize(("name", "model"), often(CASES))
 def test_on_level_pieces_far_is_the_written_model_to_rounding(name, model):
     fabric = with_threads(with_model(PRESETS[name], model), curve=STEPS)
     found = surface.evaluate(fabric, WI, WO)
@@ -58,7 +58,7 @@ def test_on_level_pieces_far_is_the_written_model_to_rounding(name, model):
     assert found == pytest.approx(written, rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize(("name", "model"), CASES)
+@pytest.mark.parametrize(("name", "model"), often(CASES))
 def test_far_is_the_dense_integral_over_the_curve_within_its_bound(name, model):
     fabric = with_model(PRESETS[name], model)
     found = surface.evaluate(fabric, WI, WO, max_error=1e-3)
@@ -66,7 +66,7 @@ def test_far_is_the_dense_integral_over_the_curve_within_its_bound(name, model):
     assert np.abs(found - dense).mean() <= 1e-3 * dense.mean()
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", often(PRESETS))
 def test_conserving_far_is_the_written_model_to_rounding_on_level_pieces(name):
     fabric = with_threads(with_model(PRESETS[name], "conserving"), curve=STEPS)
     wi, wo = random_directions(60, 3, upper=False), random_directions(60, 4, upper=False)
@@ -80,7 +80,7 @@ def test_conserving_far_is_the_written_model_to_rounding_on_level_pieces(name):
     assert found == pytest.approx(written, rel=1e-3, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", often(PRESETS))
 def test_the_scalar_and_the_vectorised_kernel_agree(name):
     for precision, tolerance in ((np.float64, 1e-12), (np.float32, 2e-5)):
         tables = surface_tables(PRESETS[name], precision=precision)
@@ -91,7 +91,7 @@ def test_the_scalar_and_the_vectorised_kernel_agree(name):
         assert out.T == pytest.approx(np.array(one_by_one), rel=tolerance, abs=1e-9)
 
 
-@pytest.mark.parametrize(("name", "model"), CASES)
+@pytest.mark.parametrize(("name", "model"), often(CASES))
 def test_single_precision_is_within_a_ten_thousandth_away_from_the_singular_set(name, model):
     fabric = with_model(PRESETS[name], model)
     wi, wo = spread_pairs(20_000)
@@ -119,14 +119,14 @@ def test_q_is_the_written_normalization():
         assert np.array(found) == pytest.approx(written, abs=2e-4), name
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", often(PRESETS))
 @pytest.mark.parametrize("bound", [0.03, 3e-3, 3e-4])
 def test_the_quadrature_meets_the_bound_that_the_caller_gives(name, bound):
     rule = choose_rule(PRESETS[name], bound)
     assert measure_rule(PRESETS[name], rule, pairs=9000).error <= bound
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", often(PRESETS))
 def test_the_bound_bites_on_the_rule_that_is_one_cheaper(name):
     rule = choose_rule(PRESETS[name], 3e-3)
     costs = {r: curve_nodes(PRESETS[name], r).cost for r in CANDIDATES}

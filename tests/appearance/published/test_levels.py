@@ -26,7 +26,7 @@ from fabricusd.appearance.weave.place import NOWHERE, Hit, Place, Places
 from fabricusd.appearance.weave.quadrature import POINTS, Rule, curve_nodes
 from fabricusd.fabric import MODELS
 from tests.appearance.directions import VIEWS, direction, random_directions
-from tests.appearance.presets import PRESETS, with_model
+from tests.appearance.presets import EVERY_RUN, PRESETS, often, with_model
 
 R = np.float64
 PUBLISHED = models.names(LAW)
@@ -44,7 +44,7 @@ def set_of(nodes, k):
     return WARP if k >= nodes.warp_start else WEFT
 
 
-@pytest.mark.parametrize(("name", "model"), CASES)
+@pytest.mark.parametrize(("name", "model"), often(CASES))
 def test_the_mean_of_weave_over_shared_nodes_is_far(name, model):
     fabric = with_model(PRESETS[name], model)
     tables, nodes = surface_tables(fabric), curve_nodes(fabric)
@@ -57,7 +57,7 @@ def test_the_mean_of_weave_over_shared_nodes_is_far(name, model):
         assert mean == pytest.approx(far_value(R, tables, *wi, *wo), rel=1e-10, abs=1e-13)
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", often(PRESETS))
 def test_the_mean_of_conserving_weave_over_shared_nodes_is_far(name):
     fabric = with_model(PRESETS[name], "conserving")
     law = surface_law(fabric, precision=np.float64)
@@ -77,10 +77,10 @@ def test_the_mean_of_conserving_weave_over_shared_nodes_is_far(name):
 
 
 def cases():
-    """Every preset with every model; with `conserving` the linen alone, the others take long."""
+    """Of `often`, with `conserving` the linen alone: the others take long."""
     for name in PRESETS:
         for model in MODELS:
-            long = model == "conserving" and name != "linen_plain"
+            long = name not in EVERY_RUN or (model == "conserving" and name != "linen_plain")
             yield pytest.param(name, model, marks=[pytest.mark.exhaustive] if long else [])
 
 
@@ -101,7 +101,7 @@ def test_the_mean_of_weave_over_places_is_far(name, model):
     assert over_places == pytest.approx(far, rel=1e-3)
 
 
-@pytest.mark.parametrize(("name", "model"), [(n, m) for n in PRESETS for m in MODELS])
+@pytest.mark.parametrize(("name", "model"), often((n, m) for n in PRESETS for m in MODELS))
 def test_the_mean_of_thread_over_the_width_is_weave(name, model):
     fabric = with_model(PRESETS[name], model)
     law = surface_law(fabric, precision=np.float64)
@@ -118,7 +118,7 @@ def test_the_mean_of_thread_over_the_width_is_weave(name, model):
             assert mean == pytest.approx(whole, rel=1e-10, abs=1e-13)
 
 
-@pytest.mark.parametrize(("name", "model"), CASES)
+@pytest.mark.parametrize(("name", "model"), often(CASES))
 def test_weave_and_thread_are_the_written_model_at_a_point(name, model):
     fabric = with_model(PRESETS[name], model)
     tables = surface_tables(fabric)

@@ -15,6 +15,7 @@ from fabricusd.appearance.weave.yarn.lay import edges, laid
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, Thread, even
 from fabricusd.schema import load, preset_names
+from tests.appearance.presets import often
 
 SPUN = {
     "unevenness_cv": 0.2,
@@ -42,7 +43,7 @@ def places(count: int, window: float = 64.0, corner: float = 1000.0, seed: int =
 
 
 @pytest.mark.parametrize("yarn", [SPUN, {**SPUN, **SLUBS}], ids=["spun", "slubs"])
-@pytest.mark.parametrize("name", CLOTHS)
+@pytest.mark.parametrize("name", often(CLOTHS))
 def test_a_window_of_64_threads_shows_what_the_even_cloth_shows(name, yarn):
     """The window's own sampling moves its means by less than a tenth of the bound."""
     cloth = woven(name, **yarn)
@@ -73,7 +74,7 @@ def test_many_windows_together_are_the_even_cloth(name):
         assert (hit.set == which).mean() == pytest.approx(share.area[which], abs=1.5e-3)
 
 
-@pytest.mark.parametrize("name", CLOTHS)
+@pytest.mark.parametrize("name", often(CLOTHS))
 def test_the_mean_over_a_window_is_the_radiance_of_the_even_cloth(name):
     cloth = woven(name, **SPUN)
     uv = places(512)
@@ -84,7 +85,7 @@ def test_the_mean_over_a_window_is_the_radiance_of_the_even_cloth(name):
         assert found == pytest.approx(true, rel=0.01), level
 
 
-@pytest.mark.parametrize("name", [n for n in preset_names() if not n.startswith("thread_")])
+@pytest.mark.parametrize("name", often(n for n in preset_names() if not n.startswith("thread_")))
 def test_the_mean_of_a_preset_under_a_shadow_is_that_of_the_even_cloth(name):
     """Law and shadow look at one place of the even cloth, so what they have in common is kept."""
     cloth = load(name)
@@ -100,7 +101,7 @@ def test_the_mean_of_a_preset_under_a_shadow_is_that_of_the_even_cloth(name):
         assert found == pytest.approx(true, rel=0.01), level
 
 
-@pytest.mark.parametrize("name", CLOTHS)
+@pytest.mark.parametrize("name", often(CLOTHS))
 def test_plies_keep_the_mean_across_and_along_a_thread(name):
     cloth = woven(name, **PLIED)
     uv = places(512)
