@@ -65,6 +65,7 @@ THREAD = (
     Attribute("thread:thickness", "double", Thread, "thickness", MILLIMETRE, "mm"),
     Attribute("thread:linearDensity", "double", Thread, "linear_density", TEX, "tex"),
     Attribute("thread:color", "color3d", Thread, "color"),
+    Attribute("thread:targetColor", "color3d", Thread, "target_color"),
     Attribute("thread:unevenness:cv", "double", Thread, "unevenness_cv"),
     Attribute("thread:unevenness:length", "double", Thread, "unevenness_length", MILLIMETRE, "mm"),
     Attribute("thread:unevenness:count", "double", Thread, "unevenness_count"),

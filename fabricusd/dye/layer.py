@@ -1,0 +1,232 @@
+"""What one layer of `conserving` cloth reflects and transmits, by the albedo of its threads.
+
+The law's factors are fitted such that the shares of light by side are those that the fabric states
+(`appearance.conserving.multiple`). Under a white sky the law is therefore a sum of those shares:
+
+    R(w) = (1 - gap) (s sigma + A (1 - s) rho) + C(A) (1 - tau) m
+    T(w) = gap + (1 - gap) (1 - s) theta (x + A (1 - x)) + C(A) tau m
+
+s is the share of the light on the threads that their surfaces reflect; sigma, rho, theta and tau
+are `Sides.surface`, `reflected`, `transmitted` and `forward`; x is the surface's share of what is
+transmitted at once; m = 1 - gap - (1 - gap) (s sigma + (1 - s) (rho + theta)); and
+C = alpha^2 p / (1 - alpha (1 - p)). By reciprocity R(w) is both the radiance towards w under a
+white sky, and the light that is reflected of what arrives from w.
+
+Plain NumPy: a fabric is authored and described without compiling kernels. `bench/colour` and the
+tests hold the numbers to `surface.evaluate`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.appearance.conserving.by_side import by_side
+from fabricusd.appearance.plain import Share, curve_points, shares, to_thread
+from fabricusd.appearance.scattering.models.conserving import plain_albedo, plain_surface
+from fabricusd.appearance.scattering.plain_lobes import angles, longitudinal
+from fabricusd.fabric import CONSERVING_MODEL, PILE_ANGLE, Fabric, Thread
+
+Floats = NDArray[np.float64]
+
+VIEW = math.radians(8.0)
+"""Angle between the view and the normal, of a d/8 instrument."""
+
+_INCLINATIONS = 41
+"""Entries of the table of E(theta): between them E is linear, and right to 1e-4."""
+
+_POLAR, _AZIMUTHS, _PIECES = 12, 8, 4
+"""Gauss-Legendre points between the normal and the horizon, azimuths over half a turn, and nodes
+per linear piece of a curve."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layer:
+    """Shares of the light on one layer, for a view at 8 degrees (row 0) and diffuse light (row 1).
+
+    surface : (2, 2) - what the surfaces send at once to the own and to the other side
+    volume : (2, 2, k) - the same of white threads' insides, per thread of the fabric
+    rest : (2, 2) - what bounces between threads and leaves, at C = 1
+    gap : (2,) - what passes between the threads
+    escape : float - `p`
+    mean : (k,) - weights of the threads in alpha, which sum to at most 1
+    bright : (k,) - mean directional albedo of each thread's surface
+    """
+
+    surface: Floats
+    volume: Floats
+    rest: Floats
+    gap: Floats
+    escape: float
+    mean: Floats
+    bright: Floats
+
+    def of(self, albedo: Floats) -> Floats:
+        """(2, 2, ...) R and T by row for albedos (k, ...) of the threads."""
+        a = np.clip(np.asarray(albedo, np.float64), 0.0, 1.0)
+        bright = self.bright.reshape(-1, *(1,) * (a.ndim - 1))
+        alpha = np.tensordot(self.mean, bright + (1.0 - bright) * a, axes=1)
+        strength = alpha**2 * self.escape / (1.0 - alpha * (1.0 - self.escape))
+        grow = (..., *(None,) * (a.ndim - 1))
+        found = self.surface[grow] + np.tensordot(self.volume, a, axes=1)
+        found = found + self.rest[grow] * strength
+        found[:, 1] += self.gap[grow]
+        return np.asarray(found)
+
+
+def layer_of(fabric: Fabric) -> Layer:
+    """One layer of `fabric`, of which threads of other models count as black, as in its law."""
+    if any(t.curve.steepest > PILE_ANGLE for t in fabric.thread_list):
+        from fabricusd.dye.pile import pile_layer
+
+        return pile_layer(fabric)
+    theta, weight = _views()
+    phi = (np.arange(2 * _AZIMUTHS) + 0.5) * (math.pi / _AZIMUTHS)
+    polar, azimuth = np.meshgrid(theta, phi, indexing="ij")
+    w = np.stack(
+        (np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)), axis=-1
+    )
+    stated = by_side(fabric, polar, azimuth)
+    covered, count = 1.0 - stated.gap, len(fabric.threads)
+    seen = [_seen(part, w) for part in shares(fabric)]
+    total = sum(area for area, _ in seen)
+    parts = shares(fabric)
+    lit, inside = np.zeros(polar.shape), np.zeros((*polar.shape, count))
+    for part, (area, reflected) in zip(parts, seen, strict=True):
+        lit += area / total * reflected
+        if part.model == CONSERVING_MODEL:
+            k = fabric.thread_list.index(part.thread)
+            inside[..., k] += area / total * (1.0 - reflected)
+    own, other = covered * lit * stated.surface, covered * (1.0 - lit) * stated.transmitted
+    if fabric.opaque:
+        other = np.zeros_like(other)
+    rest = np.maximum(
+        covered * (1.0 - lit * stated.surface - (1.0 - lit) * stated.reflected) - other, 0.0
+    )
+    forward = np.zeros_like(rest) if fabric.opaque else stated.forward
+    through = _surface_through(parts)
+    sent = (
+        own, other * through,
+        *(covered * inside[..., k] * stated.reflected for k in range(count)),
+        *((0.0 if fabric.opaque else 1.0) * covered * inside[..., k] * stated.transmitted
+          * (1.0 - through) for k in range(count)),
+        (1.0 - forward) * rest, forward * rest,
+        np.zeros_like(rest) if fabric.opaque else stated.gap,
+        rest, covered,
+    )  # fmt: skip
+    rows = np.array([_rows(values, weight) for values in sent]).T
+    kept, mean, bright = rows[:, -2:], np.zeros(count), np.zeros(count)
+    area_of_all = sum(part.area for part in parts)
+    for part in parts:
+        if part.model == CONSERVING_MODEL:
+            k = fabric.thread_list.index(part.thread)
+            mean[k] += part.area / area_of_all
+            bright[k] = _mean_surface(part.thread)
+    return Layer(
+        surface=rows[:, :2],
+        volume=np.stack((rows[:, 2 : 2 + count], rows[:, 2 + count : 2 + 2 * count]), axis=1),
+        rest=rows[:, 2 + 2 * count : 4 + 2 * count],
+        gap=rows[:, 4 + 2 * count],
+        escape=float(1.0 - kept[1, 0] / kept[1, 1]),
+        mean=mean,
+        bright=bright,
+    )
+
+
+def alone(fabric: Fabric, thread: Thread) -> Fabric:
+    """Cloth of the weave and the densities of `fabric`, woven of `thread` only."""
+    return replace(
+        fabric,
+        threads={"Thread": thread},
+        warp=replace(fabric.warp, sequence=(0,)),
+        weft=replace(fabric.weft, sequence=(0,)),
+        back=None,
+    )
+
+
+def _views() -> tuple[Floats, Floats]:
+    """Polar angles [rad], the view first, and the weight of each in diffuse light."""
+    x, w = np.polynomial.legendre.leggauss(_POLAR)
+    theta = math.pi / 4 * (x + 1.0)
+    weight = math.pi / 4 * w * 2.0 * np.sin(theta) * np.cos(theta)
+    return np.concatenate(([VIEW], theta)), np.concatenate(([0.0], weight))
+
+
+def _rows(values: Floats, weight: Floats) -> tuple[float, float]:
+    """(at the view, in diffuse light) of values by polar angle and azimuth."""
+    around = values.mean(axis=1)
+    return float(around[0]), float(around @ weight)
+
+
+def _plain(thread: Thread) -> Thread:
+    """The thread without what its scattering does not depend on: the key of cached tables."""
+    return Thread(
+        ior=thread.ior,
+        isotropic=thread.isotropic,
+        gamma_surface=thread.gamma_surface,
+        gamma_volume=thread.gamma_volume,
+        surface_gain=thread.surface_gain,
+    )
+
+
+def _surface_albedo(thread: Thread, theta: Floats) -> Floats:
+    """E at inclinations theta [rad]."""
+    at, albedo = plain_albedo(_plain(thread), _INCLINATIONS)
+    return np.asarray(np.interp(np.abs(theta), at, albedo))
+
+
+def _mean_surface(thread: Thread) -> float:
+    """(2/pi) times the integral of E cos^2 theta over +-90 degrees."""
+    x, w = np.polynomial.legendre.leggauss(64)
+    theta = math.pi / 4 * (x + 1.0)
+    return float(w @ (_surface_albedo(thread, theta) * np.cos(theta) ** 2))
+
+
+def _seen(part: Share, w: Floats) -> tuple[Floats, Floats]:
+    """(area of the part's facets that w sees, share of light that their surfaces reflect)."""
+    total, reflected = np.zeros(w.shape[:-1]), np.zeros(w.shape[:-1])
+    for psi0, weight in zip(*curve_points(part.thread.curve, _PIECES * 2), strict=True):
+        local = to_thread(w, part.is_warp, float(psi0))
+        area = part.area * weight / math.cos(psi0) * np.maximum(local[..., 2], 0.0)
+        total += area
+        theta = np.arcsin(np.clip(local[..., 0], -1.0, 1.0))
+        reflected += area * _surface_albedo(part.thread, theta)
+    return total, np.divide(reflected, total, out=np.zeros_like(total), where=total > 0)
+
+
+def _surface_through(parts: tuple[Share, ...]) -> float:
+    """The surface's share of what white threads transmit at once, of light from the view.
+
+    It hardly depends on the direction of the light (0.077 from above, 0.08 in diffuse light), and
+    on the weave not at all.
+    """
+    sums = np.zeros(2)
+    x, w = np.polynomial.legendre.leggauss(_POLAR)
+    y = (np.arange(4 * _AZIMUTHS) + 0.5) * (math.pi / (2 * _AZIMUTHS))
+    theta, phi = np.meshgrid(math.pi / 4 * (x + 1.0), y, indexing="ij")
+    below = np.stack(
+        (np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), -np.cos(theta)), axis=-1
+    )
+    measure = w[:, None] * np.sin(theta)
+    above = np.array([0.0, 0.0, 1.0])
+    for part in parts:
+        for psi0, weight in zip(*curve_points(part.thread.curve, _PIECES), strict=True):
+            i, o = (to_thread(v, part.is_warp, float(psi0)) for v in (above, below))
+            facing = part.area * weight * np.maximum(i[..., 2], 0.0) * np.maximum(-o[..., 2], 0.0)
+            surface, volume = _terms(part.thread, np.broadcast_to(i, o.shape), o)
+            sums += [(measure * facing * term).sum() for term in (surface, volume)]
+    return float(sums[0] / sums.sum()) if sums.sum() > 0 else 0.0
+
+
+def _terms(thread: Thread, i: Floats, o: Floats) -> tuple[Floats, Floats]:
+    """The surface and, up to its 8 to 11 % that scatter evenly, the white volume term."""
+    at_i, at_o = angles(i), angles(o)
+    kept_i = 1.0 - _surface_albedo(thread, at_i.theta)
+    kept_o = 1.0 - _surface_albedo(thread, at_o.theta)
+    lobe = longitudinal(at_i.theta, at_o.theta, 2 * thread.gamma_volume)
+    widest = np.maximum(np.maximum(np.cos(at_i.theta), np.cos(at_o.theta)), 1e-6)
+    lobe = (1 - thread.isotropic) * lobe / (2 * math.pi * widest) + thread.isotropic / math.pi**2
+    return plain_surface(thread, at_i, at_o), kept_i * kept_o * lobe
