@@ -124,7 +124,7 @@ def layer_of(fabric: Fabric) -> Layer:
         if part.model == CONSERVING_MODEL:
             k = fabric.thread_list.index(part.thread)
             mean[k] += part.area / area_of_all
-            bright[k] = _mean_surface(part.thread)
+            bright[k] = mean_surface(part.thread)
     return Layer(
         surface=rows[:, :2],
         volume=np.stack((rows[:, 2 : 2 + count], rows[:, 2 + count : 2 + 2 * count]), axis=1),
@@ -178,7 +178,7 @@ def _surface_albedo(thread: Thread, theta: Floats) -> Floats:
     return np.asarray(np.interp(np.abs(theta), at, albedo))
 
 
-def _mean_surface(thread: Thread) -> float:
+def mean_surface(thread: Thread) -> float:
     """(2/pi) times the integral of E cos^2 theta over +-90 degrees."""
     x, w = np.polynomial.legendre.leggauss(64)
     theta = math.pi / 4 * (x + 1.0)
@@ -203,22 +203,25 @@ def _surface_through(parts: tuple[Share, ...]) -> float:
     It hardly depends on the direction of the light (0.077 from above, 0.08 in diffuse light), and
     on the weave not at all.
     """
-    sums = np.zeros(2)
     x, w = np.polynomial.legendre.leggauss(_POLAR)
     y = (np.arange(4 * _AZIMUTHS) + 0.5) * (math.pi / (2 * _AZIMUTHS))
     theta, phi = np.meshgrid(math.pi / 4 * (x + 1.0), y, indexing="ij")
     below = np.stack(
         (np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), -np.cos(theta)), axis=-1
     )
-    measure = w[:, None] * np.sin(theta)
-    above = np.array([0.0, 0.0, 1.0])
+    above, sent, total = np.array([0.0, 0.0, 1.0]), np.zeros((2, *theta.shape)), np.zeros(())
     for part in parts:
         for psi0, weight in zip(*curve_points(part.thread.curve, _PIECES), strict=True):
             i, o = (to_thread(v, part.is_warp, float(psi0)) for v in (above, below))
-            facing = part.area * weight * np.maximum(i[..., 2], 0.0) * np.maximum(-o[..., 2], 0.0)
-            surface, volume = _terms(part.thread, np.broadcast_to(i, o.shape), o)
-            sums += [(measure * facing * term).sum() for term in (surface, volume)]
-    return float(sums[0] / sums.sum()) if sums.sum() > 0 else 0.0
+            area = part.area * weight / math.cos(psi0) * np.maximum(-o[..., 2], 0.0)
+            total = total + area
+            terms = _terms(part.thread, np.broadcast_to(i, o.shape), o)
+            sent += np.maximum(i[..., 2], 0.0) * area * np.stack(terms)
+    # What leaves is masked as what arrives is: G1 of the law.
+    covered = sum(part.area for part in parts)
+    masked = np.minimum(1.0, covered * np.cos(theta) / np.maximum(total, 1e-300))
+    surface, volume = (sent * masked * w[:, None] * np.sin(theta)).sum(axis=(1, 2))
+    return float(surface / (surface + volume)) if surface + volume > 0 else 0.0
 
 
 def _terms(thread: Thread, i: Floats, o: Floats) -> tuple[Floats, Floats]:

@@ -47,7 +47,5 @@ def made_of_colors(
             target_basis=basis,
             target_observer=observer,
         )
-    made = replace(
-        fabric, threads=threads, model=CONSERVING_MODEL, surface_law=SURFACE_LAWS[0]
-    )
+    made = replace(fabric, threads=threads, model=CONSERVING_MODEL, surface_law=SURFACE_LAWS[0])
     return Dyed(fabric=made, notes=()) if raw else dyed(made)

@@ -77,9 +77,7 @@ def cloth_color(fabric: Fabric, basis: str = BASES[1]) -> Floats:
     return BASIS[basis](layer_of(fabric).of(albedo))
 
 
-def _layer_of_one(
-    fabric: Fabric, name: str, thread: Thread, known: dict[Thread, Layer]
-) -> Layer:
+def _layer_of_one(fabric: Fabric, name: str, thread: Thread, known: dict[Thread, Layer]) -> Layer:
     """The layer of `thread` alone; `known` saves it for threads that differ in colour only."""
     if fabric.model_of(thread) != CONSERVING_MODEL:
         raise FabricError(
@@ -125,9 +123,7 @@ def _nearest(name: str, color: Floats, low: Floats, high: Floats) -> tuple[Float
 
     goal = nearest(color, low, high)
     less, more = bool((color < low).any()), bool((color > high).any())
-    why = " and ".join(
-        word for word, true in (("darker", less), ("lighter", more)) if true
-    )
+    why = " and ".join(word for word, true in (("darker", less), ("lighter", more)) if true)
     return goal, (
         f"thread {name}: {code(color)} is {why} in some channel than cloth of this fibre can be; "
         f"the nearest is {code(goal)}, delta E 2000 {float(difference(goal, color)):.2g}"

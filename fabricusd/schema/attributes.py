@@ -76,7 +76,9 @@ THREAD = (
     Attribute("thread:plies", "int", Thread, "plies"),
     Attribute("thread:twist", "double", Thread, "twist", unit="turns/m"),
 )
-"""Numbers of a WovenThread; its curve and its model are read apart."""
+"""Numbers of a WovenThread; its curve, its model and the tokens of its target are read apart."""
+
+TARGET_BASIS = Attribute("thread:targetColor:basis", "token", Thread, "target_basis")
 
 FABRIC = (
     Attribute("fabric:maskingWidth", "double", Fabric, "masking_width", DEGREE, "degrees"),

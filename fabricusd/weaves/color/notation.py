@@ -136,7 +136,9 @@ def _spectrum(path: str, where: str, observer: int) -> RGB:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         xyz = colour.sd_to_XYZ(
-            found, cmfs=colour.MSDS_CMFS[OBSERVERS[observer]], illuminant=colour.SDS_ILLUMINANTS["D65"]
+            found,
+            cmfs=colour.MSDS_CMFS[OBSERVERS[observer]],
+            illuminant=colour.SDS_ILLUMINANTS["D65"],
         )
     return _from_xyz(np.asarray(xyz) / 100.0, observer)
 
