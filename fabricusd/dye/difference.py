@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 
+from fabricusd.srgb import srgb_encode
+
 Floats = NDArray[np.float64]
 
 
@@ -37,6 +39,12 @@ def nearest(color: Floats, low: Floats, high: Floats) -> Floats:
     )  # fmt: skip
     best = np.clip(found.x**3, low, high)
     return best if difference(best, color) < difference(start, color) else start
+
+
+def code(color: ArrayLike) -> str:
+    """`#rrggbb` of a linear Rec. 709 colour, clipped to what sRGB holds."""
+    codes = np.rint(srgb_encode(np.asarray(color, np.float64)) * 255)
+    return "#" + "".join(f"{int(c):02x}" for c in codes)
 
 
 def colour_science() -> Any:

@@ -1,4 +1,4 @@
-"""One layer of pile, for which no shares by side are known: its facets are traced by the kernels."""
+"""One layer of pile, for which no shares by side are known: kernels trace its facets."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 def pile_layer(fabric: Fabric) -> Layer:
-    """As `layer.layer_of`, from the factors of 1 that `conserving.multiple` has for pile.
+    """As `woven.woven_layer`, from the factors of 1 that `conserving.multiple` has for pile.
 
     The light that several threads scatter inside is shared between them by their areas.
     """

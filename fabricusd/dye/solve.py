@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from fabricusd.dye.layer import Layer, alone, layer_of
+from fabricusd.dye.layer import Layer, alone
 from fabricusd.dye.stack import BASIS
+from fabricusd.dye.woven import woven_layer
 from fabricusd.errors import FabricError
-from fabricusd.fabric import BASES, CONSERVING_MODEL, Fabric, Thread
+from fabricusd.fabric import BASES, CONSERVING_MODEL, PILE_ANGLE, Fabric, Thread
 
 Floats = NDArray[np.float64]
 
@@ -77,6 +78,16 @@ def cloth_color(fabric: Fabric, basis: str = BASES[1]) -> Floats:
     return BASIS[basis](layer_of(fabric).of(albedo))
 
 
+def layer_of(fabric: Fabric) -> Layer:
+    """One layer of `fabric`, of which threads of other models count as black, as in its law."""
+    if any(t.curve.steepest > PILE_ANGLE for t in fabric.thread_list):
+        # Tracing pile compiles kernels.
+        from fabricusd.dye.pile import pile_layer
+
+        return pile_layer(fabric)
+    return woven_layer(fabric)
+
+
 def _layer_of_one(fabric: Fabric, name: str, thread: Thread, known: dict[Thread, Layer]) -> Layer:
     """The layer of `thread` alone; `known` saves it for threads that differ in colour only."""
     if fabric.model_of(thread) != CONSERVING_MODEL:
@@ -118,8 +129,7 @@ def _albedo(layer: Layer, thread: Thread, color: Floats) -> tuple[float, float, 
 
 def _nearest(name: str, color: Floats, low: Floats, high: Floats) -> tuple[Floats, str]:
     """(the nearest colour, the line that says so)."""
-    from fabricusd.dye.difference import difference, nearest
-    from fabricusd.dye.words import code
+    from fabricusd.dye.difference import code, difference, nearest
 
     goal = nearest(color, low, high)
     less, more = bool((color < low).any()), bool((color > high).any())

@@ -1,27 +1,19 @@
-"""Colours as people read them: what was asked for, what cloth of the thread has, and the mixture."""
+"""Colours as people read them: asked for, reached, and mixed in the cloth."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from fabricusd.fabric import BASES, CONSERVING_MODEL, Fabric, Thread
-from fabricusd.srgb import srgb_encode
 
 _OF = {"opaque": "folded until opaque", "singleLayer": "one layer over black"}
 
 
-def code(color: ArrayLike) -> str:
-    """`#rrggbb` of a linear Rec. 709 colour, clipped to what sRGB holds."""
-    codes = np.rint(srgb_encode(np.asarray(color, np.float64)) * 255)
-    return "#" + "".join(f"{int(c):02x}" for c in codes)
-
-
 def words(color: ArrayLike) -> str:
     """`#304878, Lab 31.2 5.1 -29.4`."""
-    from fabricusd.dye.difference import lab
+    from fabricusd.dye.difference import code, lab
 
     lightness, a, b = lab(color)
     return f"{code(color)}, Lab {lightness:.1f} {a:.1f} {b:.1f}"
