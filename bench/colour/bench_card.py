@@ -98,7 +98,9 @@ def main() -> int:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "card.json").write_text(json.dumps(rows, indent=1))
         patches = np.array([row["colours"] for row in rows]).reshape(len(options.weave), -1, 2, 3)
-        image = np.repeat(np.repeat(np.concatenate([p.swapaxes(0, 1) for p in patches]), 48, 0), 32, 1)
+        image = np.repeat(
+            np.repeat(np.concatenate([p.swapaxes(0, 1) for p in patches]), 48, 0), 32, 1
+        )
         write_png(folder / "card.png", np.rint(srgb_encode(image) * 255).astype(np.uint8))
     return 1 if bad else 0
 

@@ -33,10 +33,11 @@ NOT_OF_PRESETS = (
 EPILOG = """WEAVE is a name (plain, basket 2/2, twill 2/1 S, satin 8 step 3, herringbone 2/2 8,
 houndstooth, ...) or an expression in the end i and the pick j (mod(2*i + j, 5) < 4).
 
-A COLOR is that of cloth woven of the thread alone, as a textile laboratory measures it: under CIE D65,
-diffuse light, seen at 8 degrees with the specular part, folded until opaque. Write #rrggbb, a CSS name,
-lab(L, a, b), lch(L, C, h) or xyY(x, y, Y), all under D65 (CSS's lab is under D50), a reflectance
-spectrum as a CSV file, or linear r,g,b. A colour that no such cloth has becomes the nearest.
+A COLOR is that of cloth woven of the thread alone, as a textile laboratory measures it: under CIE
+D65, in diffuse light, seen at 8 degrees with the specular part, folded until opaque. Write #rrggbb,
+a CSS name, lab(L, a, b), lch(L, C, h) or xyY(x, y, Y) with Y to 100, all under D65 (CSS's lab is
+under D50), a reflectance spectrum as a CSV file, or linear r,g,b. A colour that no such cloth has
+becomes the nearest.
 
 example:
   fabricusd new --preset velvet -o velvet.usda
@@ -106,7 +107,9 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...], tuple[RGB, ...] | None]:
+def _fabric(
+    options: argparse.Namespace,
+) -> tuple[Fabric, tuple[str, ...], tuple[RGB, ...] | None]:
     """(the fabric before it is spun and dyed, notes, the colours to dye it with or None)."""
     if options.preset is not None:
         from fabricusd.schema.read import load
