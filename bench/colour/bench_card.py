@@ -2,9 +2,10 @@
 
     python bench/colour/bench_card.py [--weave plain "twill 2/2" "satin 8"] [--traced N] [-o DIR]
 
-Each colour is given to a cloth as `fabricusd new` does, and measured as it is defined, by two routes
-that share nothing with the solver: a quadrature of the law that is rendered, added up over layers;
-and, for every N-th colour with --traced, a stack of layers in a uniform sky by the path tracer.
+Each colour is given to a cloth as `fabricusd new` does, and measured as it is defined, by two
+routes that share nothing with the solver: a quadrature of the law that is rendered, added up over
+layers; and, for every N-th colour with --traced, a stack of layers in a uniform sky by the path
+tracer.
 Exits with 1 if a colour within reach is off by more than 1 delta E 2000.
 """
 
@@ -73,8 +74,10 @@ def main() -> int:
             fabric, notes = cloth(weave, color)
             found = stacked(shares(fabric))
             off = float(difference(found, color))
-            row = {"weave": weave, "name": name, "asked": code(color), "measured": code(found),
-                   "dE": off, "reachable": not notes, "colours": [list(color), list(found)]}  # fmt: skip
+            row = {
+                "weave": weave, "name": name, "asked": code(color), "measured": code(found),
+                "dE": off, "reachable": not notes, "colours": [list(color), list(found)],
+            }  # fmt: skip
             text = f"{weave:10} {name:16} {code(color)} {code(found)}  dE {off:5.2f}"
             if options.traced and k % options.traced == 0:
                 seen, error, left = traced(fabric)

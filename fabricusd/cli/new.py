@@ -160,7 +160,7 @@ def _dyed(
     done = made_of_colors(
         fabric,
         basis=BASES[2] if options.single_layer else BASES[1],
-        observer=options.observer or 2,
+        observer=int(options.observer or 2),
         palette=wanted,
         raw=options.albedo,
     )

@@ -29,7 +29,7 @@ def difference(color: ArrayLike, reference: ArrayLike) -> Floats:
 
 
 def nearest(color: Floats, low: Floats, high: Floats) -> Floats:
-    """(3,) the colour from `low` to `high` with the smallest delta E 2000 from `color`, each (3,)."""
+    """The colour from `low` to `high` with the smallest delta E 2000 from `color`, each (3,)."""
     start = np.clip(color, low, high)
     # Perceived differences are nearer to even in the cube root of linear light.
     span = [tuple(np.cbrt(ends)) for ends in zip(low, high, strict=True)]

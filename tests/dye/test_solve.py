@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-
 from fabricusd.appearance import surface
 from fabricusd.bake.bake import bake
 from fabricusd.bake.job import Settings
@@ -112,7 +111,7 @@ def test_threads_that_differ_only_in_colour_share_a_layer(monkeypatch):
 
 def test_a_thread_of_a_published_model_cannot_be_solved_for():
     fabric = cloth("plain", BLUE).fabric
-    with pytest.raises(FabricError, match="has the model microcylinder, .* must be conserving"):
+    with pytest.raises(FabricError, match=r"has the model microcylinder, .* must be conserving"):
         dyed(replace(fabric, model="microcylinder"))
 
 

@@ -92,8 +92,7 @@ def add_color_basis(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--observer",
-        type=int,
-        choices=(2, 10),
+        choices=("2", "10"),
         help="CIE standard observer of lab(), lch(), xyY() and spectra, in degrees (default: 2)",
     )
 
@@ -169,7 +168,7 @@ def _colors(options: argparse.Namespace) -> tuple[tuple[Any, ...], tuple[Any, ..
     from fabricusd.weaves.color import color_order
     from fabricusd.weaves.tartan import parse_codes, parse_threadcount
 
-    observer = options.observer or 2
+    observer = int(options.observer or 2)
     warp = color_order(options.warp_color or (), "--warp-color", observer)
     weft = color_order(options.weft_color or (), "--weft-color", observer)
     codes = parse_codes(options.palette or ())
