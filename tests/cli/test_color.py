@@ -76,3 +76,18 @@ def test_set_solves_again_what_a_change_makes_wrong(tmp_path, capsys):
     capsys.readouterr()
     assert main(["set", str(path), "thickness=0.4"]) == 0
     assert "solved" not in capsys.readouterr().err
+
+
+def test_set_solves_the_colour_of_a_thread_that_is_named_by_its_prim(tmp_path):
+    path = new(tmp_path, "--warp-color", "#8a90a0", "--weft-color", "#e0e0e0")
+    assert main(["set", f"{path}:/cloth/Color1", "colour=#40a080"]) == 0
+    one, other = load(path).thread_list
+    assert main(["set", str(path), "warp.colour=#40a080"]) == 0
+    assert load(path).thread_list == (one, other)
+
+
+def test_pile_is_dyed_by_tracing_its_facets(tmp_path, capsys):
+    path = new(tmp_path, "--thread", "velvet", "--warp-color", "0.1,0.05,0.15")
+    capsys.readouterr()
+    assert main(["cat", str(path), "--no-draft"]) == 0
+    assert "reached, delta E 2000 0.00" in capsys.readouterr().out

@@ -15,6 +15,7 @@ from fabricusd.errors import FabricError, did_you_mean, reads
 from fabricusd.fabric import Fabric, Thread, ThreadSet
 from fabricusd.schema import attributes
 from fabricusd.schema.access import definitions, kind_of, thread_prims, type_of
+from fabricusd.schema.access import value as read
 from fabricusd.schema.attributes import Attribute, from_si
 from fabricusd.schema.build import build_side, build_thread
 from fabricusd.schema.colors import LINEAR
@@ -222,7 +223,9 @@ def _of_word(prim: Usd.Prim, change: Change) -> Iterator[Value]:
     if kind == "WovenFabric":
         fabric, prims = build_side(prim), thread_prims(prim)
     elif kind == "WovenThread":
-        fabric, prims = Fabric(threads={prim.GetName(): build_thread(prim)}), [prim]
+        above = _fabric_of(prim)
+        told = {} if above == prim else {"model": str(read(above, "fabric:model"))}
+        fabric, prims = Fabric(threads={prim.GetName(): build_thread(prim)}, **told), [prim]
     else:
         raise FabricError(
             change.name,
