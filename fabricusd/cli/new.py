@@ -43,7 +43,7 @@ example:
   fabricusd new --preset velvet -o velvet.usda
   fabricusd new --weave "twill 2/2 Z" --warp-color "#1f2a4d" --weft-color "#e8e0d0" -o denim.usda
   fabricusd new --weave plain --warp-color navy --weft-color "lab(92, 0, 3)" -o chambray.usda
-  fabricusd new --weave "twill 2/2" --warp-color "4*#111" "4*#eee" -o houndstooth.usda
+  fabricusd new --weave "twill 2/2" --warp-color "4*#333" "4*#eee" -o houndstooth.usda
   fabricusd new --tartan "B24 W4 B24 R2 K24" --ends-per-cm 22 --picks-per-cm 22 -o tartan.usda
   fabricusd new --figure rose.png --figure-ends 480 --ends-per-cm 60 --picks-per-cm 40 -o rose.usda
   fabricusd new --weave "twill 3/1" --warp-yarn "Ne 7" --weft-yarn "Ne 8" --ends-per-inch 68 \\
