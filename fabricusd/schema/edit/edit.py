@@ -12,7 +12,7 @@ from typing import Any
 from pxr import Sdf, Usd
 
 from fabricusd.errors import FabricError, did_you_mean, reads
-from fabricusd.fabric import Fabric, Thread, ThreadSet
+from fabricusd.fabric import DEFAULT_MODEL, Fabric, Thread, ThreadSet
 from fabricusd.schema import attributes
 from fabricusd.schema.access import definitions, kind_of, thread_prims, type_of
 from fabricusd.schema.access import value as read
@@ -224,8 +224,8 @@ def _of_word(prim: Usd.Prim, change: Change) -> Iterator[Value]:
         fabric, prims = build_side(prim), thread_prims(prim)
     elif kind == "WovenThread":
         above = _fabric_of(prim)
-        told = {} if above == prim else {"model": str(read(above, "fabric:model"))}
-        fabric, prims = Fabric(threads={prim.GetName(): build_thread(prim)}, **told), [prim]
+        model = DEFAULT_MODEL if above == prim else str(read(above, "fabric:model"))
+        fabric, prims = Fabric(threads={prim.GetName(): build_thread(prim)}, model=model), [prim]
     else:
         raise FabricError(
             change.name,
