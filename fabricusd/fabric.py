@@ -31,6 +31,14 @@ published threads are modules of that name in `appearance/laws`; FACETS is the l
 `conserving` threads."""
 
 DEFAULT_MODEL = "microcylinder"
+CONSERVING_MODEL = MODELS[-1]
+
+BASES = ("none", "opaque", "singleLayer")
+"""What a thread's target colour is the colour of: nothing, cloth of it folded until opaque, or one
+layer of cloth of it over black."""
+
+OBSERVERS = (2, 10)
+"""Field of view of the CIE standard observers [degrees]."""
 PILE_ANGLE = math.radians(85.0)
 """A curve steeper than this is pile: it stands up from the cloth and has no height field."""
 
@@ -210,6 +218,10 @@ class Thread:
     curve : TangentCurve
     model : str - one of MODELS, or "" for that of the fabric
     color : (3,) float - its colour in a draft, linear Rec. 709; rendering does not use it
+    target_color : (3,) float - colour of cloth of it that `albedo` was solved for, linear Rec. 709;
+        below 0 outside of that gamut. Rendering does not use it
+    target_basis : str - one of BASES; "none" where `albedo` was not solved for
+    target_observer : int - one of OBSERVERS, that the colour was given for
     unevenness_cv : float - CVm, the coefficient of variation of the mass of pieces 8 mm long; the
         width varies by half of it
     unevenness_length : float - distance along the thread over which thickness and shade change [m];
@@ -236,6 +248,11 @@ class Thread:
     curve: TangentCurve = TangentCurve()
     model: str = ""
     color: tuple[float, float, float] = field(default=(0.5, 0.5, 0.5), metadata=_limits(0.0))
+    target_color: tuple[float, float, float] = field(
+        default=(0.5, 0.5, 0.5), metadata=_limits(-10.0, 10.0)
+    )
+    target_basis: str = BASES[0]
+    target_observer: int = OBSERVERS[0]
     unevenness_cv: float = field(default=0.0, metadata=_limits(0.0, 1.0))
     unevenness_length: float = field(default=0.0, metadata=_limits(0.0))
     unevenness_count: float = field(default=0.0, metadata=_limits(0.0, 1.0))
@@ -248,7 +265,7 @@ class Thread:
     documentation: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("albedo", "color"):
+        for name in ("albedo", "color", "target_color"):
             value = tuple(float(x) for x in getattr(self, name))
             if len(value) != 3:
                 raise FabricError(name, f"has {len(value)} numbers; it must have 3")
@@ -266,6 +283,10 @@ class Thread:
             raise FabricError(name, problem)
         if self.model and self.model not in MODELS:
             raise FabricError("model", f"is '{self.model}'; it must be one of {', '.join(MODELS)}")
+        for name, allowed in (("target_basis", BASES), ("target_observer", OBSERVERS)):
+            if getattr(self, name) not in allowed:
+                words = ", ".join(str(x) for x in allowed)
+                raise FabricError(name, f"is '{getattr(self, name)}'; it must be one of {words}")
 
     @property
     def is_uneven(self) -> bool:

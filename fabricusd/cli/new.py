@@ -6,30 +6,44 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
-from fabricusd.cli.arguments.draft import add_colors, add_figure, add_sources, given_draft
+from fabricusd.cli.arguments.draft import (
+    add_color_basis,
+    add_colors,
+    add_figure,
+    add_sources,
+    given_draft,
+)
 from fabricusd.cli.arguments.yarn import add_yarns, settle_densities, spun
 from fabricusd.cli.terminal.stdout import write_utf8
 from fabricusd.errors import FabricError, did_you_mean
 
 if TYPE_CHECKING:
     from fabricusd.fabric import Fabric, Thread
+    from fabricusd.weaves.color import RGB
 
 SOURCES = ("preset", "weave", "source", "wif", "image", "figure", "tartan", "stripes")
 """Options of which at least one is needed."""
 
 NOT_OF_PRESETS = (
     "tartan", "stripes", "palette", "thread", "warp_color", "weft_color", "thickness", "invert",
-    "yarn", "warp_yarn", "weft_yarn",
+    "yarn", "warp_yarn", "weft_yarn", "albedo", "single_layer", "observer",
 )  # fmt: skip
 """Options that a preset, whose threads and weave are what they are, cannot follow."""
 
 EPILOG = """WEAVE is a name (plain, basket 2/2, twill 2/1 S, satin 8 step 3, herringbone 2/2 8,
 houndstooth, ...) or an expression in the end i and the pick j (mod(2*i + j, 5) < 4).
 
+A COLOR is that of cloth woven of the thread alone, as a textile laboratory measures it: under CIE
+D65, in diffuse light, seen at 8 degrees with the specular part, folded until opaque. Write #rrggbb,
+a CSS name, lab(L, a, b), lch(L, C, h) or xyY(x, y, Y) with Y to 100, all under D65 (CSS's lab is
+under D50), a reflectance spectrum as a CSV file, or linear r,g,b. A colour that no such cloth has
+becomes the nearest.
+
 example:
   fabricusd new --preset velvet -o velvet.usda
   fabricusd new --weave "twill 2/2 Z" --warp-color "#1f2a4d" --weft-color "#e8e0d0" -o denim.usda
-  fabricusd new --weave "twill 2/2" --warp-color "4*#111" "4*#eee" -o houndstooth.usda
+  fabricusd new --weave plain --warp-color navy --weft-color "lab(92, 0, 3)" -o chambray.usda
+  fabricusd new --weave "twill 2/2" --warp-color "4*#333" "4*#eee" -o houndstooth.usda
   fabricusd new --tartan "B24 W4 B24 R2 K24" --ends-per-cm 22 --picks-per-cm 22 -o tartan.usda
   fabricusd new --figure rose.png --figure-ends 480 --ends-per-cm 60 --picks-per-cm 40 -o rose.usda
   fabricusd new --weave "twill 3/1" --warp-yarn "Ne 7" --weft-yarn "Ne 8" --ends-per-inch 68 \\
@@ -51,11 +65,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--name", help="name of the prim (default: from the output file)")
     add_colors(parser)
+    add_color_basis(parser)
     parser.add_argument(
         "--thread",
         metavar="FABRIC[:THREAD]",
-        help="make the threads scatter like those of this fabric file or preset; their size stays "
-        "(default: a plain spun thread)",
+        help="make the threads scatter like those of this fabric file or preset; their size stays, "
+        "and their colour where none is given (default: a spun thread of the --fibre)",
     )
     parser.add_argument(
         "--invert", action="store_true", help="in an image, white means warp on top"
@@ -82,16 +97,20 @@ def run(options: argparse.Namespace) -> int:
     if options.output == "-":
         options.output = None
     settle_densities(options)
-    fabric, notes = _fabric(options)
+    fabric, notes, wanted = _fabric(options)
     fabric, spinning = spun(_changed(fabric, options), options)
+    fabric, dyeing = _dyed(fabric, wanted, options)
     _write(fabric, options)
-    for note in (*notes, *spinning):
+    for note in (*notes, *spinning, *dyeing):
         if not options.quiet:
             print(f"fabricusd: {note}", file=sys.stderr)
     return 0
 
 
-def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
+def _fabric(
+    options: argparse.Namespace,
+) -> tuple[Fabric, tuple[str, ...], tuple[RGB, ...] | None]:
+    """(the fabric before it is spun and dyed, notes, the colours to dye it with or None)."""
     if options.preset is not None:
         from fabricusd.schema.read import load
         from fabricusd.schema.source import preset_names
@@ -110,7 +129,7 @@ def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
                 raise FabricError(
                     _flag(option), "cannot be used with --preset; edit the layer that new writes"
                 )
-        return load(options.preset), ()
+        return load(options.preset), (), None
     from dataclasses import replace
 
     from fabricusd.weaves import losses, to_fabric
@@ -121,7 +140,31 @@ def _fabric(options: argparse.Namespace) -> tuple[Fabric, tuple[str, ...]]:
             told = {f"{which}_spacing": 0.01 / density, f"{which}_spacings": ()}
             draft = replace(draft, **told)
     fabric = to_fabric(draft, _base_thread(options))
-    return fabric, (*draft.warnings, *losses(draft))
+    as_the_donor = bool(options.thread) and not draft.palette
+    for option in ("albedo", "single_layer", "observer"):
+        if as_the_donor and getattr(options, option):
+            raise FabricError(_flag(option), "needs a colour: give --warp-color or --weft-color")
+    wanted = None if as_the_donor else draft.palette
+    return fabric, (*draft.warnings, *losses(draft)), wanted
+
+
+def _dyed(
+    fabric: Fabric, wanted: tuple[RGB, ...] | None, options: argparse.Namespace
+) -> tuple[Fabric, tuple[str, ...]]:
+    """(the fabric in the colours asked for, a line for each that cannot be reached)."""
+    if wanted is None:
+        return fabric, ()
+    from fabricusd.dye.make import made_of_colors
+    from fabricusd.fabric import BASES
+
+    done = made_of_colors(
+        fabric,
+        basis=BASES[2] if options.single_layer else BASES[1],
+        observer=int(options.observer or 2),
+        palette=wanted,
+        raw=options.albedo,
+    )
+    return done.fabric, done.notes
 
 
 def _flag(option: str) -> str:
@@ -132,10 +175,14 @@ def _base_thread(options: argparse.Namespace) -> Thread:
     from dataclasses import replace
 
     from fabricusd.schema.anysource import load_any
-    from fabricusd.weaves import DEFAULT_THREAD
 
     if not options.thread:
-        return DEFAULT_THREAD
+        from fabricusd.dye.make import thread_of
+        from fabricusd.weaves.yarn import DEFAULT_FIBRE, fibre_density
+
+        fibre = options.fibre or DEFAULT_FIBRE
+        fibre_density(fibre)
+        return thread_of(fibre.lower())
     file, _, wanted = options.thread.partition(":")
     fabric, _notes = load_any(file)
     if wanted and wanted not in fabric.threads:

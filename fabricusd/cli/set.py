@@ -8,7 +8,8 @@ import sys
 EPILOG = """NAME is an attribute of the schema, whole or its last word (thread:ior, ior), in the
 unit of the schema, or a word of the trade:
 
-  color, colour        #rrggbb or linear r,g,b; the albedo keeps its ratio to the colour
+  color, colour        of cloth of the thread, as in 'new': #rrggbb, navy, "lab(40, 10, -30)" (D65);
+                       the albedo is solved for it (a preset's keeps its ratio to the colour)
   roughness            0 to 1, of both lobes: 0.25 a bright filament, 0.55 spun linen
   yarn                 yarn count, 20 tex or "Ne 30/2"; the thickness follows by Peirce
   weight               14oz or 470gsm: scales the yarn counts, densities stay
@@ -16,7 +17,8 @@ unit of the schema, or a word of the trade:
   grain, scale         of a binding: degrees; millimetres per UV unit
 
 warp.NAME, weft.NAME and THREAD.NAME set it on those threads alone. The file's own layer is changed;
-undo is left to version control.
+undo is left to version control. Threads keep their colour when the weave, a density or the
+scattering changes: their albedo is solved again, and a line says so.
 
 example:
   fabricusd set denim.usda weight=14oz warp.colour="#1f2a4d" roughness=0.6

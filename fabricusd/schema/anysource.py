@@ -20,10 +20,13 @@ def load_any(source: str | os.PathLike[str]) -> tuple[Fabric, tuple[str, ...]]:
     """Return (fabric, notes of the reader). Raises FabricError as that reader does."""
     text = os.fspath(source)
     if is_draft(text):
+        from fabricusd.dye.make import made_of_colors, thread_of
         from fabricusd.weaves import losses, to_fabric
 
         draft = read_draft(text)
-        return to_fabric(draft, name=Path(text).stem), (*draft.warnings, *losses(draft))
+        woven = to_fabric(draft, thread_of(), name=Path(text).stem)
+        done = made_of_colors(woven, palette=draft.palette)
+        return done.fabric, (*draft.warnings, *losses(draft), *done.notes)
     from fabricusd.schema.read import load_noted
 
     return load_noted(text)

@@ -65,6 +65,7 @@ THREAD = (
     Attribute("thread:thickness", "double", Thread, "thickness", MILLIMETRE, "mm"),
     Attribute("thread:linearDensity", "double", Thread, "linear_density", TEX, "tex"),
     Attribute("thread:color", "color3d", Thread, "color"),
+    Attribute("thread:targetColor", "color3d", Thread, "target_color"),
     Attribute("thread:unevenness:cv", "double", Thread, "unevenness_cv"),
     Attribute("thread:unevenness:length", "double", Thread, "unevenness_length", MILLIMETRE, "mm"),
     Attribute("thread:unevenness:count", "double", Thread, "unevenness_count"),
@@ -75,7 +76,9 @@ THREAD = (
     Attribute("thread:plies", "int", Thread, "plies"),
     Attribute("thread:twist", "double", Thread, "twist", unit="turns/m"),
 )
-"""Numbers of a WovenThread; its curve and its model are read apart."""
+"""Numbers of a WovenThread; its curve, its model and the tokens of its target are read apart."""
+
+TARGET_BASIS = Attribute("thread:targetColor:basis", "token", Thread, "target_basis")
 
 FABRIC = (
     Attribute("fabric:maskingWidth", "double", Fabric, "masking_width", DEGREE, "degrees"),

@@ -50,6 +50,8 @@ def build_thread(prim: Usd.Prim) -> Thread:
     return Thread(
         curve=curve,
         model="" if model == "inherit" else model,
+        target_basis=str(value(prim, "thread:targetColor:basis")),
+        target_observer=int(value(prim, "thread:targetColor:observer")),
         documentation=_documentation(prim),
         **build_numbers(prim, attributes.THREAD),
     )

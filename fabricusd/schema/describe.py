@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fabricusd.appearance.weave.coverage import WARP, WEFT, coverage
+from fabricusd.dye.words import cloth_color_lines, color_dict, thread_color_lines
 from fabricusd.fabric import Fabric, TangentCurve, Thread, ThreadSet
 from fabricusd.weaves.cloth import weight, yarn_of
 from fabricusd.weaves.floats import longest_float
@@ -48,6 +49,7 @@ def in_words(fabric: Fabric, width: int = 80) -> str:
         f"  light by side: {_stated(fabric)}",
         f"  model: {fabric.model}, surface law {fabric.surface_law}, masking width "
         f"{math.degrees(fabric.masking_width):.4g} degrees",
+        *cloth_color_lines(fabric),
         "",
     ]
     for index, (name, thread) in enumerate(fabric.threads.items()):
@@ -136,6 +138,7 @@ def _thread_lines(index: int, name: str, thread: Thread, fabric: Fabric, width: 
         f"    lobes: surface {degrees(thread.gamma_surface):.3g}, "
         f"volume {degrees(thread.gamma_volume):.3g} degrees; {curve_words(thread.curve)}",
     ]
+    lines += thread_color_lines(name, thread, fabric)
     if thread.is_uneven:
         lines.append(f"    yarn: {yarn_words(thread)}")
     if thread.documentation:
@@ -221,7 +224,9 @@ def as_dict(fabric: Fabric) -> dict[str, Any]:
         "sides": {f.name: list(getattr(fabric.sides, f.name)) for f in fields(fabric.sides)},
         "masking_width": math.degrees(fabric.masking_width),
         "unevenness_seed": fabric.unevenness_seed,
-        "threads": {name: _thread_dict(thread) for name, thread in fabric.threads.items()},
+        "threads": {
+            name: _thread_dict(name, thread, fabric) for name, thread in fabric.threads.items()
+        },
         "back": as_dict(fabric.back) if fabric.back else None,
     }
 
@@ -232,7 +237,7 @@ def _weight_dict(fabric: Fabric) -> dict[str, float] | None:
     return None if heavy is None else {**asdict(heavy), "total": heavy.total}
 
 
-def _thread_dict(thread: Thread) -> dict[str, Any]:
+def _thread_dict(name: str, thread: Thread, fabric: Fabric) -> dict[str, Any]:
     return {
         "albedo": list(thread.albedo),
         "ior": thread.ior,
@@ -248,6 +253,7 @@ def _thread_dict(thread: Thread) -> dict[str, Any]:
             "angles": [math.degrees(angle) for angle in thread.curve.angles],
         },
         "color": list(thread.color),
+        "target": color_dict(name, thread, fabric),
         "unevenness": {
             "cv": thread.unevenness_cv,
             "length": thread.unevenness_length,

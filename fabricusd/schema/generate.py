@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from fabricusd.fabric import MODELS, SURFACE_LAWS
+from fabricusd.fabric import BASES, MODELS, OBSERVERS, SURFACE_LAWS
 from fabricusd.schema.attributes import Attribute, every_attribute, unscale
 
 HERE = Path(__file__).resolve().parent
@@ -30,6 +30,10 @@ def _name_models(layer: Any) -> None:
     fabric = layer.GetAttributeAtPath("/WovenFabric.fabric:model")
     thread = layer.GetAttributeAtPath("/WovenThread.thread:model")
     fabric.allowedTokens, thread.allowedTokens = MODELS, ("inherit", *MODELS)
+    thread = layer.GetAttributeAtPath("/WovenThread.thread:targetColor:basis")
+    thread.allowedTokens = BASES
+    thread = layer.GetAttributeAtPath("/WovenThread.thread:targetColor:observer")
+    thread.allowedTokens = [str(field) for field in OBSERVERS]
     meaning = " ".join(f"{name}: {named(name).summary}." for name in MODELS)
     fabric.documentation = fabric.documentation.replace("Unit:", f"{meaning} Unit:")
     law = layer.GetAttributeAtPath("/WovenFabric.fabric:surfaceLaw")

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pxr import Sdf, Usd, Vt
 
 from fabricusd.errors import FabricError
-from fabricusd.fabric import SURFACE_LAWS, Binding, Fabric, Thread
+from fabricusd.fabric import BASES, SURFACE_LAWS, Binding, Fabric, Thread
 from fabricusd.files import whole_file
 from fabricusd.schema import attributes
 from fabricusd.schema.access import BINDING_API
@@ -134,6 +134,9 @@ def write_thread(stage: Usd.Stage, path: Sdf.Path | str, thread: Thread) -> Usd.
     _document(prim, thread.documentation)
     _set_numbers(prim, attributes.THREAD, thread)
     _set(prim, "thread:model", "token", thread.model or "inherit")
+    if thread.target_basis != BASES[0]:
+        _set(prim, "thread:targetColor:basis", "token", thread.target_basis)
+        _set(prim, "thread:targetColor:observer", "token", str(thread.target_observer))
     angles = [unscale(a, DEGREE) for a in thread.curve.angles]
     _set(prim, "thread:curve:positions", "double[]", Vt.DoubleArray(thread.curve.positions))
     _set(prim, "thread:curve:angles", "double[]", Vt.DoubleArray(angles))
@@ -171,6 +174,8 @@ def _document(prim: Usd.Prim, text: str) -> None:
 
 def _set_numbers(prim: Usd.Prim, table: tuple[Attribute, ...], owner: object) -> None:
     for entry in table:
+        if entry.field == "target_color" and getattr(owner, "target_basis", "") == BASES[0]:
+            continue
         _set(prim, entry.name, entry.type_name, from_si(getattr(owner, entry.field), entry))
 
 

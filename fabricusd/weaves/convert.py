@@ -197,7 +197,8 @@ def _threads(draft: Draft, base: Thread, kinds: list[tuple[int, float]]) -> dict
             name = f"{stem}_{copy}"
         thread = replace(base, thickness=thickness)
         if index >= 0:
-            r, g, b = draft.palette[index]
+            # A colour outside of Rec. 709 has numbers below 0.
+            r, g, b = (max(channel, 0.0) for channel in draft.palette[index])
             thread = replace(thread, color=(r, g, b), albedo=(r * scale, g * scale, b * scale))
         threads[name] = thread
     return threads

@@ -122,7 +122,8 @@ def test_cat_says_what_a_count_that_is_not_known_rests_on(capsys):
     [
         (("--yarn", "30"), "--yarn is '30'; write a count and its unit"),
         (("--weft-yarn", "Ne x"), "--weft-yarn is 'Ne x'"),
-        (("--fibre", "wool"), "--fibre needs a yarn count"),
+        (("--thread", "linen_plain", "--fibre", "wool"), "--fibre needs a yarn count"),
+        (("--fibre", "hemp"), "--fibre is 'hemp'; it must be one of cotton"),
         (("--packing", "0.5"), "--packing needs a yarn count"),
         (("--yarn", "Ne 30", "--fibre", "hemp"), "--fibre is 'hemp'; it must be one of cotton"),
         (("--weight", "heavy"), "--weight is 'heavy'; write it as in 14oz"),

@@ -12,7 +12,16 @@ from pathlib import Path
 import pytest
 from pxr import Sdf, Usd
 
-from fabricusd.fabric import MODELS, SURFACE_LAWS, Binding, Fabric, Thread, ThreadSet
+from fabricusd.fabric import (
+    BASES,
+    MODELS,
+    OBSERVERS,
+    SURFACE_LAWS,
+    Binding,
+    Fabric,
+    Thread,
+    ThreadSet,
+)
 from fabricusd.schema import PLUGIN_PATH, attributes, load, save
 from fabricusd.schema.generate import generate
 from fabricusd.schema.plugin import VALIDATORS
@@ -134,8 +143,14 @@ def test_every_attribute_has_a_fallback_and_every_token_its_allowed_values(owner
     assert attribute.GetFallbackValue() is not None
     if attribute.GetTypeName() == "token" and prop != "fabric:binding:uvSet":
         allowed = list(attribute.GetMetadata("allowedTokens"))
-        names = SURFACE_LAWS if prop == "fabric:surfaceLaw" else MODELS
-        assert allowed == (["inherit"] if owner == "WovenThread" else []) + list(names)
+        names = {
+            "fabric:surfaceLaw": SURFACE_LAWS,
+            "fabric:model": MODELS,
+            "thread:model": ("inherit", *MODELS),
+            "thread:targetColor:basis": BASES,
+            "thread:targetColor:observer": tuple(str(field) for field in OBSERVERS),
+        }
+        assert allowed == list(names[prop])
 
 
 @pytest.mark.parametrize(

@@ -66,6 +66,8 @@ OTHER_VALUES = {
     "thread:isotropic": 0.9, "thread:gammaSurface": 3.0, "thread:gammaVolume": 6.0,
     "thread:surfaceGain": 0.125, "thread:model": "thesis", "thread:thickness": 0.75,
     "thread:linearDensity": 20.0,
+    "thread:targetColor": (-0.1, 0.2, 0.3), "thread:targetColor:basis": "singleLayer",
+    "thread:targetColor:observer": "10",
     "thread:curve:positions": [0.0, 0.0, 1.0], "thread:curve:angles": [-10.0, 20.0, 30.0],
     # Lengths come first: without them, what varies along the thread is refused.
     "thread:unevenness:length": 5.0, "thread:unevenness:cv": 0.2, "thread:unevenness:count": 0.1,
@@ -77,7 +79,8 @@ OTHER_VALUES = {
 
 def test_every_property_of_the_schema_is_written_and_read():
     stage = Usd.Stage.CreateInMemory()
-    fabric = Fabric(threads={"A": Thread(), "B": Thread()}, opaque=True, back=Fabric(name="Back"))
+    dyed = Thread(target_basis="opaque")
+    fabric = Fabric(threads={"A": dyed, "B": Thread()}, opaque=True, back=Fabric(name="Back"))
     sides = Sides(**{f.name: (0.45,) for f in fields(Sides)})
     fabric = replace(fabric, weave=replace(fabric.weave, name="plain"), sides=sides)
     fabric = replace(fabric, surface_law="unmasked")

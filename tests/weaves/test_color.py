@@ -56,7 +56,12 @@ def test_a_colour_is_read_from_display_hex_or_linear_numbers(
     assert parse_color(text) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("text", ["", "#12345", "red", "1,2", "nan,0,0", "inf,0,0", "-1,0,0", "#"])
+@pytest.mark.parametrize(
+    "text",
+    ["", "#12345", "redd", "lab(50,0)", "lab(150,0,0)", "1,2", "nan,0,0", "inf,0,0", "-1,0,0", "#"],
+)
 def test_what_is_no_colour_is_refused_with_its_place(text: str) -> None:
-    with pytest.raises(FabricError, match=r"--warp-color is .*it must be #rrggbb"):
+    with pytest.raises(
+        FabricError, match=r"--warp-color is .*(must be #rrggbb|must have three numbers)"
+    ):
         parse_color(text, "--warp-color")

@@ -72,9 +72,29 @@ def add_colors(parser: argparse.ArgumentParser) -> None:
             f"--{which}-color",
             nargs="+",
             metavar="COLOR",
-            help=f"colours of the {noun} in order: #rrggbb, linear r,g,b, or COUNT*COLOR "
-            "(default: the draft's, or none)",
+            help=f"colours of the {noun} in order: a COLOR as below, or COUNT*COLOR "
+            "(default: the draft's, or a light grey)",
         )
+
+
+def add_color_basis(parser: argparse.ArgumentParser) -> None:
+    """What the colours are the colours of."""
+    basis = parser.add_mutually_exclusive_group()
+    basis.add_argument(
+        "--single-layer",
+        action="store_true",
+        help="colours are those of one layer of cloth over black (default: folded until opaque)",
+    )
+    basis.add_argument(
+        "--albedo",
+        action="store_true",
+        help="colours are the raw albedo of the threads, from 0 to 1, and nothing is solved",
+    )
+    parser.add_argument(
+        "--observer",
+        choices=("2", "10"),
+        help="CIE standard observer of lab(), lch(), xyY() and spectra, in degrees (default: 2)",
+    )
 
 
 def add_figure(parser: argparse.ArgumentParser) -> None:
@@ -148,8 +168,9 @@ def _colors(options: argparse.Namespace) -> tuple[tuple[Any, ...], tuple[Any, ..
     from fabricusd.weaves.color import color_order
     from fabricusd.weaves.tartan import parse_codes, parse_threadcount
 
-    warp = color_order(options.warp_color or (), "--warp-color")
-    weft = color_order(options.weft_color or (), "--weft-color")
+    observer = int(options.observer or 2)
+    warp = color_order(options.warp_color or (), "--warp-color", observer)
+    weft = color_order(options.weft_color or (), "--weft-color", observer)
     codes = parse_codes(options.palette or ())
     if options.palette and not (options.tartan or options.stripes):
         raise FabricError("--palette", "can only be used with --tartan or --stripes")

@@ -41,8 +41,8 @@ def add_yarns(parser: argparse.ArgumentParser) -> None:
         "--fibre",
         "--fiber",
         metavar="NAME",
-        help="fibre of the yarns, whose density Peirce's diameter needs: cotton, linen, wool, "
-        "silk, viscose, polyester, nylon, acrylic, acetate (default: cotton)",
+        help="fibre of the yarns, for how they scatter and for the density in Peirce's diameter: "
+        "cotton, linen, wool, silk, viscose, polyester, nylon, acrylic, acetate (default: cotton)",
     )
     yarn.add_argument(
         "--packing",
@@ -91,7 +91,9 @@ def spun(fabric: Fabric, options: argparse.Namespace) -> tuple[Fabric, list[str]
         counts[which] = None if text is None else parse_count(text, option)
     known = any(count is not None for count in counts.values())
     for option in ("fibre", "packing"):
-        if getattr(options, option) is not None and not known:
+        # Without a count, a fibre still says how a thread scatters that no one else describes.
+        scatters = option == "fibre" and not (options.preset or options.thread)
+        if getattr(options, option) is not None and not known and not scatters:
             raise FabricError(f"--{option}", "needs a yarn count: give --yarn too, as in Ne 30")
     notes = []
     thickness = None if options.thickness is None else options.thickness * 1e-3

@@ -12,12 +12,14 @@ from typing import Any
 from pxr import Sdf, Usd
 
 from fabricusd.errors import FabricError, did_you_mean, reads
-from fabricusd.fabric import Fabric, Thread, ThreadSet
+from fabricusd.fabric import DEFAULT_MODEL, Fabric, Thread, ThreadSet
 from fabricusd.schema import attributes
 from fabricusd.schema.access import definitions, kind_of, thread_prims, type_of
+from fabricusd.schema.access import value as read
 from fabricusd.schema.attributes import Attribute, from_si
 from fabricusd.schema.build import build_side, build_thread
 from fabricusd.schema.colors import LINEAR
+from fabricusd.schema.edit.dye import ALBEDO, Value, solved_again, without_target
 from fabricusd.schema.edit.values import value_of
 from fabricusd.schema.edit.variant import Variant
 from fabricusd.schema.edit.words import SHORT, WORDS, Changes
@@ -47,10 +49,6 @@ class Change:
     of: str = ""
 
 
-Value = tuple[Usd.Prim, Sdf.AttributeSpec, Any]
-"""A prim, the attribute of the schema, its value in the file's unit."""
-
-
 def parse_change(text: str) -> Change:
     """`roughness=0.4`, `warp.colour=#112233`, `thread:ior=1.4` -> Change."""
     name, equals, value = text.partition("=")
@@ -72,6 +70,9 @@ def set_values(
     write: bool = True,
 ) -> tuple[str, ...]:
     """Set attributes of the fabric, thread or binding `FILE[:/PRIM]`; a line for each change.
+
+    Albedos that were solved for a colour are solved again where a change makes them wrong, with a
+    line for each; an albedo that is set itself forgets its colour.
 
     Values go into the file's own layer, over what its references and sublayers say. With `variant`,
     `NAME` or `SET=NAME`, they go into that variant of the fabric, which is made if it is new and is
@@ -106,6 +107,12 @@ def set_values(
                 _author(values, into)
                 prims = len({value[0].GetPath() for value in values})
                 told.append(f"{change.name} = {change.text}, on {prims} prim{'s' * (prims > 1)}")
+                if any(spec.name == ALBEDO for _, spec, _ in values):
+                    _author(list(without_target(values)), into)
+            if not set(_faults(prim)) - set(before):
+                solved, lines = solved_again(_fabric_of(prim))
+                _author(solved, into)
+                told += lines
             for (at, name), problem in _faults(prim).items():
                 if before.get((at, name)) != problem:
                     raise FabricError(f"{file}:{at} {name}".strip(), problem)
@@ -216,7 +223,9 @@ def _of_word(prim: Usd.Prim, change: Change) -> Iterator[Value]:
     if kind == "WovenFabric":
         fabric, prims = build_side(prim), thread_prims(prim)
     elif kind == "WovenThread":
-        fabric, prims = Fabric(threads={prim.GetName(): build_thread(prim)}), [prim]
+        above = _fabric_of(prim)
+        model = DEFAULT_MODEL if above == prim else str(read(above, "fabric:model"))
+        fabric, prims = Fabric(threads={prim.GetName(): build_thread(prim)}, model=model), [prim]
     else:
         raise FabricError(
             change.name,
@@ -229,7 +238,8 @@ def _of_word(prim: Usd.Prim, change: Change) -> Iterator[Value]:
         raise FabricError(change.name, f"needs a WovenFabric; {prim.GetPath()} is a thread")
     for name, fields in made.threads.items():
         for field, value in fields.items():
-            yield _in_file(prims[names.index(name)], attributes.THREAD, field, value, Thread)
+            table = (*attributes.THREAD, attributes.TARGET_BASIS)
+            yield _in_file(prims[names.index(name)], table, field, value, Thread)
     for which, fields in made.sets.items():
         for field, value in fields.items():
             yield _in_file(prim, attributes.thread_set(which), field, value, ThreadSet)

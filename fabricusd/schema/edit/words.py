@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fabricusd.errors import FabricError
-from fabricusd.fabric import Fabric, Thread
+from fabricusd.fabric import BASES, CONSERVING_MODEL, Fabric, Thread
 from fabricusd.weaves.cloth import parse_weight, with_weight
 from fabricusd.weaves.color import parse_color
 from fabricusd.weaves.draft import quoted
@@ -52,12 +52,23 @@ def _number(text: str, low: float, high: float, unit: str, where: str) -> float:
 
 
 def color(fabric: Fabric, names: Iterable[str], text: str, where: str) -> Changes:
-    """Colour of the thread, #rrggbb or linear r,g,b; the albedo keeps its ratio to the colour."""
-    rgb = parse_color(text, where)
+    """Colour of cloth of the thread, in any form of `new`; the albedo is solved for it.
+
+    A thread of a published model, whose A is no albedo, keeps the ratio of its albedo to its
+    colour.
+    """
+    names = list(names)
+    observer = {fabric.threads[name].target_observer for name in names}
+    rgb = parse_color(text, where, min(observer, default=2))
+    red, green, blue = (max(channel, 0.0) for channel in rgb)
+    inside = red, green, blue
 
     def change(thread: Thread) -> dict[str, Any]:
+        if fabric.model_of(thread) == CONSERVING_MODEL:
+            basis = thread.target_basis if thread.target_basis != BASES[0] else BASES[1]
+            return {"color": inside, "target_color": rgb, "target_basis": basis}
         ratio = max(thread.albedo) / max(thread.color) if max(thread.color) > 0 else 1.0
-        return {"color": rgb, "albedo": tuple(channel * ratio for channel in rgb)}
+        return {"color": inside, "albedo": tuple(channel * ratio for channel in inside)}
 
     return _each(names, fabric, change)
 

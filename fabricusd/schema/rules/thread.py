@@ -9,7 +9,7 @@ from pxr import Usd
 
 from fabricusd.fabric import UNEVENNESS, yarn_faults
 from fabricusd.schema import attributes
-from fabricusd.schema.access import value
+from fabricusd.schema.access import allowed_tokens, value
 from fabricusd.schema.attributes import MILLIMETRE, to_si
 from fabricusd.schema.rules.table import THREAD, Fault, rule
 
@@ -62,3 +62,12 @@ def yarn_is_whole(prim: Usd.Prim) -> Iterator[Fault]:
     held = {name: to_si(value(prim, entry.name), entry) for name, entry in mine.items()}
     for name, problem in yarn_faults(**held, scale=1.0 / MILLIMETRE, unit="mm"):
         yield mine[name].name, problem
+
+
+@rule(THREAD)
+def target_allowed(prim: Usd.Prim) -> Iterator[Fault]:
+    """Basis and observer of the target colour are allowed tokens."""
+    for name in ("thread:targetColor:basis", "thread:targetColor:observer"):
+        allowed, token = allowed_tokens(prim, name), value(prim, name)
+        if token not in allowed:
+            yield name, f"is '{token}'; it must be one of {', '.join(allowed)}"

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from fabricusd.errors import FabricError, one_line
 from fabricusd.ranges import RANGES
 from fabricusd.srgb import linear_from_srgb, srgb_from_linear
-
-RGB = tuple[float, float, float]
+from fabricusd.weaves.color.notation import FORMS, RGB, parse_notation
 
 LONGEST_ORDER = 16384
 """Most threads of one colour in a row; equal to the most threads of a draft."""
@@ -34,16 +33,22 @@ def codes_from_palette(palette: Sequence[RGB], low: int = 0, high: int = 255) ->
     return np.rint(srgb_from_linear(linear) * (high - low) + low).astype(np.int64)
 
 
-def parse_color(text: str, where: str = "colour") -> RGB:
-    """A linear colour from `#rgb` or `#rrggbb` (display codes) or `r,g,b` (linear, at least 0).
+def parse_color(text: str, where: str = "colour", observer: int = 2) -> RGB:
+    """A linear Rec. 709 colour from any of `notation.FORMS`.
+
+    `#rgb` and `#rrggbb` are display codes. `r,g,b` are linear, at least 0. The others are under D65
+    and may lie outside of Rec. 709, with numbers below 0; `observer`, 2 or 10 degrees, is theirs.
 
     Raises FabricError, naming `where`, for anything else.
     """
-    accepted = "it must be #rrggbb (display) or three linear numbers, as in 0.2,0.8,1"
+    accepted = f"it must be {FORMS}"
     word = text.strip()
     if re.fullmatch(r"#([0-9a-fA-F]{3}){1,2}", word):
         digits = word[1:] if len(word) == 7 else "".join(2 * c for c in word[1:])
         return palette_from_codes([[int(digits[k : k + 2], 16) for k in (0, 2, 4)]])[0]
+    noted = parse_notation(word, where, observer)
+    if noted is not None:
+        return noted
     try:
         r, g, b = (float(part) for part in word.split(","))
     except ValueError:
@@ -53,7 +58,7 @@ def parse_color(text: str, where: str = "colour") -> RGB:
     return (r, g, b)
 
 
-def color_order(items: Sequence[str], where: str) -> tuple[RGB, ...]:
+def color_order(items: Sequence[str], where: str, observer: int = 2) -> tuple[RGB, ...]:
     """`4*#111 4*#eee` -> linear colours of eight threads; raises FabricError, naming `where`."""
     order: list[RGB] = []
     for item in items:
@@ -65,9 +70,10 @@ def color_order(items: Sequence[str], where: str) -> tuple[RGB, ...]:
             raise FabricError(
                 where, f"has the count '{said}'; it must be from 1 to {LONGEST_ORDER}"
             )
-        rgb = parse_color(color, where)
+        rgb = parse_color(color, where, observer)
         for value in rgb:
-            RANGES["color"].require(where, value)
+            # A colour outside of Rec. 709 has numbers below 0.
+            RANGES["color"].require(where, max(value, 0.0))
         order += [rgb] * (int(count) if star else 1)
     return tuple(order)
 
