@@ -11,7 +11,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from fabricusd.appearance.laws.law import Law
+from fabricusd.appearance.laws.law import Law, same_gap
 from fabricusd.fabric import FACETS, SURFACE_LAWS, Fabric
 from fabricusd.kernels.choice import by_type
 
@@ -24,6 +24,11 @@ _BY_TYPE = {law.tables: law for law in REGISTRY.values()}
 def law_of(fabric: Fabric) -> Law:
     """The law of the published threads of `fabric`."""
     return REGISTRY.get(fabric.surface_law, REGISTRY[SURFACE_LAWS[0]])
+
+
+def gaps_close(tables: Any) -> bool:
+    """Whether less light passes the gaps from aside, under the law of these tables."""
+    return _BY_TYPE[type(tables)].openness is not same_gap
 
 
 def law_summary(name: str) -> str:

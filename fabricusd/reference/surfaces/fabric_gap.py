@@ -43,14 +43,14 @@ def gap_table(law: SurfaceLaw, opaque: bool) -> NDArray[np.float32] | None:
         return None
     gap = law.conserving.gap
     if law.kind == PUBLISHED_ONLY:
+        if not laws.gaps_close(law.published):
+            return None
         gap = np.empty(TABLE, np.float32)
         polar, azimuth = (x.ravel() for x in entry_angles(*TABLE))
         towards = np.stack(
             (np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar))
         )
         pass_published(R, law.published, R(1), towards.astype(np.float32), gap.reshape(-1))
-        if np.ptp(gap) < OPEN:
-            return None
     if gap.shape != TABLE or gap.max() < OPEN:
         return None
     return np.ascontiguousarray(gap, np.float32)
