@@ -123,6 +123,7 @@ def test_a_sheet_lets_as_much_of_an_even_sky_through_as_its_threads(preset):
     assert np.allclose(got.mean(axis=0), true.mean(axis=0), rtol=0.05)
 
 
+@pytest.mark.exhaustive
 @GAPS_SCATTER
 def test_a_look_lit_from_behind_is_near_its_threads(tmp_path):
     fabric = conserving("linen_plain")
@@ -147,6 +148,7 @@ def test_a_look_lit_from_behind_is_near_its_threads(tmp_path):
     assert without.mean() < 0.6 * true.mean()
 
 
+@pytest.mark.exhaustive
 @GAPS_SCATTER
 def test_a_fabric_without_a_bake_lets_as_much_light_through(tmp_path):
     fabric = conserving("linen_plain")
