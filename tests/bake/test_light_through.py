@@ -78,7 +78,10 @@ def test_maps_of_light_through_are_baked_where_light_comes_through():
     assert more == names | set(THROUGH)
 
 
-@pytest.mark.parametrize("preset", [pytest.param("linen_plain", marks=GAPS_SCATTER), "silk_shot"])
+@pytest.mark.parametrize(
+    "preset",
+    [pytest.param("linen_plain", marks=[GAPS_SCATTER, pytest.mark.exhaustive]), "silk_shot"],
+)
 def test_texels_relight_conserving_cloth_from_both_sides(preset):
     fabric = conserving(preset)
     one = garments(quad_scene(fabric, 8.0))[0]
