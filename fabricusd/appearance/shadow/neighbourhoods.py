@@ -26,9 +26,6 @@ MOST_KINDS = 3072
 MOST_RADIUS = 8
 """Radius [cells] beyond which nothing is gained: horizons are then off by less than .01 degree."""
 
-_SLOTS = 4 * MOST_KINDS
-"""Slots of the hash table in which kinds are counted."""
-
 _MIX = 0x9E3779B97F4A7C15
 """Odd constant that spreads a run's place and length over 64 bits."""
 
@@ -51,8 +48,8 @@ def neighbourhoods(
 ) -> Neighbourhoods:
     """The kinds of the cells of `repeat`, `most` of them at most.
 
-    repeat : of the threads' shapes; most : MOST_KINDS or less, and no less than there are codes of
-    a cell, two for each pair of threads' shapes
+    repeat : of the threads' shapes; most : raised to the number of codes of a cell, two for each
+    pair of threads' shapes, which cannot share horizons
 
     Cells of a kind lie at the same place of a run of the same
     length, however small the radius is; where even these are too many, runs that are longer than
@@ -70,7 +67,7 @@ def neighbourhoods(
     )
     marks = np.zeros(repeat, np.uint64)
     kinds = np.empty(repeat, np.int32)
-    first = np.empty((most, 2), np.int64)
+    first = np.empty((max(most, 2 * count * count), 2), np.int64)
     found = None
     for radius in range(MOST_RADIUS + 1):
         ring = np.array(
@@ -106,8 +103,7 @@ def _mark(grid, warp, weft, count, ring, drawn, marks):
             end = (i + a) % m
             row = end % grid.shape[0]
             for j in range(n):
-                pick = j + b
-                pick = pick + n if pick < 0 else (pick - n if pick >= n else pick)
+                pick = (j + b) % n
                 code = grid[row, pick % grid.shape[1]] + 2 * (warp[end] * count + weft[pick])
                 marks[i, j] ^= drawn[middle + a, middle + b, code]
 
@@ -128,15 +124,16 @@ def _mark_runs(runs, marks):
 @njit(**KERNEL)
 def _count(marks, kinds, first):
     """Number the marks into `kinds` and `first`: how many there are, or -1 if `first` is full."""
-    keys = np.zeros(_SLOTS, np.uint64)
-    numbers = np.full(_SLOTS, -1, np.int32)
+    slots = 4 * len(first)
+    keys = np.zeros(slots, np.uint64)
+    numbers = np.full(slots, -1, np.int32)
     count = 0
     for i in range(marks.shape[0]):
         for j in range(marks.shape[1]):
             mark = marks[i, j]
-            at = (mark >> np.uint64(20)) % np.uint64(_SLOTS)
+            at = (mark >> np.uint64(20)) % np.uint64(slots)
             while numbers[at] >= 0 and keys[at] != mark:
-                at = (at + np.uint64(1)) % np.uint64(_SLOTS)
+                at = (at + np.uint64(1)) % np.uint64(slots)
             if numbers[at] < 0:
                 if count == len(first):
                     return -1

@@ -10,7 +10,7 @@ from fabricusd.appearance.shadow.methods import METHODS, compile_shadow, shadowi
 from fabricusd.appearance.shadow.neighbourhoods import neighbourhoods
 from fabricusd.appearance.weave.compiled import compile_fabric
 from fabricusd.bake.texels.recipe import recipe, repeat_mean
-from fabricusd.fabric import Fabric, TangentCurve, Thread, Weave
+from fabricusd.fabric import Fabric, TangentCurve, Thread, ThreadSet, Weave
 from fabricusd.schema import load
 
 SATIN = np.array([[(5 * i + j) % 8 == 0 for j in range(8)] for i in range(8)])
@@ -68,6 +68,28 @@ def test_a_weave_that_is_all_chance_still_has_few_kinds():
         found = neighbourhoods(fabric, compiled, (160, 160), most)
         assert len(found.first) <= most
         assert np.array_equal(cells[tuple(found.first.T)][found.kinds], cells)
+
+
+def test_a_repeat_narrower_than_the_radius_wraps_around():
+    cells = np.tile(SATIN[:, :1], (500, 1))
+    fabric = replace(figured(8), weave=Weave(cells, "narrow"))
+    compiled = compile_fabric(fabric, precision=np.float64)
+    narrow = neighbourhoods(fabric, compiled, (4000, 1), 100)
+    assert (narrow.radius, len(narrow.first)) == (8, 8)
+    assert np.array_equal(narrow.kinds[:, 0], np.arange(4000) % 8)
+
+
+def test_threads_of_many_shapes_have_kinds_of_their_own():
+    plain = figured(8).threads["Yarn"]
+    threads = {f"T{k}": replace(plain, thickness=1e-4 + 1e-6 * k) for k in range(12)}
+    order = tuple(range(12))
+    fabric = Fabric(
+        weave=Weave(np.eye(2, dtype=bool), "plain"), threads=threads,
+        warp=ThreadSet(sequence=order), weft=ThreadSet(sequence=order),
+    )  # fmt: skip
+    compiled = compile_fabric(fabric, precision=np.float64)
+    found = neighbourhoods(fabric, compiled, (12, 12), 20)
+    assert len(found.first) == 144
 
 
 def test_shadows_by_neighbourhood_are_near_those_by_cell(cloth, by_kind, monkeypatch):
