@@ -93,7 +93,9 @@ def cylinder(fabric: Fabric, wrap: float, lights: np.ndarray) -> np.ndarray:
             u = math.cos(turn) * w[:, 0]
             v = math.sin(turn) * w[:, 0]
             pair.append(np.stack((u, v, w[:, 2]), axis=-1))
-        profile[k] = surface.evaluate(fabric, pair[0], pair[1], level="far").mean(axis=1)
+        profile[k] = surface.evaluate(
+            fabric, pair[0], pair[1], level="far", shadow=surface.mean_shadow(fabric)
+        ).mean(axis=1)
     return profile
 
 

@@ -40,7 +40,9 @@ def main() -> None:
     for preset in sys.argv[1:] or PRESETS:
         fabric = of_one_model(preset)
         texels = mean_sample(fabric)
-        true = albedo(surface.evaluate(fabric, wi, wo, level="far"))
+        true = albedo(
+            surface.evaluate(fabric, wi, wo, level="far", shadow=surface.mean_shadow(fabric))
+        )
         i, o = (np.einsum("kab,nb->kna", frames_of(texels), w) for w in (wi, wo))
         for kind in KINDS:
             made = fit(kind, texels, fabric)

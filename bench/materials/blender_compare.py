@@ -129,7 +129,7 @@ def reference(scene, folder, spp):
     if not picture.exists():
         render(
             scene, picture, width=SIZE[0], height=SIZE[1], spp=spp, max_bounces=0,
-            level="far", shadow="none", pixel_filter="box",
+            level="far", shadow="horizon", pixel_filter="box",
         )  # fmt: skip
     return picture
 

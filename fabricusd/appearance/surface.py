@@ -83,6 +83,12 @@ class Sample(NamedTuple):
     pdf: Floats
 
 
+def mean_shadow(fabric: Fabric) -> str:
+    """The shadow that level `far` of this cloth takes the mean of: "horizon" under a law that does
+    not mask, else "none", since the mask already contains it."""
+    return "horizon" if law_of(fabric).absolute else "none"
+
+
 def evaluate(
     fabric: Fabric,
     wi: ArrayLike,
@@ -217,6 +223,11 @@ def _lit(fabric: Fabric, method: str, uv: Floats, wi: Floats) -> Floats:
 def _check_shadow(method: str) -> None:
     if method not in METHODS:
         raise FabricError("shadow", f"is '{method}'; it must be one of {', '.join(METHODS)}")
+
+
+def places_of(fabric: Fabric, uv: Floats) -> WeaveHit:
+    """What level `weave` finds at weave coordinates uv (n, 2)."""
+    return _places(fabric, uv, "weave", len(uv))[0]
 
 
 def _places(

@@ -79,7 +79,7 @@ def cloth_value(
 ) -> Floats:
     """(n,) radiance per unit `L_i dwi` at weave coordinates (n, 2), mean of the channels."""
     if level == "far":
-        return np.repeat(evaluate(fabric, wi, wo).mean(axis=1), len(uv))
+        return np.repeat(evaluate(fabric, wi, wo, shadow=shadow).mean(axis=1), len(uv))
     return np.asarray(evaluate(fabric, wi, wo, uv, level, shadow).mean(axis=1))
 
 

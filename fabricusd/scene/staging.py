@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 from fabricusd.errors import FabricError, did_you_mean
 from fabricusd.images.files import read_image
 from fabricusd.scene.light_kinds import DOME
-from fabricusd.scene.scene import Camera, Light, Mesh, PreviewSurface, Scene
+from fabricusd.scene.scene import (
+    Camera,
+    FabricSurface,
+    Light,
+    Material,
+    Mesh,
+    PreviewSurface,
+    Scene,
+)
 from fabricusd.scene.studio import (
     GREY,
     ROUGHNESS,
@@ -47,6 +55,7 @@ class Staging:
     frame : prim path or name of what the camera frames, "" for none; "/" for the whole scene
     eye, look_at : places of the camera, and of what it looks at [m]; None leaves them
     orbit : number of pictures around the subject, 0 for one picture
+    surface_law : law that all fabrics wear, one of `fabric.SURFACE_LAWS`; "" for their own
     """
 
     dome: str | os.PathLike[str] | None = None
@@ -57,6 +66,7 @@ class Staging:
     eye: Place | None = None
     look_at: Place | None = None
     orbit: int = 0
+    surface_law: str = ""
 
     @property
     def moves_the_camera(self) -> bool:
@@ -70,8 +80,11 @@ def put(staging: Staging, scene: Scene, aspect: float, *, turn: float = 0.0) -> 
     aspect : width over height of the picture
     turn : by which the camera goes around the subject, counter-clockwise from above [rad]
 
-    Raises FabricError for a dome that cannot be read, and for a frame that names no mesh.
+    Raises FabricError for a dome that cannot be read, for a frame that names no mesh, and for a law
+    that a fabric cannot wear.
     """
+    if staging.surface_law:
+        scene.materials = [_wearing(m, staging.surface_law) for m in scene.materials]
     subject = _subject(scene, framed_meshes(scene, staging.frame))
     if staging.studio:
         everything = _subject(scene, scene.meshes)
@@ -90,6 +103,16 @@ def put(staging: Staging, scene: Scene, aspect: float, *, turn: float = 0.0) -> 
         scene.lights = [replace(light, hidden=True, camera_visible=False) for light in scene.lights]
     if staging.moves_the_camera or (staging.studio and scene.camera is None):
         scene.camera = _camera(staging, scene, subject, aspect, turn)
+
+
+def _wearing(material: Material, law: str) -> Material:
+    """The material with its fabric, and the back of that, under another surface law."""
+    if not isinstance(material, FabricSurface):
+        return material
+    fabric = material.binding.fabric
+    back = None if fabric.back is None else replace(fabric.back, surface_law=law)
+    worn = replace(fabric, surface_law=law, back=back)
+    return replace(material, binding=replace(material.binding, fabric=worn))
 
 
 def framed_meshes(scene: Scene, frame: str) -> Sequence[Mesh]:

@@ -28,9 +28,13 @@ def preset_names() -> list[str]:
     return sorted(path.stem for path in PRESETS.glob("*.usda"))
 
 
+VARIANTS = re.compile(r"(?:\{[^{}=]*=[^{}=]*\})+$")
+"""What chooses variants at the end of a source."""
+
+
 def split_source(source: str | os.PathLike[str]) -> tuple[Path, str]:
-    """`FILE[:/PRIM]` or a preset's name -> (file, prim path or "")."""
-    text = os.fspath(source)
+    """`FILE[:/PRIM][{SET=VARIANT}...]`, or a preset's name for FILE -> (file, prim path or "")."""
+    text = _split_variants(source)[0]
     file, separator, prim = text.rpartition(":/")
     # The part of `C:/cloth.usda` before the `:` is a drive, not a file.
     if not separator or (len(file) == 1 and file.isalpha()):
@@ -43,14 +47,29 @@ def split_source(source: str | os.PathLike[str]) -> tuple[Path, str]:
     return Path(file), prim
 
 
+def variants_of(source: str | os.PathLike[str]) -> tuple[tuple[str, str], ...]:
+    """(set, variant) of each `{SET=VARIANT}` at the end of `source`, as USD's paths write it."""
+    return _split_variants(source)[1]
+
+
+def _split_variants(source: str | os.PathLike[str]) -> tuple[str, tuple[tuple[str, str], ...]]:
+    text = os.fspath(source)
+    found = VARIANTS.search(text)
+    if found is None or os.path.exists(text):
+        return text, ()
+    chosen = (one.partition("=") for one in found.group()[1:-1].split("}{"))
+    return text[: found.start()], tuple((name, variant) for name, _, variant in chosen)
+
+
 @reads("USD")
 def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
     """Open the stage of a file or a preset, with every composition error raised.
 
-    Returns (stage, the name to use in messages). Raises FabricError where the file is missing,
-    empty, not USD, or does not compose.
+    Variants that the source chooses are selected in the session layer. Returns (stage, the name to
+    use in messages). Raises FabricError where the file is missing, empty, not USD, or does not
+    compose, and where the fabric has no such variant.
     """
-    path, _ = split_source(source)
+    path, prim_path = split_source(source)
     missing = "does not exist"
     if not path.suffix:
         hint = did_you_mean(str(path), preset_names())
@@ -60,10 +79,29 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
         if Sdf.FileFormat.FindByExtension(str(path)) is None:
             raise FabricError(str(path), "is not USD; it must be .usda, .usdc, .usd or .usdz")
         stage = compose_stage(str(path))
+        for which, variant in variants_of(source):
+            _select(find_fabric(stage, str(path), prim_path), which, variant, str(path))
         errors = stage.GetCompositionErrors()
         if errors:
             raise FabricError(str(path), f"does not compose: {one_line(str(errors[0]), 300)}")
     return stage, str(path)
+
+
+def _select(prim: Usd.Prim, which: str, variant: str, file: str) -> None:
+    """Select a variant of `prim` in the session layer of its stage."""
+    where = f"{file}:{prim.GetPath()}{{{which}={variant}}}"
+    sets = prim.GetVariantSets()
+    if not sets.HasVariantSet(which):
+        known = ", ".join(sets.GetNames()) or "none"
+        raise FabricError(where, f"has no variant set '{which}'; the fabric's sets are: {known}")
+    names = sets.GetVariantSet(which).GetVariantNames()
+    if variant not in names:
+        raise FabricError(
+            where, f"has no variant '{variant}'; it must be one of {', '.join(names)}"
+        )
+    stage = prim.GetStage()
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        sets.GetVariantSet(which).SetVariantSelection(variant)
 
 
 def compose_stage(path: str) -> Usd.Stage:

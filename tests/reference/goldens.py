@@ -31,12 +31,13 @@ SAMPLES = 4096
 CASES: dict[str, dict[str, Any]] = {
     # name: fabric, of even threads unless told, threads to a unit of UV, level, shadowing; the
     # cloth, over a floor, under a picture and a lamp
-    "satin_far": {"preset": "polyester_satin_charmeuse", "level": "far"},
+    "satin_far": {"preset": "polyester_satin_charmeuse", "level": "far", "shadow": "horizon"},
     "silk_thread": {"preset": "silk_shot", "level": "thread", "threads": 12.0},
     "linen_auto": {"preset": "linen_plain", "level": "auto", "threads": 40.0},
     "velvet_weave": {"preset": "velvet", "level": "weave", "threads": 12.0},
     "satin_horizon": {"preset": "polyester_satin_charmeuse", "shadow": "horizon", "threads": 24.0},
-    "silk_ball": {"preset": "silk_shot", "shadow": "horizon", "threads": 12.0, "cloth": "ball"},
+    "silk_ball": {"preset": "silk_shot{appearance=published}", "shadow": "horizon",
+                  "threads": 12.0, "cloth": "ball"},
     "linen_skirt": {"preset": "linen_plain", "shadow": "horizon", "threads": 24.0,
                     "cloth": "skirt"},
     "linen_uneven": {"preset": "linen_plain", "level": "thread", "shadow": "horizon",

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import argparse
 import math
 
 import numpy as np
 import pytest
 
+from fabricusd.cli.arguments.staging import add_staging
 from fabricusd.errors import FabricError
+from fabricusd.fabric import SURFACE_LAWS, Binding
 from fabricusd.images.files import write_exr, write_png
 from fabricusd.scene.light_kinds import DISTANT, DOME
-from fabricusd.scene.scene import Camera, Light, Mesh, PreviewSurface, Scene
+from fabricusd.scene.scene import Camera, FabricSurface, Light, Mesh, PreviewSurface, Scene
 from fabricusd.scene.staging import Staging, framed_meshes, over_background, put
+from fabricusd.schema import load
 
 TURN = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
 """A quarter about +y, counter-clockwise from above: x goes to -z, z goes to x."""
@@ -150,3 +154,29 @@ def test_a_picture_over_a_background_is_opaque() -> None:
     assert laid == pytest.approx(
         np.array([[[1, 0.5, 0, 1], [0.5, 0.25, 0, 1], [0.7, 0.35, 0, 1]]]), abs=1e-6
     )
+
+
+def test_every_fabric_and_its_back_wear_the_law_asked_for() -> None:
+    satin = load("polyester_satin_charmeuse")
+    grey, own = PreviewSurface(), FabricSurface(binding=Binding(fabric=satin, rotation=0.5))
+    staged = scene(materials=[grey, own])
+    put(Staging(surface_law="masked"), staged, 1.0)
+    assert staged.materials[0] is grey
+    binding = staged.materials[1].binding
+    assert (binding.fabric.surface_law, binding.fabric.back.surface_law) == ("masked", "masked")
+    assert binding.fabric.threads == satin.threads
+    assert binding.rotation == 0.5
+    assert own.binding.fabric.surface_law == "unmasked"
+
+
+def test_a_law_that_a_fabric_cannot_wear_is_refused() -> None:
+    linen = scene(materials=[FabricSurface(binding=Binding(fabric=load("linen_plain")))])
+    with pytest.raises(FabricError, match="'facets', the law of conserving threads"):
+        put(Staging(surface_law="facets"), linen, 1.0)
+
+
+def test_the_option_offers_every_law() -> None:
+    parser = argparse.ArgumentParser()
+    add_staging(parser)
+    offered = {a.dest: a.choices for a in parser._actions}["surface_law"]
+    assert tuple(offered) == SURFACE_LAWS

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
+from fabricusd.geometry.nearest import LIKE, law_errors, published, scaled, worn
 from fabricusd.schema import load, preset_names
 
 # [Sadeghi2013] Table II: colour, scale, eta, kd, gs, gv, a, offsets, lengths between them.
@@ -42,7 +44,7 @@ PUBLISHED = {
 @pytest.mark.parametrize(("name", "which"), PUBLISHED)
 def test_a_preset_has_the_published_numbers(name, which):
     color, scale, ior, kd, gs, gv, area, offsets, lengths = PUBLISHED[name, which]
-    fabric = load(name)
+    fabric = published(name)
     thread_set = getattr(fabric, which)
     thread = fabric.thread_list[thread_set.sequence[0]]
     assert thread.albedo == pytest.approx([c * scale for c in color], rel=1e-14)
@@ -70,6 +72,32 @@ def test_a_preset_says_where_its_numbers_come_from(name):
             or "erived" in thread.documentation
             or ("[Bisker2011]" in thread.documentation)
         )
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_a_preset_is_the_published_one_under_another_law_with_one_factor_on_its_albedos(name):
+    fabric, before = load(name), published(name)
+    assert before.surface_law == "masked"
+    factor = fabric.thread_list[0].albedo[0] / before.thread_list[0].albedo[0]
+    expected = replace(scaled(before, factor), surface_law=fabric.surface_law)
+    for thread, other in zip(fabric.thread_list, expected.thread_list, strict=True):
+        assert thread.albedo == pytest.approx(other.albedo, rel=1e-3)
+        assert replace(thread, albedo=other.albedo) == other
+    assert replace(fabric, threads=expected.threads, back=None) == replace(expected, back=None)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("name", preset_names())
+def test_the_law_is_the_one_nearest_to_the_tubes_and_the_cloth_as_bright_as_published(name):
+    law, factor = worn(name, law_errors(LIKE.get(name, name)))
+    assert load(name).surface_law == law
+    first, before = load(name).thread_list[0], published(name).thread_list[0]
+    assert first.albedo[0] == pytest.approx(factor * before.albedo[0], rel=1e-3)
+
+
+def test_the_published_front_has_the_published_back():
+    front = published("polyester_satin_charmeuse")
+    assert front.back == published("polyester_satin_charmeuse_back")
 
 
 def test_the_satin_has_a_back_of_its_own():

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fabricusd import FabricError
 from fabricusd.schema import check, load, save
-from fabricusd.schema.source import split_source
+from fabricusd.schema.edit.edit import Change, set_values
+from fabricusd.schema.source import split_source, variants_of
 
 TWO = """#usda 1.0
 def WovenFabric "A"
@@ -80,6 +82,82 @@ def test_a_broken_source_is_one_clear_line(case, tmp_path, capfd):
 def test_a_drive_is_no_file():
     assert split_source("C:/cloth.usda") == (Path("C:/cloth.usda"), "")
     assert split_source("C:/cloth.usda:/A/B") == (Path("C:/cloth.usda"), "/A/B")
+
+
+VARIANTS = """#usda 1.0
+(
+    defaultPrim = "A"
+)
+def WovenFabric "A" (
+    references = @linen.usda@
+    variants = { string dye = "blue" }
+    prepend variantSets = ["dye", "nap"]
+)
+{
+    variantSet "dye" = {
+        "blue" {
+        }
+        "red" {
+            over "Linen"
+            {
+                uniform color3d thread:albedo = (0.5, 0.1, 0.1)
+            }
+        }
+    }
+    variantSet "nap" = {
+        "flat" {
+        }
+        "rough" {
+            over "Linen"
+            {
+                uniform double thread:gammaSurface = 30
+            }
+        }
+    }
+}
+"""
+
+
+@pytest.fixture
+def dyed(tmp_path):
+    save(load("linen_plain"), tmp_path / "linen.usda")
+    return write(tmp_path, "dyed.usda", VARIANTS)
+
+
+def test_a_source_chooses_variants(dyed):
+    before = Path(dyed).read_bytes()
+    plain, red = load(dyed), load(f"{dyed}:/A{{dye=red}}{{nap=rough}}")
+    assert red.thread_list[0].albedo == (0.5, 0.1, 0.1)
+    assert red.thread_list[0].gamma_surface == pytest.approx(np.radians(30))
+    assert load(f"{dyed}{{dye=red}}").thread_list[0].albedo == (0.5, 0.1, 0.1)
+    assert load(dyed) == plain
+    assert plain.thread_list[0].albedo != (0.5, 0.1, 0.1)
+    assert Path(dyed).read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("choice", "message"),
+    [
+        ("{dye=green}", "has no variant 'green'; it must be one of blue, red"),
+        ("{colour=red}", "has no variant set 'colour'; the fabric's sets are: dye, nap"),
+        ("{dye}", "does not exist"),
+    ],
+)
+def test_a_variant_that_is_not_there_is_named(dyed, choice, message):
+    with pytest.raises(FabricError, match=message):
+        load(f"{dyed}{choice}")
+
+
+def test_a_file_whose_name_ends_like_a_choice_is_read(dyed, tmp_path):
+    path = tmp_path / "cloth{dye=red}"
+    Path(dyed).with_name("linen.usda").rename(path)
+    assert variants_of(path) == ()
+    assert split_source(path) == (path, "")
+
+
+def test_values_are_set_in_a_variant_by_its_option_alone(dyed):
+    with pytest.raises(FabricError, match="name it with --variant"):
+        set_values(f"{dyed}{{dye=red}}", [Change(name="thread:ior", text="1.4")])
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes in folders here")

@@ -184,6 +184,36 @@ def node_groups(shadow: Any, nodes: CurveNodes, fabric: Fabric) -> Floats | None
     return found
 
 
+def angle_groups(shadow: Any, fabric: Fabric, which: int, kind: int, psi0: Floats) -> Floats:
+    """(columns + 1, n, GROUPS) horizons of the places of set `which` where the thread type `kind`
+    has the tangent angles psi0 (n,) [rad], as `groups_of`.
+
+    shadow : the `Shadow` of `fabric`, not of method `none`. An angle that several stretches have is
+    in all of them, by their lengths; one that the curve does not have is in the nearest.
+    """
+    columns = shadow.mean_columns + 1
+    table = np.asarray(shadow.mean, np.float64).reshape(-1, columns, GROUPS)
+    p = pieces(fabric.thread_list[kind].curve)
+    counts = shadow.piece_last[kind, : len(p.first)] + 1
+    length = np.diff(_cuts(p, shadow.piece_last[kind] + 1))
+    ends = [
+        a + (b - a) * np.arange(n + 1) / n for a, b, n in zip(p.first, p.last, counts, strict=True)
+    ]
+    low = np.concatenate([np.minimum(e[:-1], e[1:]) for e in ends])
+    high = np.concatenate([np.maximum(e[:-1], e[1:]) for e in ends])
+    piece = np.repeat(np.arange(len(counts)), counts)
+    first = int(shadow.mean_first[which, kind])
+    rows = table[first : first + len(length)]
+    found = np.empty((columns, len(psi0), GROUPS))
+    for k, angle in enumerate(psi0):
+        away = np.maximum(np.maximum(low - angle, angle - high), 0.0)
+        on = np.flatnonzero((away <= away.min() + 1e-9) & (length > 0))
+        # Between two stretches of a piece, either will do.
+        on = on[np.unique(piece[on], return_index=True)[1]]
+        found[:, k] = _mixed(rows[on], length[on])
+    return found
+
+
 def _cuts(p: Pieces, counts: NDArray[np.int32]) -> Floats:
     """Ends of the stretches of a curve, in run lengths, from 0 to 1."""
     parts = zip(p.start, p.length, counts, strict=False)

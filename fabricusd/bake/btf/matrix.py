@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.law import surface_law
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.lookup import lookup
-from fabricusd.bake.texels.law_values import law_values
+from fabricusd.bake.texels.law_values import cloth_law, law_values
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, even
 
@@ -154,7 +153,7 @@ def _nodes(fabric: Fabric, keys: NDArray[np.int64], directions: Floats) -> NDArr
     """(d*d, 3, k) values at the nodes."""
     step, d = _spacing(fabric), len(directions)
     middle = math.ceil(0.5 * math.pi / step)
-    law = surface_law(fabric, precision=np.float64)
+    law = cloth_law(fabric)
     view, light = np.divmod(np.arange(d * d), d)
     wi = np.ascontiguousarray(directions[light].T)
     wo = np.ascontiguousarray(directions[view].T)

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.surface import evaluate
 from fabricusd.bake.btf.factored import (
     FactoredBtf,
     factored,
@@ -22,6 +21,7 @@ from fabricusd.bake.btf.factors import Factors, factors
 from fabricusd.bake.btf.matrix import Btf, btf_of
 from fabricusd.bake.btf.ubo import read_ubo, write_ubo
 from fabricusd.bake.error.accuracy import PAIRS, bound_of, display, pairs_between
+from fabricusd.bake.texels.law_values import LawAtPlaces
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.quality.colors import delta_e_2000
@@ -125,9 +125,10 @@ def between(
     pairs : (n, 3) wi and wo; None for `accuracy.PAIRS` default pairs
     """
     weave = np.random.default_rng(1).random((512, 2)) * 64.0
+    cloth = LawAtPlaces(fabric, weave)
     found = []
     for wi, wo in zip(*(pairs or pairs_between(PAIRS)), strict=True):
-        true = evaluate(fabric, np.repeat(wi[None], len(weave), axis=0), wo, weave, "weave")
+        true = cloth.values(wi, wo)
         got = np.stack([one.evaluate(weave, wi, wo) for one in forms])
         shown = np.broadcast_to(display(true, wi), got.shape)
         found.append(delta_e_2000(display(got, wi), shown).mean(axis=1))

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.accuracy import spread_pairs
 from fabricusd.appearance.scattering.models import translucent
-from fabricusd.appearance.surface import evaluate
 from fabricusd.bake.error.relight import NEEDED, relight
 from fabricusd.bake.layout.raster import NOBODY, owners
 from fabricusd.bake.texels.blocks import bake_block
+from fabricusd.bake.texels.law_values import LawAtPlaces
 from fabricusd.bake.texels.maps import REGISTRY
 from fabricusd.bake.texels.sheet import Sheet, texel_start, texel_step
 from fabricusd.errors import FabricError
@@ -206,10 +206,9 @@ def compared(
     """
     errors = np.zeros((len(choices), len(pairs[0])))
     n, samples = weave.shape[:2]
+    cloth = LawAtPlaces(fabric, weave.reshape(-1, 2))
     for k, (wi, wo) in enumerate(zip(*pairs, strict=True)):
-        true = evaluate(
-            fabric, np.repeat(wi[None], n * samples, axis=0), wo, weave.reshape(-1, 2), "weave"
-        ).reshape(n, samples, 3)
+        true = cloth.values(wi, wo).reshape(n, samples, 3)
         mean = display(true.mean(axis=1), wi)
         for choice, texels in enumerate(choices):
             got = relight({name: a[:n] for name, a in texels.items()}, fabric, wi, wo)

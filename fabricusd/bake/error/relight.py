@@ -142,7 +142,7 @@ def relight(
     # Earlier versions stored 255 for texels without a thread.
     kinds = np.where((ids >= 0) & (ids < 2 * types), ids, NO_THREAD).astype(np.int64)
     i, o = (np.asarray(w, np.float64) for w in (wi, wo))
-    if any_conserving(fabric):
+    if any_conserving(fabric) or laws.law_of(fabric).absolute:
         return relight_law(fabric, share, shapes, sets, kinds, i, o)
     out = np.zeros((len(ids), 3))
     _relight(surface_tables(fabric), share, shapes, types, sets, kinds, i, o, out)

@@ -1,9 +1,9 @@
-"""Re-light texels of cloth with `conserving` threads, from either side.
+"""Re-light texels of cloth whose law is not a sum over what a texel shows.
 
-The law of such cloth is not a sum over what a texel shows: light also goes from thread to thread,
-and what is visible of a thread depends on all of them. Both are the same all over the cloth,
-though, so for one pair of directions the law is a table by thread and tangent angle, which is
-averaged over the angles that a texel holds.
+Between `conserving` threads light also goes from thread to thread, and what is visible of a thread
+depends on all of them. Under a law that does not mask, each place is shadowed by all threads. Both
+are the same all over the cloth, though, so for one pair of directions the law is a table by thread
+and tangent angle, which is averaged over the angles that a texel holds.
 """
 
 from __future__ import annotations
@@ -15,11 +15,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.law import SurfaceLaw, surface_law
+from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.scattering.columns import GAMMA_SURFACE
 from fabricusd.appearance.scattering.table import pack_threads
+from fabricusd.appearance.shadow.mean import WIDEST
 from fabricusd.bake.texels.angle_shape import COUNTS
-from fabricusd.bake.texels.law_values import law_values, painted
+from fabricusd.bake.texels.law_values import ClothLaw, cloth_law, law_values
 from fabricusd.bake.texels.moment_indices import PARTS
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import KERNEL
@@ -34,10 +35,10 @@ LEAST_ALBEDO = 1e-3
 
 
 @lru_cache(maxsize=8)
-def _laws(fabric: Fabric) -> tuple[SurfaceLaw, SurfaceLaw]:
+def _laws(fabric: Fabric) -> tuple[ClothLaw, ClothLaw]:
     return (
-        surface_law(painted(fabric, 0.0), precision=np.float64, multiple=False),
-        surface_law(fabric, precision=np.float64),
+        cloth_law(fabric, 0.0, multiple=False),
+        cloth_law(fabric),
     )
 
 
@@ -64,6 +65,9 @@ def relight_law(
     """
     albedo = np.array([t.albedo for t in fabric.thread_list])
     gamma = pack_threads(fabric, np.float64)[:, GAMMA_SURFACE]
+    if law_of(fabric).absolute:
+        # The mean shadow steps from stretch to stretch.
+        gamma = np.minimum(gamma, WIDEST)
     out = np.zeros((len(kinds), 3))
     _relight(angle_table(fabric, wi, wo), albedo, gamma, shares, shapes, sets, kinds, out)
     return out

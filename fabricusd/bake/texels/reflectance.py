@@ -13,11 +13,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.law import PUBLISHED_ONLY, SurfaceLaw, surface_law
 from fabricusd.appearance.scattering.models import translucent
 from fabricusd.appearance.weave.coverage import WARP, WEFT
 from fabricusd.appearance.weave.quadrature import CELLS, Rule, curve_nodes
-from fabricusd.bake.texels.law_values import law_values, painted
+from fabricusd.bake.texels.law_values import ClothLaw, cloth_law, law_values
 from fabricusd.fabric import Fabric
 
 Floats = NDArray[np.float64]
@@ -51,11 +50,11 @@ def reflectance_table(fabric: Fabric) -> Floats:
     does not show hold 0.
     """
     table = np.zeros((2, len(fabric.threads), ANGLES, COLUMNS))
-    black = surface_law(painted(fabric, 0.0), precision=np.float64, multiple=False)
+    black = cloth_law(fabric, 0.0, multiple=False)
     # The published volume term is proportional to `A`. That of `conserving` cloth is not: light
     # goes from thread to thread.
-    linear = black.kind == PUBLISHED_ONLY
-    lit = surface_law(painted(fabric, 1.0) if linear else fabric, precision=np.float64)
+    linear = black.linear
+    lit = cloth_law(fabric, 1.0 if linear else None)
     for (which, kind), used in _used_angles(fabric).items():
         psi0 = np.radians(np.linspace(-90.0, 90.0, ANGLES)[used])
         surface = _scattered(black, which, kind, psi0, 0.0)[:, :1]
@@ -92,7 +91,7 @@ def _used_angles(fabric: Fabric) -> dict[tuple[int, int], slice]:
 
 
 def _scattered(
-    law: SurfaceLaw,
+    law: ClothLaw,
     thread_set: int,
     thread: int,
     psi0: Floats,

@@ -70,7 +70,9 @@ def _rows(fabric: Fabric, texels: TexelSample, quick: bool) -> list[Row]:
     one = texels.part(slice(1))
     law = "the law, far"
     runs: dict[str, Callable[[], object]] = {
-        law: lambda: surface.evaluate(fabric, wi, wo, level="far")
+        law: lambda: surface.evaluate(
+            fabric, wi, wo, level="far", shadow=surface.mean_shadow(fabric)
+        )
     }
     errors, highest = {law: 0.0}, {law: 0.0}
     for kind in QUICK_KINDS if quick else KINDS:

@@ -1,4 +1,4 @@
-"""The options of a review: light, background, studio, camera, without a line of USD."""
+"""The options of a review: light, background, studio, camera, law, without a line of USD."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 
 def add_staging(parser: argparse.ArgumentParser) -> None:
-    """Light, background and camera."""
-    group = parser.add_argument_group("light, background and camera of a review")
+    """Light, background, camera and surface law."""
+    group = parser.add_argument_group("light, background, camera and surface law of a review")
     group.add_argument(
         "--dome",
         metavar="SKY",
@@ -62,6 +62,13 @@ def add_staging(parser: argparse.ArgumentParser) -> None:
         help="render N numbered pictures from around the subject (default: one, from the camera)",
     )
 
+    group.add_argument(
+        "--surface-law",
+        choices=["masked", "unmasked", "projected", "facets"],
+        help="how light on threads becomes light on cloth, in all fabrics; their albedos are kept "
+        "(default: each fabric's own law)",
+    )
+
 
 def given_staging(options: argparse.Namespace) -> Staging:
     """What the options ask for; FabricError for a colour or a place that is none."""
@@ -77,6 +84,7 @@ def given_staging(options: argparse.Namespace) -> Staging:
         eye=_place(options.eye, "--eye"),
         look_at=_place(options.look_at, "--look-at"),
         orbit=options.orbit,
+        surface_law=options.surface_law or "",
     )
 
 

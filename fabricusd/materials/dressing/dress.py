@@ -29,6 +29,7 @@ from fabricusd.schema.source import (
     open_stage,
     split_source,
     usd_errors,
+    variants_of,
 )
 from fabricusd.schema.write import EXTENSIONS
 
@@ -227,6 +228,8 @@ def _wear(stage: Usd.Stage, cloth: Fabric, source: str, binding: Binding, target
         found = find_fabric(layer, name, split_source(source)[1])
         prim = stage.DefinePrim(path)
         prim.GetReferences().AddReference(_relative(file, target), found.GetPath())
+        for which, variant in variants_of(source):
+            prim.GetVariantSets().SetSelection(which, variant)
     material = write_fabric_material(
         stage, ROOT.AppendPath(f"Looks/{prim_name(cloth.name)}"), path, binding
     )

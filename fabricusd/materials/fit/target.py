@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance import surface
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.lookup import NO_THREAD, lookup, thread_number
+from fabricusd.bake.texels.law_values import cloth_law, law_values
 from fabricusd.fabric import Fabric, even
 from fabricusd.materials.fit.judge import direction_pairs
 
@@ -88,7 +89,9 @@ def target_of(fabric: Fabric, texels: TexelSample) -> Target:
     threads together have the same weight as the first row.
     """
     wi, wo = direction_pairs()
-    values, members = [surface.evaluate(fabric, wi, wo, level="far")], [texels.weight]
+    shadow = surface.mean_shadow(fabric)
+    values = [surface.evaluate(fabric, wi, wo, level="far", shadow=shadow)]
+    members = [texels.weight]
     shares = []
     for one in texels.threads:
         mine = texels.weight * (texels.thread == one)
@@ -115,7 +118,8 @@ def of_thread(fabric: Fabric, number: int, wi: Floats, wo: Floats) -> Floats:
     # Radiance depends on the tangent angle alone, so uniform quantiles of it represent the area.
     order = mine[np.argsort(hit.angle[mine])]
     chosen = order[((np.arange(PLACES) + 0.5) / PLACES * len(order)).astype(int)]
-    total = np.zeros_like(wi)
-    for place in places[chosen]:
-        total += surface.evaluate(fabric, wi, wo, place, "weave")
-    return total / PLACES
+    angles, count = np.repeat(hit.angle[chosen], len(wi)), len(chosen)
+    lights, viewers = (np.tile(w.T, (1, count)) for w in (wi, wo))
+    which, kind = int(hit.set[mine[0]]), int(hit.thread[mine[0]])
+    found = law_values(cloth_law(fabric), which, kind, angles, lights, viewers)
+    return np.asarray(found.reshape(3, count, len(wi)).mean(axis=1).T)

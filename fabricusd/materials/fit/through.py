@@ -45,7 +45,7 @@ def fit_through(kind: str, texels: TexelSample, fabric: Fabric, look: Look) -> T
     """
     wi, wo = direction_pairs()
     wi = wi * (1.0, 1.0, -1.0)
-    true = surface.evaluate(fabric, wi, wo, level="far")
+    true = surface.evaluate(fabric, wi, wo, level="far", shadow=surface.mean_shadow(fabric))
     frames = frames_of(texels)
     i, o = (np.einsum("kab,nb->kna", frames, w) for w in (wi, wo))
     plain = np.einsum("k,knc->nc", texels.weight, forward_through(kind, look, texels, i, o))

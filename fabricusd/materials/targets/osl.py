@@ -6,6 +6,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from fabricusd.appearance.laws import law_of
+from fabricusd.appearance.laws.excess import COLUMNS as AROUND
+from fabricusd.appearance.laws.excess import ROWS
+from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.quadrature import DEFAULT, curve_nodes
 from fabricusd.errors import FabricError
@@ -14,6 +21,12 @@ from fabricusd.files import whole_file
 from fabricusd.materials.targets import Job
 
 SOURCE = Path(__file__).resolve().parent / "blender" / "fabric_thread.osl"
+
+LAWS = ("masked", "unmasked", "projected")
+"""Surface laws of the shader, by its parameter `law`."""
+
+COLUMNS, GROUPS = 16, 4
+"""Azimuths of the shader's horizons, and groups of places: a part of those of `laws.lit`."""
 
 
 def check(where: None, clobber: bool) -> None:
@@ -54,6 +67,10 @@ def osl_source(fabric: Fabric) -> str:
             )
     nodes = curve_nodes(fabric, DEFAULT)
     threads = fabric.thread_list
+    shadow = None
+    if law_of(fabric).absolute:
+        shadow = compile_shadow(fabric, "horizon", precision=np.float64)
+    law = surface_tables(fabric, rule=DEFAULT, shadow=shadow)
     sets = [int(k >= nodes.warp_start) for k in range(len(nodes.psi0))]
     gap = coverage(fabric).gap
     tables = [
@@ -70,13 +87,34 @@ def osl_source(fabric: Fabric) -> str:
         f"    float masking_width = {fabric.masking_width:.9g},\n",
         f"    float gap = {gap:.9g},\n",
         f"    float open = {0.0 if fabric.opaque else gap:.9g},\n",
+        f"    int law = {LAWS.index(fabric.surface_law)},\n",
+        *_unmasked(law, len(nodes.psi0)),
     ]
     text = SOURCE.read_text("utf-8")
     return text.replace("    /* tables */\n", "".join(tables))
 
 
-def _array(kind: str, name: str, values: Iterable[Any]) -> str:
+def _unmasked(law: Any, nodes: int) -> list[str]:
+    """The tables of laws that do not mask, of a single entry each where the law does."""
+    horizons, columns = np.zeros(1), 1
+    if getattr(law, "columns", 0):
+        whole = law.horizons.reshape(law.columns + 1, nodes, law.groups)[:: law.columns // COLUMNS]
+        horizons = whole.reshape(COLUMNS + 1, nodes, GROUPS, -1).mean(axis=3)
+        columns = COLUMNS
+    shape = {name: getattr(law, name, np.zeros(2)) for name in ("wide_2", "tall_2")}
+    excess = np.asarray(getattr(law, "excess", np.ones(1)))
+    return [
+        f"    int columns = {columns},\n",
+        f"    int groups = {GROUPS},\n",
+        f"    float softness = {float(getattr(law, 'softness', 1.0)):.9g},\n",
+        *(_array("float", name, values) for name, values in shape.items()),
+        _array("float", "horizons", horizons.ravel(), digits=4),
+        _array("float", "excess", excess if excess.size > 1 else np.ones(ROWS * (AROUND + 1))),
+    ]
+
+
+def _array(kind: str, name: str, values: Iterable[Any], digits: int = 9) -> str:
     # Blender treats an array of length one as a number.
-    words = [f"{v:.9g}" if kind == "float" else str(int(v)) for v in values]
+    words = [f"{v:.{digits}g}" if kind == "float" else str(int(v)) for v in values]
     words *= 2 if len(words) == 1 else 1
     return f"    {kind} {name}[{len(words)}] = {{{', '.join(words)}}},\n"

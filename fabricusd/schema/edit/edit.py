@@ -32,6 +32,7 @@ from fabricusd.schema.source import (
     preset_names,
     split_source,
     usd_errors,
+    variants_of,
 )
 from fabricusd.schema.write import EXTENSIONS, export
 from fabricusd.weaves.draft import quoted
@@ -83,6 +84,8 @@ def set_values(
     stronger layer hides, and for a fabric that could no longer be read.
     """
     path, where = split_source(source)
+    if variants_of(source):
+        raise FabricError(str(source), "chooses a variant; name it with --variant instead")
     if os.fspath(source) in preset_names() and not Path(source).exists():
         raise FabricError(
             str(source),
