@@ -14,7 +14,9 @@ from fabricusd.appearance import laws, surface
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.geometry import tubes
+from fabricusd.geometry.conserve import reflectance
 from fabricusd.geometry.judge import judge
+from fabricusd.geometry.nearest import APPEARANCE, CONSERVING, LIKE
 from fabricusd.geometry.tables import (
     AZIMUTHS,
     COUNT,
@@ -28,6 +30,7 @@ from fabricusd.geometry.tables import (
     table_names,
     views,
 )
+from fabricusd.quality.colors import delta_e_2000
 from fabricusd.schema import load, preset_names
 
 HERE = Path(__file__).resolve().parent
@@ -69,9 +72,9 @@ SKY = """
 ## A white sky
 
 Reflected of a white sky by the preset as it is, brightest channel, mean over azimuths of
-{azimuths}: tubes, law `masked`, law `projected` with the shadow `horizon`. Tubes: {count} paths
-a view, standard error below {error:.3f}. Laws with an absolute shadow stop at 1, where tubes of
-published threads go beyond.
+{azimuths}: tubes, law `masked`, the law that the preset wears with its shadow `horizon`.
+Tubes: {count} paths a view, standard error below {error:.3f}. Laws with an absolute shadow stop
+at 1, where tubes of published threads go beyond.
 
 | preset | {columns} |
 |---|{rule}"""
@@ -87,6 +90,19 @@ which the law takes to be white.
 
 | preset | angle | gap | once R | once T | R | T | law R | law T | lost |
 |---|---|---|---|---|---|---|---|---|---|"""
+
+SECOND = """
+## The presets in `conserving`
+
+`PRESET{appearance=conserving}` is a second opinion: the preset's threads under the conserving law,
+each as bright as comes nearest to the preset over the pairs above, up to an albedo of 1
+(`python -m fabricusd.geometry.conserve`). Published threads are brighter than white, so most stop
+at 1 and stay darker. *white sky* is what is reflected of one at 8°, brightest channel: preset,
+conserving. ΔE is over the pairs; with `conserving` scaled to the preset's mean, what is left is
+shape.
+
+| preset | albedos | white sky | error | ΔE | ΔE scaled |
+|---|---|---|---|---|---|"""
 
 REFUSED = """
 ## What has no geometry
@@ -151,6 +167,22 @@ def share_rows(name: str, found: Table) -> list[str]:
     return rows
 
 
+def second_row(name: str) -> str:
+    """A preset's second opinion."""
+    preset, other = load(name), load(f"{name}{{{APPEARANCE}={CONSERVING}}}")
+    here, there = reflectance(other), reflectance(preset)
+    scaled = here * (there.mean() / here.mean())
+    error = np.abs(here - there).mean() / there.mean()
+    delta, shape = (delta_e_2000(np.pi * x, np.pi * there).mean() for x in (here, scaled))
+    wo = np.array([[np.sin(np.radians(8.0)), 0.0, np.cos(np.radians(8.0))]])
+    sky = [law_shares(f, 1, wo, surface.mean_shadow(f)).max() for f in (preset, other)]
+    albedos = "; ".join(" ".join(f"{a:.2f}" for a in t.albedo) for t in other.thread_list)
+    return (
+        f"| {name} | {albedos} | {sky[0]:.2f} {sky[1]:.2f} | {error:.2f} | {delta:.1f} "
+        f"| {shape:.1f} |"
+    )
+
+
 def main() -> None:
     """Write the page."""
     found = {name: table(name) for name in table_names()}
@@ -166,8 +198,8 @@ def main() -> None:
     )  # fmt: skip
     for name, t in found.items():
         worn = [
-            by_angle(law_shares(replace(load(name), surface_law=law), 1, views(), shadow))
-            for law, shadow in (("masked", "none"), ("projected", "horizon"))
+            by_angle(law_shares(fabric, 1, views(), surface.mean_shadow(fabric)))
+            for fabric in (replace(load(name), surface_law="masked"), load(name))
         ]
         truth = by_angle(t.sky)
         bright = truth.mean(axis=0).argmax()
@@ -177,6 +209,8 @@ def main() -> None:
     lines.append(SHARES.format(shades=", ".join(f"{s:g}" for s in SHADES)))
     for name, t in found.items():
         lines += share_rows(name, t)
+    lines.append(SECOND)
+    lines += [second_row(name) for name in sorted({*found, *LIKE})]
     lines.append(REFUSED)
     for name in sorted(set(preset_names()) - set(found)):
         try:
