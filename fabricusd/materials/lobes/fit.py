@@ -27,8 +27,9 @@ SKY = 0.2
 GRAZING_SHARE = 0.25
 """Weight of the pairs of a grazing view; those of any other view have 1."""
 
-EXCESS = 60.0
-"""Delta E that is as bad as being twice as bright as the cloth in one view."""
+EXCESS, BRIGHTNESS = 15.0, 60.0
+"""Delta E that is as bad as being twice as bright as the cloth in each view, and as being twice as
+bright, or dark, in the mean over the views."""
 
 PULL = 0.02
 """Delta E that a number costs that moves by 1, so that numbers without effect stay."""
@@ -49,7 +50,7 @@ class _Problem:
         share[-len(GRAZING) :] = GRAZING_SHARE
         share /= share.sum()
         self.share_pairs = np.repeat((1.0 - SKY) * share / LIGHTS, LIGHTS)
-        self.share_sky = SKY * share
+        self.share_views, self.share_sky = share, SKY * share
 
     def _albedo(self, values: Floats) -> Floats:
         """(..., views, 3) directional albedos of (..., n, 3) values."""
@@ -64,13 +65,20 @@ class _Problem:
         )
 
     def score(self, mixture: Mixture) -> float:
-        """Mean delta E 2000, with what light too much costs."""
+        """Mean delta E 2000, with what light too much and too little costs."""
         values, _ = value_and_slopes(mixture, self.pairs.wi, self.pairs.wo, slopes=False)
         pairs, sky = self.errors(values)
-        excess = EXCESS * np.maximum(self._albedo(values) / self.sky - 1.0, 0.0)
-        return float(
-            self.share_pairs @ pairs + self.share_sky @ sky + np.sum(excess**2) / excess.size
-        )
+        excess, mean, _, _ = self._light(self._albedo(values))
+        light = float(np.sum(excess**2) + np.sum(mean**2))
+        return float(self.share_pairs @ pairs + self.share_sky @ sky) + light
+
+    def _light(self, albedo: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Residuals of (views, 3) albedos: excess in each view, (3,) of the mean; their slopes."""
+        scale = EXCESS / np.sqrt(len(albedo)) / self.sky.max(axis=1, keepdims=True)
+        off = albedo - self.sky
+        over = np.where(off > 0.0, scale, 0.0)
+        even = BRIGHTNESS * self.share_views / (self.share_views @ self.sky).max()
+        return off * over, even @ off, over, even
 
     def solve(self, start: Mixture, steps: int, *, evened: bool) -> Mixture:
         """Improve a mixture; `evened` turns the sum of squares into a sum."""
@@ -113,17 +121,14 @@ class _Problem:
         js = np.einsum(
             "nij,mnj->nim", by_albedo * less_sky[:, None, None], albedo_slopes, optimize=True
         )
-        ratio = EXCESS / np.sqrt(albedo.size) / self.sky
-        over = albedo > self.sky
-        re = np.where(over, (albedo - self.sky) * ratio, 0.0)
-        je = np.where(over, ratio, 0.0) * albedo_slopes
+        excess, mean, over, even = self._light(albedo)
         m = len(slopes)
-        residuals = np.concatenate(
-            ((r * less[:, None]).ravel(), (rs * less_sky[:, None]).ravel(), re.ravel())
-        )
-        return residuals, np.concatenate(
-            (j.reshape(-1, m), js.reshape(-1, m), je.reshape(m, -1).T)
-        )
+        residuals = (r * less[:, None], rs * less_sky[:, None], excess, mean)
+        by_number = (
+            j.reshape(-1, m), js.reshape(-1, m), (over * albedo_slopes).reshape(m, -1).T,
+            np.einsum("v,mvc->cm", even, albedo_slopes),
+        )  # fmt: skip
+        return np.concatenate([one.ravel() for one in residuals]), np.concatenate(by_number)
 
 
 def fit(fabric: Fabric, count: int, form: str = CYCLES) -> Mixture:
