@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.materials.lobes.colors import Colors
 from fabricusd.materials.lobes.mixture import CYCLES, Mixture
@@ -21,13 +22,19 @@ from fabricusd.quality.colors import delta_e_2000
 
 Floats = NDArray[np.float64]
 
+COUNT, COUNTS = 4, (1, 2, 3, 4, 5, 6)
+"""Number of lobes unless another is asked for, and the numbers that may be."""
+
 SKY = 0.2
 """Weight of the views under an even sky; the pairs have the rest."""
+
+DARKEST = 1e-4
+"""Albedo below which nothing is a share of the cloth's."""
 
 GRAZING_SHARE = 0.25
 """Weight of the pairs of a grazing view; those of any other view have 1."""
 
-EXCESS, BRIGHTNESS = 15.0, 60.0
+EXCESS, BRIGHTNESS = 15.0, 20.0
 """Delta E that is as bad as being twice as bright as the cloth in each view, and as being twice as
 bright, or dark, in the mean over the views."""
 
@@ -64,6 +71,12 @@ class _Problem:
             delta_e_2000(self._albedo(values), self.sky),
         )
 
+    def delta_e(self, mixture: Mixture) -> float:
+        """Mean delta E 2000 of the pairs of views that are not grazing."""
+        values, _ = value_and_slopes(mixture, self.pairs.wi, self.pairs.wo, slopes=False)
+        steep = len(values) - len(GRAZING) * LIGHTS
+        return float(self.errors(values)[0][:steep].mean())
+
     def score(self, mixture: Mixture) -> float:
         """Mean delta E 2000, with what light too much and too little costs."""
         values, _ = value_and_slopes(mixture, self.pairs.wi, self.pairs.wo, slopes=False)
@@ -74,10 +87,11 @@ class _Problem:
 
     def _light(self, albedo: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Residuals of (views, 3) albedos: excess in each view, (3,) of the mean; their slopes."""
-        scale = EXCESS / np.sqrt(len(albedo)) / self.sky.max(axis=1, keepdims=True)
+        scale = EXCESS / np.sqrt(len(albedo))
+        scale = scale / np.maximum(self.sky.max(axis=1, keepdims=True), DARKEST)
         off = albedo - self.sky
         over = np.where(off > 0.0, scale, 0.0)
-        even = BRIGHTNESS * self.share_views / (self.share_views @ self.sky).max()
+        even = BRIGHTNESS * self.share_views / max((self.share_views @ self.sky).max(), DARKEST)
         return off * over, even @ off, over, even
 
     def solve(self, start: Mixture, steps: int, *, evened: bool) -> Mixture:
@@ -131,22 +145,38 @@ class _Problem:
         return np.concatenate([one.ravel() for one in residuals]), np.concatenate(by_number)
 
 
-def fit(fabric: Fabric, count: int, form: str = CYCLES) -> Mixture:
-    """Return the mixture of `count` lobes in `form` that is nearest to `fabric`."""
+def fit(
+    fabric: Fabric, count: int = COUNT, form: str = CYCLES, *, max_error: float | None = None
+) -> Mixture:
+    """Return the mixture of `count` lobes in `form` that is nearest to `fabric`.
+
+    max_error : mean delta E 2000 that fewer lobes may have; None takes `count` of them
+    """
     problem = _Problem(fitted_pairs(fabric))
-    return _found(problem, starts(fabric, count, form))
+    fewer = range(1, count) if max_error is not None else ()
+    for few in fewer:
+        found = _found(problem, starts(fabric, few, form))
+        if found is not None and problem.delta_e(found) <= (max_error or 0.0):
+            return found
+    found = _found(problem, starts(fabric, count, form))
+    if found is None:
+        raise FabricError("lobes", f"is {count}; it must be one of {COUNTS[0]} to {COUNTS[-1]}")
+    return found
 
 
 def refit(fabric: Fabric, mixture: Mixture) -> Mixture:
     """Return the mixture nearest to `fabric` that a solver finds from `mixture`."""
-    return _found(_Problem(fitted_pairs(fabric)), [mixture])
+    found = _found(_Problem(fitted_pairs(fabric)), [mixture])
+    assert found is not None
+    return found
 
 
-def _found(problem: _Problem, begun: list[Mixture]) -> Mixture:
+def _found(problem: _Problem, begun: list[Mixture]) -> Mixture | None:
+    """Return the best of what is found from each of `begun`; None if there is nothing to begin."""
     tried = [problem.solve(one, FIRST, evened=False) for one in begun]
     kept = sorted(tried, key=problem.score)[:KEPT]
     best = [_rounds(problem, one) for one in kept]
-    return min(best, key=problem.score)
+    return min(best, key=problem.score, default=None)
 
 
 def _rounds(problem: _Problem, mixture: Mixture) -> Mixture:

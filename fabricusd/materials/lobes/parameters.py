@@ -72,7 +72,7 @@ def unpack(x: Floats, like: Mixture) -> Mixture:
         v = [float(t) for t in x[k * PER_LOBE : (k + 1) * PER_LOBE]]
         lobes.append(
             replace(
-                one, tilt=v[0], alpha_along=math.exp(v[1]), alpha_across=math.exp(v[2]),
+                one, tilt=v[0] if one.tilt else 0.0, alpha_along=math.exp(v[1]), alpha_across=math.exp(v[2]),
                 color=(math.exp(v[3]), math.exp(v[4]), math.exp(v[5])),
                 facing=v[6], crossing=v[7], upright=v[8],
             )
@@ -101,6 +101,23 @@ def bounds(mixture: Mixture) -> tuple[Floats, Floats]:
 
 def _logs(color: Sequence[float]) -> list[float]:
     return [_LOG(max(c, DARK)) for c in color]
+
+
+def at_bounds(mixture: Mixture) -> list[str]:
+    """Name the numbers of a mixture that are at a bound, where the bound is not simply none."""
+    low, high = bounds(mixture)
+    x, names = pack(mixture), []
+    for k in range(len(mixture.lobes)):
+        names += [f"{name} of lobe {k}" for name in NAMES]
+    names += TAIL_NAMES
+    none = low == _LOG(DARK)
+    at_low, at_high = (x < low + 1e-6) & ~none, x > high - 1e-6
+    upright = np.array([name.startswith("tilt") for name in names]) & (high - low < 1e-6)
+    return [
+        f"{name} is at its {'least' if least else 'greatest'}"
+        for name, least, most, held in zip(names, at_low, at_high, upright, strict=True)
+        if (least or most) and not held
+    ]
 
 
 def value_and_slopes(

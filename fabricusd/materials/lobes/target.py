@@ -17,11 +17,11 @@ VIEWS, LIGHTS, LOWEST = 28, 192, 81.0
 """Views down to LOWEST degrees, and lights for each of them, both uniform in solid angle. The
 lights of each view are turned, so that no two views see the same ones."""
 
-GRAZING = (84.0, 84.0, 87.0, 87.0, 89.0, 89.0)
+GRAZING = (84.0, 86.5, 89.0) * 4
 """Further views [degrees], which keep a mixture from growing bright where no pair would show it."""
 
 _TURN = 0.5 * (np.sqrt(5.0) - 1.0)
-"""Of the lights of successive views, in whole turns; the golden ratio spreads them evenly."""
+"""Of successive views, and of their lights, in whole turns; the golden ratio spreads them evenly."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,7 +48,7 @@ def fitted_directions() -> tuple[Floats, Floats]:
     """(n, 3) wi and wo of the pairs."""
     steep = hemisphere(VIEWS, float(np.cos(np.radians(LOWEST))))
     polar = np.radians(GRAZING)
-    turn = 0.3 + 2.4 * np.arange(len(GRAZING))
+    turn = 2.0 * np.pi * (0.06 + _TURN * np.arange(len(GRAZING)))
     flat = np.stack((np.cos(turn), np.sin(turn)), axis=1) * np.sin(polar)[:, None]
     views = np.concatenate((steep, np.column_stack((flat, np.cos(polar)))))
     lights = hemisphere(LIGHTS)
