@@ -20,7 +20,7 @@ from materialx_values import generated, values_of, with_library
 
 from fabricusd.materials.lobes.known import mixture_of
 from fabricusd.materials.lobes.mixture import MATERIALX
-from fabricusd.materials.networks.lobes import lobes
+from fabricusd.materials.lobes.network import lobes
 from fabricusd.materials.targets.mtlx import write_mtlx
 from fabricusd.schema import load
 

@@ -12,7 +12,8 @@ import numpy as np
 from fabricusd.errors import FabricError
 from fabricusd.images.files import read_mip_level, write_png
 from fabricusd.materials.bake_folder import BakedLay, BakeFolder, MapSet
-from fabricusd.materials.fit.fit import Fitted, fit, fit_threads, thread_factors, with_threads
+from fabricusd.materials.fit.fit import Fitted, bounds_met, thread_factors, with_threads
+from fabricusd.materials.fit.keep import kept_fit, kept_fit_threads
 from fabricusd.materials.fit.texels import draw_texels, mean_texel
 from fabricusd.materials.fit.thread_maps import COLUMNS, Factors, write_thread_maps
 from fabricusd.materials.lobes.fit import COUNT
@@ -21,7 +22,7 @@ from fabricusd.materials.lobes.mixture import MATERIALX, Mixture
 from fabricusd.materials.lobes.parameters import at_bounds
 from fabricusd.materials.networks.graph import Graph, Texture, Value, unrolled
 from fabricusd.materials.networks.hair import hair
-from fabricusd.materials.networks.lobes import lobes
+from fabricusd.materials.lobes.network import lobes
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import (
     GRAPHS,
@@ -128,9 +129,7 @@ def recipes(
                 ("procedural", means, {**of_means, **dark}),
             ):
                 title = name if variant == "baked" else f"{name}_plain"
-                graphs = {
-                    s: _graph(s, inputs, opaque, lay, mixture) for s in settings.surfaces
-                }
+                graphs = {s: _graph(s, inputs, opaque, lay, mixture) for s in settings.surfaces}
                 found[maps.name, number, variant] = material_recipe(
                     title, graphs, plain, looks, opaque
                 )
@@ -289,22 +288,25 @@ def _looks(
             made.notes.append(note)
         return plain, {}
 
-    def fitting(what: str) -> None:
-        if progress:
-            progress(f"fitting {what} to {lay.name} on {maps.name}")
+    where, fabric = f"{maps.name} {lay.name}", lay.fabric
+
+    def waiting(what: str) -> Callable[[], None]:
+        line = f"fitting {what} to {lay.name} on {maps.name}"
+        return lambda: progress(line) if progress else None
 
     factors: Factors = {}
     own = texels
     if texels.threads:
-        fitting("threads")
-        threads = fit_threads(texels, lay.fabric)
+        threads = kept_fit_threads(texels, fabric, waiting=waiting("threads"))
         looks = {one: fitted.look for one, fitted in threads.items()}
         own, factors = with_threads(texels, looks), thread_factors(looks, texels.shares)
-        made.threads[f"{maps.name} {lay.name}"] = threads
+        made.threads[where] = threads
     found = {}
     for kind in kinds:
-        fitting(kind)
         takes = texels if kind == "preview" else own
-        found[kind] = fit(kind, takes, lay.fabric, baked=texels)
-    made.fits[f"{maps.name} {lay.name}"] = found
+        found[kind] = kept_fit(kind, takes, fabric, baked=texels, waiting=waiting(kind))
+        made.remarks += [
+            f"{kind} of {where}: {told}" for told in bounds_met(kind, found[kind].look)
+        ]
+    made.fits[where] = found
     return plain | {kind: one.look for kind, one in found.items()}, factors

@@ -177,9 +177,7 @@ def sheen_value(roughness: float, wi: Floats, wo: Floats) -> Floats:
     return np.where((wi[..., 2] > 0) & (wo[..., 2] > 0), albedo * value, 0.0)
 
 
-def _zeltner(
-    roughness: Floats, wi: Floats, wo: Floats, cos_o: Floats
-) -> tuple[Floats, Floats]:
+def _zeltner(roughness: Floats, wi: Floats, wo: Floats, cos_o: Floats) -> tuple[Floats, Floats]:
     """(...) directional albedo, and the distribution of the light that it reflects, to light wi."""
     x, y = cos_o, np.clip(roughness, 0.01, 1.0)
     sigma = y * (0.0206607 + 1.58491 * y) / (0.0379424 + y * (1.32227 + y))

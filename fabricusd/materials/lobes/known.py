@@ -88,12 +88,13 @@ def in_form(mixture: Mixture, form: str) -> Mixture:
 
 def from_dict(said: Mapping[str, Any]) -> Mixture:
     """Return a mixture that `dataclasses.asdict` took apart."""
-    values = {k: tuple(v) if isinstance(v, list) else v for k, v in said.items()}
-    values["lobes"] = tuple(
-        Lobe(**{k: tuple(v) if isinstance(v, list) else v for k, v in dict(one).items()})
-        for one in said["lobes"]
-    )
+    values: dict[str, Any] = _with_tuples(said)
+    values["lobes"] = tuple(Lobe(**_with_tuples(one)) for one in said["lobes"])
     return Mixture(**values)
+
+
+def _with_tuples(said: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in said.items()}
 
 
 def add_rows(rows: list[dict[str, Any]], path: Path = TABLE) -> None:

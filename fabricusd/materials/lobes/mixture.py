@@ -135,9 +135,7 @@ def reflected(
 def weight(lobe: Lobe, one: Reflected, wo: Floats) -> Floats:
     """(n,) the factor W of a lobe."""
     upright = np.maximum(wo[:, 2], UPRIGHT)
-    return np.asarray(
-        one.facing**lobe.facing * one.crossing**lobe.crossing * upright**lobe.upright
-    )
+    return np.asarray(one.facing**lobe.facing * one.crossing**lobe.crossing * upright**lobe.upright)
 
 
 def evaluate(mixture: Mixture, wi: Floats, wo: Floats) -> Floats:

@@ -72,7 +72,8 @@ def unpack(x: Floats, like: Mixture) -> Mixture:
         v = [float(t) for t in x[k * PER_LOBE : (k + 1) * PER_LOBE]]
         lobes.append(
             replace(
-                one, tilt=v[0] if one.tilt else 0.0, alpha_along=math.exp(v[1]), alpha_across=math.exp(v[2]),
+                one, tilt=v[0] if one.tilt else 0.0,
+                alpha_along=math.exp(v[1]), alpha_across=math.exp(v[2]),
                 color=(math.exp(v[3]), math.exp(v[4]), math.exp(v[5])),
                 facing=v[6], crossing=v[7], upright=v[8],
             )

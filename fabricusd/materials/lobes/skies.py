@@ -25,7 +25,7 @@ def directions() -> Floats:
 
 def _overcast(w: Floats) -> Floats:
     """CIE's overcast sky, three times as bright overhead as at the horizon."""
-    return 1.0 + 2.0 * w[:, 2]
+    return np.asarray(1.0 + 2.0 * w[:, 2])
 
 
 def _window(w: Floats) -> Floats:
@@ -38,7 +38,7 @@ def _clear(w: Floats) -> Floats:
     to_sun = _cosine(w, 35.0, 110.0)
     away = np.arccos(np.clip(to_sun, -1.0, 1.0))
     blue = 0.5 / (0.3 + w[:, 2]) * (1.0 + 4.0 * np.exp(-3.0 * away))
-    return blue + 60.0 * (to_sun > np.cos(np.radians(5.0)))
+    return np.asarray(blue + 60.0 * (to_sun > np.cos(np.radians(5.0))))
 
 
 SKIES: dict[str, Callable[[Floats], Floats]] = {

@@ -39,7 +39,7 @@ def starts(fabric: Fabric, count: int, form: str) -> list[Mixture]:
             width = float(np.mean([t.gamma_surface for t in threads]))
             shapes = list(_shapes(nodes.psi0[mine], nodes.weight[mine], count))
             choices.append([(along, width, s) for s in (*shapes, ())])
-    found = {}
+    found: dict[Mixture, None] = {}
     for chosen in product(*choices):
         lobes = tuple(
             _lobe(along, width, tilt, paired, wide)
@@ -74,7 +74,9 @@ def _shapes(psi: Floats, share: Floats, most: int) -> Iterator[tuple[Shape, ...]
         yield (one, level, level)
         return
     for groups in range(1, most + 1):
-        edges = np.quantile(psi, (np.arange(groups) + 0.5) / groups, weights=share, method="inverted_cdf")
+        edges = np.quantile(
+            psi, (np.arange(groups) + 0.5) / groups, weights=share, method="inverted_cdf"
+        )
         yield tuple((float(np.clip(t, -STEEPEST, STEEPEST)), False) for t in edges)
 
 

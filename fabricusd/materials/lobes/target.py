@@ -21,7 +21,7 @@ GRAZING = (84.0, 86.5, 89.0) * 4
 """Further views [degrees], which keep a mixture from growing bright where no pair would show it."""
 
 _TURN = 0.5 * (np.sqrt(5.0) - 1.0)
-"""Of successive views, and of their lights, in whole turns; the golden ratio spreads them evenly."""
+"""Of successive views, and of their lights, in whole turns: the golden ratio spreads them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

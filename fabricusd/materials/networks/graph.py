@@ -114,7 +114,7 @@ def unrolled(graph: Graph) -> Graph:
         if definition is None:
             nodes.append(replace(node, inputs=_rewired(node.inputs, ends)))
             continue
-        outside = definition.inputs | _rewired(node.inputs, ends)
+        outside: dict[str, Source] = {**definition.inputs, **_rewired(node.inputs, ends)}
         for inner in definition.nodes:
             inputs: dict[str, Source] = {}
             for name, source in inner.inputs.items():

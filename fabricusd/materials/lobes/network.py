@@ -97,7 +97,9 @@ def _axes(b: Builder, matrix: Floats) -> tuple[Link, Link]:
 def _diffuse(b: Builder, mixture: Mixture, normal: Link, upright: Link) -> Link:
     least = b.math("diffuse_cosine", "max", "float", upright, one(EVEN))
     power = b.math("diffuse_power", "power", "float", least, one(mixture.diffuse_power))
-    color = b.math("diffuse_color", "multiply", "color3", _color(mixture.diffuse), power, short=True)
+    color = b.math(
+        "diffuse_color", "multiply", "color3", _color(mixture.diffuse), power, short=True
+    )
     return b.add(
         "diffuse", "oren_nayar_diffuse_bsdf", "BSDF", "ND_oren_nayar_diffuse_bsdf",
         color=color, normal=normal,
@@ -137,9 +139,13 @@ def _definition() -> Definition:
     def scaled(name: str, vector: Source, by: Source) -> Link:
         return b.math(name, "multiply", "vector3", vector, by, short=True)
 
-    n = _unit(b, "n", b.math("n_sum", "add", "vector3", scaled("n_a", axis, s), scaled("n_n", normal, c)))
+    n = _unit(
+        b, "n", b.math("n_sum", "add", "vector3", scaled("n_a", axis, s), scaled("n_n", normal, c))
+    )
     t = _unit(
-        b, "t", b.math("t_sum", "subtract", "vector3", scaled("t_a", axis, c), scaled("t_n", normal, s))
+        b,
+        "t",
+        b.math("t_sum", "subtract", "vector3", scaled("t_a", axis, c), scaled("t_n", normal, s)),
     )
     no, to, up = (_dot(b, name, eye, v) for name, v in (("no", n), ("to", t), ("up", normal)))
     flat = b.math("to_square", "multiply", "float", to, to)
