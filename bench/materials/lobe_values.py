@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
 
 import MaterialX as mx
@@ -28,7 +29,8 @@ PAIRS = 48
 PRESETS = (("silk_shot", 6), ("velvet", 4), ("linen_plain", 4))
 
 MATRIX = ((30.0, 12.0), (-16.0, 40.0))
-"""From texture coordinates to threads: turned, and of another density in each set."""
+"""From texture coordinates to threads: turned, and of another density in each set. The threads stay
+at a right angle."""
 
 
 def shader(graph):
@@ -42,10 +44,7 @@ def shader(graph):
 
 
 def turned(w):
-    """(n, 3) directions on a mesh whose tangents are x and y, from those along the threads.
-
-    Weft and warp are held at a right angle by what is baked, so only the turn of the weft counts.
-    """
+    """(n, 3) directions on a mesh whose tangents are x and y, from those along the threads."""
     u = np.array(MATRIX[0]) / np.hypot(*MATRIX[0])
     return w @ np.array([[u[0], u[1], 0.0], [-u[1], u[0], 0.0], [0.0, 0.0, 1.0]])
 
@@ -60,8 +59,11 @@ def main() -> None:
         mixture = mixture_of(load(name), count, MATERIALX)
         graph = lobes({}, True, mixture, np.array(MATRIX))
         values = values_of(*shader(graph), turned(w[0]), turned(w[1]))
-        rows.append({"preset": name, "lobes": count, "values": values})
-    said = {"materialx": mx.__version__, "wi": w[0].tolist(), "wo": w[1].tolist(), "rows": rows}
+        rows.append({"preset": name, "mixture": asdict(mixture), "values": values})
+    said = {
+        "materialx": mx.__version__, "matrix": MATRIX, "wi": w[0].tolist(), "wo": w[1].tolist(),
+        "rows": rows,
+    }  # fmt: skip
     Path(sys.argv[1]).write_text(json.dumps(said) + "\n")
 
 

@@ -19,10 +19,10 @@ from fabricusd.materials.fit.thread_maps import COLUMNS, Factors, write_thread_m
 from fabricusd.materials.lobes.fit import COUNT
 from fabricusd.materials.lobes.known import mixture_of
 from fabricusd.materials.lobes.mixture import MATERIALX, Mixture
+from fabricusd.materials.lobes.network import lobes
 from fabricusd.materials.lobes.parameters import at_bounds
 from fabricusd.materials.networks.graph import Graph, Texture, Value, unrolled
 from fabricusd.materials.networks.hair import hair
-from fabricusd.materials.lobes.network import lobes
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import (
     GRAPHS,

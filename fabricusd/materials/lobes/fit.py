@@ -46,7 +46,7 @@ FIRST, KEPT, MORE, ROUNDS = 8, 3, 25, 4
 """Steps from each start, starts that are kept, steps in each round, and rounds."""
 
 
-class _Problem:
+class Problem:
     """Residuals of mixtures against the pairs of one fabric, and their derivatives."""
 
     def __init__(self, pairs: Pairs) -> None:
@@ -82,9 +82,17 @@ class _Problem:
         """Mean delta E 2000, with what light too much and too little costs."""
         values, _ = value_and_slopes(mixture, self.pairs.wi, self.pairs.wo, slopes=False)
         pairs, sky = self.errors(values)
-        excess, mean, _, _ = self._light(self._albedo(values))
-        light = float(np.sum(excess**2) + np.sum(mean**2))
+        light = self._light_cost(values)
         return float(self.share_pairs @ pairs + self.share_sky @ sky) + light
+
+    def light(self, mixture: Mixture) -> float:
+        """What light too much and too little costs."""
+        values, _ = value_and_slopes(mixture, self.pairs.wi, self.pairs.wo, slopes=False)
+        return self._light_cost(values)
+
+    def _light_cost(self, values: Floats) -> float:
+        excess, mean, _, _ = self._light(self._albedo(values))
+        return float(np.sum(excess**2) + np.sum(mean**2))
 
     def _light(self, albedo: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Residuals of (views, 3) albedos: excess in each view, (3,) of the mean; their slopes."""
@@ -152,8 +160,12 @@ def fit(
     """Return the mixture of `count` lobes in `form` that is nearest to `fabric`.
 
     max_error : mean delta E 2000 that fewer lobes may have; None takes `count` of them
+
+    Raises FabricError for a number of lobes out of COUNTS, and for a fabric without threads.
     """
-    problem = _Problem(fitted_pairs(fabric))
+    if count not in COUNTS:
+        raise FabricError("lobes", f"is {count}; it must be from {COUNTS[0]} to {COUNTS[-1]}")
+    problem = Problem(fitted_pairs(fabric))
     fewer = range(1, count) if max_error is not None else ()
     for few in fewer:
         found = _found(problem, starts(fabric, few, form))
@@ -161,18 +173,18 @@ def fit(
             return found
     found = _found(problem, starts(fabric, count, form))
     if found is None:
-        raise FabricError("lobes", f"is {count}; it must be one of {COUNTS[0]} to {COUNTS[-1]}")
+        raise FabricError(f"fabric '{fabric.name}'", f"has no threads for {count} lobes")
     return found
 
 
 def refit(fabric: Fabric, mixture: Mixture) -> Mixture:
     """Return the mixture nearest to `fabric` that a solver finds from `mixture`."""
-    found = _found(_Problem(fitted_pairs(fabric)), [mixture])
+    found = _found(Problem(fitted_pairs(fabric)), [mixture])
     assert found is not None
     return found
 
 
-def _found(problem: _Problem, begun: list[Mixture]) -> Mixture | None:
+def _found(problem: Problem, begun: list[Mixture]) -> Mixture | None:
     """Return the best of what is found from each of `begun`; None if there is nothing to begin."""
     tried = [problem.solve(one, FIRST, evened=False) for one in begun]
     kept = sorted(tried, key=problem.score)[:KEPT]
@@ -180,7 +192,7 @@ def _found(problem: _Problem, begun: list[Mixture]) -> Mixture | None:
     return min(best, key=problem.score, default=None)
 
 
-def _rounds(problem: _Problem, mixture: Mixture) -> Mixture:
+def _rounds(problem: Problem, mixture: Mixture) -> Mixture:
     best, score = mixture, problem.score(mixture)
     for _ in range(ROUNDS):
         # Least squares favours the worst pairs. Reweighting [Holland1977] turns it to the mean.

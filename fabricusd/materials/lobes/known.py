@@ -100,10 +100,15 @@ def _with_tuples(said: Mapping[str, Any]) -> dict[str, Any]:
 def add_rows(rows: list[dict[str, Any]], path: Path = TABLE) -> None:
     """Write rows to the table, in place of those of the same names and laws."""
     mine = {(one["name"], one["law"]) for one in rows}
-    others = json.loads(path.read_text("utf-8"))["rows"] if path.exists() else []
+    others = read_rows(path) if path.exists() else []
     both = [one for one in others if (one["name"], one["law"]) not in mine] + rows
     write_json(path, {"rows": sorted(both, key=lambda one: (one["name"], one["law"]))})
     _table.cache_clear()
+
+
+def read_rows(path: Path = TABLE) -> list[dict[str, Any]]:
+    """Return the rows of the table."""
+    return list(json.loads(path.read_text("utf-8"))["rows"])
 
 
 def row_of(name: str, fabric: Fabric, mixtures: list[Mixture]) -> dict[str, Any]:
@@ -129,9 +134,7 @@ def _count(held: Mapping[str, Any]) -> int:
 
 @lru_cache(maxsize=1)
 def _table() -> list[dict[str, Any]]:
-    if not TABLE.exists():
-        return []
-    return list(json.loads(TABLE.read_text("utf-8"))["rows"])
+    return read_rows() if TABLE.exists() else []
 
 
 @lru_cache(maxsize=1)

@@ -30,7 +30,7 @@ def _overcast(w: Floats) -> Floats:
 
 def _window(w: Floats) -> Floats:
     """A soft box 40 degrees wide, 50 degrees high, which gives most of the light of a dim room."""
-    return 0.08 + (_cosine(w, 50.0, 25.0) > np.cos(np.radians(20.0)))
+    return np.asarray(0.08 + (_cosine(w, 50.0, 25.0) > np.cos(np.radians(20.0))))
 
 
 def _clear(w: Floats) -> Floats:
