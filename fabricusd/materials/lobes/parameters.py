@@ -112,6 +112,9 @@ def at_bounds(mixture: Mixture) -> list[str]:
         names += [f"{name} of lobe {k}" for name in NAMES]
     names += TAIL_NAMES
     none = low == _LOG(DARK)
+    # Neither the roughness nor the power of what is not there matters.
+    none[-1] = max(mixture.sheen) <= 2.0 * DARK
+    none[-5] = max(mixture.diffuse) <= 2.0 * DARK
     at_low, at_high = (x < low + 1e-6) & ~none, x > high - 1e-6
     upright = np.array([name.startswith("tilt") for name in names]) & (high - low < 1e-6)
     return [
