@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.cache import kept
-from fabricusd.fabric import Fabric
+from fabricusd.fabric import Fabric, Weave
 from fabricusd.kernels.cache import fingerprint
 from fabricusd.materials.fit.fit import Fitted, fit, fit_threads
 from fabricusd.materials.fit.target import TexelSample
@@ -62,12 +62,18 @@ def _fitted(said: dict[str, Any]) -> Fitted:
 
 def _key(texels: TexelSample) -> tuple[object, ...]:
     # Sums of arrays differ in their last digit with the place of the arrays in memory.
-    return tuple(np.round(np.asarray(getattr(texels, one.name)), 7) for one in fields(texels))
+    return tuple(np.round(np.atleast_1d(getattr(texels, one.name)), 7) for one in fields(texels))
 
 
 def _cloth(fabric: Fabric) -> tuple[object, ...]:
-    # The text of a large array leaves out its middle.
-    return repr(fabric), fabric.weave.cells
+    # colour-science changes how NumPy prints its numbers, and a fit imports it.
+    with np.printoptions(legacy=False):
+        said = repr(replace(fabric, weave=_ANY_WEAVE, back=None))
+    return said, fabric.weave.cells
+
+
+_ANY_WEAVE = Weave(np.eye(2, dtype=bool))
+"""Stands for a weave, whose text would leave out the middle of a large array."""
 
 
 @lru_cache(maxsize=1)
