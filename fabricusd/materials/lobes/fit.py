@@ -36,8 +36,8 @@ GRAZING_SHARE = 0.25
 
 EXCESS, BRIGHTNESS = 5.0, 10.0
 """Delta E that is as bad as being twice as bright as the cloth in each view, and as being twice as
-bright, or dark, in the mean over the views. With three times these, the presets are at most 14 %
-and not 23 % brighter than the cloth in any view, and 0.1 to 0.2 delta E farther from it."""
+bright, or dark, in the mean over the views. With three times these, six lobes of the presets are at
+most 14 and not 23 % brighter than the cloth in any view, and 0.1 to 0.2 delta E farther from it."""
 
 PULL = 0.02
 """Delta E that a number costs that moves by 1, so that numbers without effect stay."""
