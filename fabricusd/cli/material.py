@@ -38,12 +38,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "(default: openpbr)",
     )
     parser.add_argument(
-        "--lobes", type=int, default=4, metavar="N",
+        "--lobes",
+        type=int,
+        default=4,
+        metavar="N",
         help="number of lobes of the surface 'lobes', 1 to 6 (default: 4)",
     )
     parser.add_argument(
-        "--max-error", type=float, metavar="E",
-        help="fewer lobes where their mean delta E 2000 is at most E",
+        "--max-error",
+        type=float,
+        metavar="E",
+        help="fewer lobes where their mean delta E 2000 is at most E (default: N lobes)",
     )
     for target in TARGETS:
         given: dict[str, Any] = {"metavar": target.metavar}
