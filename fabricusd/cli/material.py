@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from fabricusd.cli.arguments.number import number
 from fabricusd.materials.targets import TARGETS
 
 EPILOG = """example:
@@ -39,14 +40,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--lobes",
-        type=int,
+        type=number("lobes"),
         default=4,
         metavar="N",
         help="number of lobes of the surface 'lobes', 1 to 6 (default: 4)",
     )
     parser.add_argument(
         "--max-error",
-        type=float,
+        type=number("max_error"),
         metavar="E",
         help="fewer lobes where their mean delta E 2000 is at most E (default: N lobes)",
     )

@@ -18,13 +18,13 @@ from fabricusd.fabric import Fabric
 from fabricusd.files import remove_partial_files, write_json
 from fabricusd.materials.bake_folder import BakeFolder, read_bake_folder
 from fabricusd.materials.bound_prims import BoundScene, find_bound_prims
-from fabricusd.materials.lobes.fit import COUNTS
 from fabricusd.materials.networks.surfaces import GRAPHS, MAPS
 from fabricusd.materials.recipes import OF_THREADS, Progress, Settings, Written, recipes
 from fabricusd.materials.targets import Job, chosen
 from fabricusd.materials.targets.layer import write_baked_look, write_scene_look
 from fabricusd.materials.targets.mtlx import write_mtlx
 from fabricusd.materials.targets.paths import asset_path
+from fabricusd.ranges import RANGES
 
 
 def write_materials(
@@ -156,14 +156,9 @@ def _check_surfaces(folder: BakeFolder, settings: Settings) -> None:
             )
     if "lobes" in settings.surfaces and not settings.fitted:
         raise FabricError("surface 'lobes'", "is fitted; it cannot be written with --no-fit")
-    if settings.lobes not in COUNTS:
-        raise FabricError(
-            "lobes", f"is {settings.lobes}; it must be from {COUNTS[0]} to {COUNTS[-1]}"
-        )
-    if settings.max_error is not None and not settings.max_error > 0.0:
-        raise FabricError(
-            "max-error", f"is {settings.max_error}; it must be a delta E 2000 above 0"
-        )
+    RANGES["lobes"].require("lobes", settings.lobes)
+    if settings.max_error is not None:
+        RANGES["max_error"].require("max_error", settings.max_error)
 
 
 def _fabrics(folder: BakeFolder) -> dict[str, Fabric]:

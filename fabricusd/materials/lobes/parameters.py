@@ -44,6 +44,9 @@ _LOG = math.log
 DARK = 1e-5
 """Least of a colour: as good as none."""
 
+ABSENT = 1e-3
+"""Largest channel of a part that does not show, and whose other numbers do not matter."""
+
 LOBE_BOUNDS = (
     (-1.5, 1.5), (_LOG(0.015), 0.0), (_LOG(0.015), 0.0),
     *((_LOG(DARK), _LOG(30.0)),) * 3,
@@ -111,15 +114,14 @@ def at_bounds(mixture: Mixture) -> list[str]:
     for k in range(len(mixture.lobes)):
         names += [f"{name} of lobe {k}" for name in NAMES]
     names += TAIL_NAMES
-    none = low == _LOG(DARK)
-    # Neither the roughness nor the power of what is not there matters.
-    none[-1] = max(mixture.sheen) <= 2.0 * DARK
-    none[-5] = max(mixture.diffuse) <= 2.0 * DARK
-    at_low, at_high = (x < low + 1e-6) & ~none, x > high - 1e-6
-    upright = np.array([name.startswith("tilt") for name in names]) & (high - low < 1e-6)
+    # Neither the roughness nor the power of what is not there matters, and a level tilt is fixed.
+    fixed = high - low < 1e-6
+    fixed[-1] = max(mixture.sheen) <= ABSENT
+    fixed[-5] = max(mixture.diffuse) <= ABSENT
+    at_low, at_high = (x < low + 1e-6) & (low != _LOG(DARK)), x > high - 1e-6
     return [
         f"{name} is at its {'least' if least else 'greatest'}"
-        for name, least, most, held in zip(names, at_low, at_high, upright, strict=True)
+        for name, least, most, held in zip(names, at_low, at_high, fixed, strict=True)
         if (least or most) and not held
     ]
 

@@ -67,8 +67,11 @@ def test_alone_the_lobes_are_the_network_in_usd(shirt, tmp_path, quick):
 @pytest.mark.parametrize(
     ("settings", "told"),
     [
-        (Settings(surfaces=("lobes",), lobes=7), "lobes is 7; it must be from 1 to 6"),
-        (Settings(surfaces=("lobes",), max_error=0.0), "max-error is 0.0; it must be a delta E"),
+        (
+            Settings(surfaces=("lobes",), lobes=7),
+            "lobes is 7; it must be a whole number from 1 to 6",
+        ),
+        (Settings(surfaces=("lobes",), max_error=0.0), "max_error is 0; it must be above 0"),
         (Settings(surfaces=("lobes",), fitted=False), "cannot be written with --no-fit"),
     ],
 )
