@@ -76,6 +76,7 @@ RANGES = {
     "figure_picks": Range(low=1, high=16384, whole=True, unit="picks"),
     "longest_float": Range(low=2, high=16384, whole=True, unit="threads"),
     "difference": Range(low=0, high=1000),
+    "lobes": Range(low=1, high=6, whole=True),
     "paths": Range(low=64, high=2**20, whole=True, unit="paths a direction"),
     "significance": Range(low=0, high=0.5, above=True),
 }

@@ -64,10 +64,16 @@ def inputs_of(kind, s):
     }  # fmt: skip
 
 
+def with_library():
+    """A document that holds MaterialX's own definitions."""
+    document = mx.createDocument()
+    mx.loadLibraries(mx.getDefaultDataLibraryFolders(), mx.getDefaultDataSearchPath(), document)
+    return document
+
+
 def shaders(category, inputs):
-    """Vertex and fragment shader of a surface under a directional light, without a sky."""
-    document, search = mx.createDocument(), mx.getDefaultDataSearchPath()
-    mx.loadLibraries(mx.getDefaultDataLibraryFolders(), search, document)
+    """Vertex and fragment shader of one surface node."""
+    document = with_library()
     node = document.addNode(category, "shown", "surfaceshader")
     for name, value in inputs.items():
         if isinstance(value, list):
@@ -75,6 +81,12 @@ def shaders(category, inputs):
         else:
             node.setInputValue(name, value, "float")
     document.addMaterialNode("shown_material", node)
+    return generated(document, node)
+
+
+def generated(document, node):
+    """Vertex and fragment shader of a surface under a directional light, without a sky."""
+    search = mx.getDefaultDataSearchPath()
     generator = PyMaterialXGenGlsl.GlslShaderGenerator.create()
     context = PyMaterialXGenShader.GenContext(generator)
     context.registerSourceCodeSearchPath(search)
@@ -92,7 +104,11 @@ def shaders(category, inputs):
 
 def evaluate(kind, surface, wi, wo):
     """(n, 3) values of the shader on a plane at the origin, x along the tangent."""
-    vertex, fragment = shaders(*inputs_of(kind, surface))
+    return values_of(*shaders(*inputs_of(kind, surface)), wi, wo)
+
+
+def values_of(vertex, fragment, wi, wo):
+    """(n, 3) values of a shader on a plane at the origin, x along the tangent."""
     context = moderngl.create_standalone_context(backend="egl")
     program = context.program(vertex_shader=vertex, fragment_shader=fragment)
     for name in ("u_worldMatrix", "u_viewProjectionMatrix", "u_worldInverseTransposeMatrix"):

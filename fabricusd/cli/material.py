@@ -7,11 +7,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from fabricusd.cli.arguments.number import number
 from fabricusd.materials.targets import TARGETS
 
 EPILOG = """example:
   fabricusd material baked
   fabricusd material baked --scene coat.usda -o coat_look.usda --surface openpbr gltf_pbr
+  fabricusd material baked --surface openpbr lobes --lobes 6
   fabricusd material baked --usdz coat.usdz --osl
   fabricusd material baked_red --asset assets/coat --colorway red"""
 
@@ -33,7 +35,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=["openpbr"],
         metavar="NAME",
-        help="openpbr, standard_surface, gltf_pbr, hair; USD gets the first (default: openpbr)",
+        help="openpbr, standard_surface, gltf_pbr, hair, lobes; USD gets the first "
+        "(default: openpbr)",
+    )
+    parser.add_argument(
+        "--lobes",
+        type=number("lobes"),
+        default=4,
+        metavar="N",
+        help="number of lobes of the surface 'lobes', 1 to 6 (default: 4)",
+    )
+    parser.add_argument(
+        "--max-error",
+        type=number("max_error"),
+        metavar="E",
+        help="fewer lobes where their mean delta E 2000 is at most E (default: N lobes)",
     )
     for target in TARGETS:
         given: dict[str, Any] = {"metavar": target.metavar}
@@ -72,14 +88,14 @@ def run(options: argparse.Namespace) -> int:
         options.bake, options.output,
         Settings(
             surfaces=tuple(options.surface), fitted=not options.no_fit, targets=targets,
-            colorway=options.colorway,
+            colorway=options.colorway, lobes=options.lobes, max_error=options.max_error,
         ),
         scene=options.scene, clobber=not options.no_clobber, dry_run=options.dry_run,
-        progress=say if options.verbose else None,
+        progress=None if options.quiet else say,
     )  # fmt: skip
     for path in made.files:
         print(path)
     if not options.quiet:
-        for note in made.notes:
-            say(note)
+        for line in (*made.notes, *made.remarks):
+            say(line)
     return 1 if made.notes else 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,12 @@ from fabricusd.files import remove_partial_files, write_json
 from fabricusd.materials.bake_folder import BakeFolder, read_bake_folder
 from fabricusd.materials.bound_prims import BoundScene, find_bound_prims
 from fabricusd.materials.networks.surfaces import GRAPHS, MAPS
-from fabricusd.materials.recipes import Progress, Settings, Written, recipes
+from fabricusd.materials.recipes import OF_THREADS, Progress, Settings, Written, recipes
 from fabricusd.materials.targets import Job, chosen
 from fabricusd.materials.targets.layer import write_baked_look, write_scene_look
 from fabricusd.materials.targets.mtlx import write_mtlx
 from fabricusd.materials.targets.paths import asset_path
+from fabricusd.ranges import RANGES
 
 
 def write_materials(
@@ -139,18 +141,24 @@ def _without(name: str) -> str:
 
 
 def _check_surfaces(folder: BakeFolder, settings: Settings) -> None:
-    known = (*GRAPHS, "hair")
+    known = (*GRAPHS, *OF_THREADS)
     for name in settings.surfaces:
         if name not in known:
             raise FabricError(
                 f"surface '{name}'", f"is unknown; it must be one of {', '.join(known)}"
             )
     nameless = [lay.name for one in folder.garments for lay in one.lays if lay.fabric is None]
-    if "hair" in settings.surfaces and nameless:
-        raise FabricError(
-            f"fabric '{nameless[0]}'",
-            "is not in the bake folder; surface 'hair' needs it: bake again",
-        )
+    for name in OF_THREADS:
+        if name in settings.surfaces and nameless:
+            raise FabricError(
+                f"fabric '{nameless[0]}'",
+                f"is not in the bake folder; surface '{name}' needs it: bake again",
+            )
+    if "lobes" in settings.surfaces and not settings.fitted:
+        raise FabricError("surface 'lobes'", "is fitted; it cannot be written with --no-fit")
+    RANGES["lobes"].require("lobes", settings.lobes)
+    if settings.max_error is not None:
+        RANGES["max_error"].require("max_error", settings.max_error)
 
 
 def _fabrics(folder: BakeFolder) -> dict[str, Fabric]:
@@ -202,5 +210,7 @@ def _report(made: Written) -> dict[str, Any]:
             where: {str(number): one.as_dict() for number, one in threads.items()}
             for where, threads in made.threads.items()
         },
+        "lobes": {where: asdict(one) for where, one in made.lobes.items()},
         "notes": made.notes,
+        "remarks": made.remarks,
     }

@@ -11,11 +11,17 @@ import numpy as np
 
 from fabricusd.errors import FabricError
 from fabricusd.images.files import read_mip_level, write_png
-from fabricusd.materials.bake_folder import BakeFolder, MapSet
-from fabricusd.materials.fit.fit import Fitted, fit, fit_threads, thread_factors, with_threads
+from fabricusd.materials.bake_folder import BakedLay, BakeFolder, MapSet
+from fabricusd.materials.fit.fit import Fitted, bounds_met, thread_factors, with_threads
+from fabricusd.materials.fit.keep import kept_fit, kept_fit_threads
 from fabricusd.materials.fit.texels import draw_texels, mean_texel
 from fabricusd.materials.fit.thread_maps import COLUMNS, Factors, write_thread_maps
-from fabricusd.materials.networks.graph import Graph, Texture, Value
+from fabricusd.materials.lobes.fit import COUNT
+from fabricusd.materials.lobes.known import mixture_of
+from fabricusd.materials.lobes.mixture import MATERIALX, Mixture
+from fabricusd.materials.lobes.network import lobes
+from fabricusd.materials.lobes.parameters import at_bounds
+from fabricusd.materials.networks.graph import Graph, Texture, Value, unrolled
 from fabricusd.materials.networks.hair import hair
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import (
@@ -38,6 +44,9 @@ Progress = Callable[[str], None]
 BLENDER = "principled:"
 """Prefix of the material's inputs for Blender's Principled BSDF, which the import hook reads."""
 
+OF_THREADS = ("hair", "lobes")
+"""Surfaces that are made of a fabric and not of the textures of its bake."""
+
 OPAQUE = 0.9995
 """Mean cover from which a material is opaque, since blending is expensive for renderers."""
 
@@ -58,8 +67,10 @@ NEUTRAL = {
 class Settings:
     """What to write.
 
-    surfaces : MaterialX surfaces, names of `surfaces.GRAPHS` or "hair"; USD takes the first, the
-        document all
+    surfaces : MaterialX surfaces, names of `surfaces.GRAPHS` or OF_THREADS; USD takes the first,
+        the document all
+    lobes, max_error : number of lobes of surface "lobes", and the mean delta E 2000 that fewer may
+        have; None takes that number
     fitted : whether the parameters are sought; otherwise the textures stand as they are
     targets : what is written besides, names of `targets.TARGETS`, and where
     colorway : name of an asset's variant, "" for the fabrics' names
@@ -67,18 +78,25 @@ class Settings:
 
     surfaces: tuple[str, ...] = ("openpbr",)
     fitted: bool = True
+    lobes: int = COUNT
+    max_error: float | None = None
     targets: Wanted = field(default_factory=dict)
     colorway: str = ""
 
 
 @dataclass(kw_only=True)
 class Written:
-    """The files that were written, notes on omissions, and the fits of surfaces and threads."""
+    """The files that were written, notes on omissions, and the fits of surfaces and threads.
+
+    remarks : what is worth knowing though nothing was left out
+    """
 
     files: list[Path] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     fits: dict[str, dict[str, Fitted]] = field(default_factory=dict)
     threads: dict[str, dict[int, Fitted]] = field(default_factory=dict)
+    lobes: dict[str, Mixture] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
 
 
 def recipes(
@@ -96,6 +114,7 @@ def recipes(
             one = maps.name if len(maps.lays) == 1 else f"{maps.name}_{number}"
             name = prim_name(one, ascii_only=True)
             looks = found_looks[number]
+            mixture = _mixture(maps, number, settings, made, progress)
             means, of_means = mean_inputs(maps, number), mean_inputs(fitted, number)
             cover = means["opacity"].value
             assert isinstance(cover, float)
@@ -110,10 +129,7 @@ def recipes(
                 ("procedural", means, {**of_means, **dark}),
             ):
                 title = name if variant == "baked" else f"{name}_plain"
-                graphs = {
-                    s: GRAPHS[s](inputs, opaque) if s in GRAPHS else hair(inputs, opaque, lay)
-                    for s in settings.surfaces
-                }
+                graphs = {s: _graph(s, inputs, opaque, lay, mixture) for s in settings.surfaces}
                 found[maps.name, number, variant] = material_recipe(
                     title, graphs, plain, looks, opaque
                 )
@@ -121,6 +137,33 @@ def recipes(
                     tail = "" if len(graphs) == 1 else f"_{surface}"
                     documents.append((title + tail, graph, parameter_values(looks[surface])))
     return found, documents
+
+
+def _graph(
+    surface: str, inputs: Inputs, opaque: bool, lay: BakedLay, mixture: Mixture | None
+) -> Graph:
+    if surface in GRAPHS:
+        return GRAPHS[surface](inputs, opaque)
+    if surface == "hair":
+        return hair(inputs, opaque, lay)
+    assert mixture is not None
+    return lobes(inputs, opaque, mixture, lay.matrix)
+
+
+def _mixture(
+    maps: MapSet, number: int, settings: Settings, made: Written, progress: Progress | None
+) -> Mixture | None:
+    """Return the lobes of a lay's fabric, if they are asked for."""
+    fabric = maps.lays[number].fabric
+    if "lobes" not in settings.surfaces or fabric is None:
+        return None
+    found = mixture_of(
+        fabric, settings.lobes, MATERIALX, max_error=settings.max_error, progress=progress
+    )
+    where = f"{maps.name} {maps.lays[number].name}"
+    made.lobes[where] = found
+    made.remarks += [f"lobes of {where}: {told}" for told in at_bounds(found)]
+    return found
 
 
 def lit_through(look: Look) -> Look:
@@ -147,7 +190,7 @@ def material_recipe(
     first = next(iter(graphs))
     return MaterialRecipe(
         name=name,
-        graphs=(("", preview(plain, looks["preview"], opaque)), ("", graphs[first])),
+        graphs=(("", preview(plain, looks["preview"], opaque)), ("", unrolled(graphs[first]))),
         parameters=parameter_values(looks[first]) | parameter_values(looks["principled"], BLENDER),
     )
 
@@ -245,22 +288,25 @@ def _looks(
             made.notes.append(note)
         return plain, {}
 
-    def fitting(what: str) -> None:
-        if progress:
-            progress(f"fitting {what} to {lay.name} on {maps.name}")
+    where, fabric = f"{maps.name} {lay.name}", lay.fabric
+
+    def waiting(what: str) -> Callable[[], None]:
+        line = f"fitting {what} to {lay.name} on {maps.name}"
+        return lambda: progress(line) if progress else None
 
     factors: Factors = {}
     own = texels
     if texels.threads:
-        fitting("threads")
-        threads = fit_threads(texels, lay.fabric)
+        threads = kept_fit_threads(texels, fabric, waiting=waiting("threads"))
         looks = {one: fitted.look for one, fitted in threads.items()}
         own, factors = with_threads(texels, looks), thread_factors(looks, texels.shares)
-        made.threads[f"{maps.name} {lay.name}"] = threads
+        made.threads[where] = threads
     found = {}
     for kind in kinds:
-        fitting(kind)
         takes = texels if kind == "preview" else own
-        found[kind] = fit(kind, takes, lay.fabric, baked=texels)
-    made.fits[f"{maps.name} {lay.name}"] = found
+        found[kind] = kept_fit(kind, takes, fabric, baked=texels, waiting=waiting(kind))
+        made.remarks += [
+            f"{kind} of {where}: {told}" for told in bounds_met(kind, found[kind].look)
+        ]
+    made.fits[where] = found
     return plain | {kind: one.look for kind, one in found.items()}, factors

@@ -49,6 +49,8 @@ OPTIONS = {
     ("compare", "--max-error"): ("-0.1", "1001"),
     ("compare", "--significance"): ("0", "-0.1", "0.6"),
     ("sides", "--paths"): ("0", "63", "1048577", "1.5"),
+    ("material", "--lobes"): ("0", "-1", "7", "1.5"),
+    ("material", "--max-error"): ("0", "-1", "1001"),
 }
 
 ARGUMENTS = {
@@ -58,6 +60,7 @@ ARGUMENTS = {
     "new": ["--weave", "plain", "-o", "out.usda"],
     "compare": ["a.png", "b.png", "-o", "out.png"],
     "sides": ["linen_plain", "-o", "out.usda"],
+    "material": ["baked", "--surface", "lobes"],
 }
 
 TEXTS = {

@@ -9,7 +9,10 @@ import pytest
 from pxr import Sdf, Usd, UsdShade
 
 from fabricusd.materials.bake_folder import BakedLay
-from fabricusd.materials.networks.graph import Link, Parameter, Texture, Value
+from fabricusd.materials.lobes.known import mixture_of
+from fabricusd.materials.lobes.mixture import MATERIALX
+from fabricusd.materials.lobes.network import lobes
+from fabricusd.materials.networks.graph import Link, Parameter, Texture, Value, unrolled
 from fabricusd.materials.networks.hair import absorption, hair
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import (
@@ -142,6 +145,8 @@ def networks():
         offset=np.zeros(2),
     )  # fmt: skip
     yield "hair", hair(textures, False, lay)
+    worn = mixture_of(load("silk_shot"), 4, MATERIALX)
+    yield "lobes", unrolled(lobes(textures, False, worn, lay.matrix))
 
 
 def _here():

@@ -257,6 +257,18 @@ def _free(kind: str) -> tuple[_Free, ...]:
     )
 
 
+def bounds_met(kind: str, look: Look) -> list[str]:
+    """Say which parameters of a fitted look are at a bound; a value without effect is none."""
+    found = []
+    for one in _free(kind):
+        value, plain = (np.atleast_1d(getattr(x, one.name)) for x in (look, Look()))
+        near = 1e-4 * (one.bounds[1] - one.bounds[0])
+        for bound in one.bounds:
+            if np.any((np.abs(value - bound) < near) & (np.abs(plain - bound) >= near)):
+                found.append(f"{one.name} is at its bound, {bound:g}")
+    return found
+
+
 def _starts(target: Floats) -> tuple[Look, ...]:
     """Return the starting looks: weak reflection with much fuzz, the reverse, the textures alone.
 

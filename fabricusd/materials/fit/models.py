@@ -166,7 +166,20 @@ def ggx_albedo(x: Any, y: Any, f0: Any, f90: Any) -> Floats:
 
 def zeltner(s: Surface, wi: Floats, wo: Floats, cos_o: Floats) -> tuple[Floats, Floats]:
     """(..., 3) sheen of [Zeltner2022], and the share of light that reaches the layer below."""
-    x, y = cos_o, np.clip(s.fuzz_roughness, 0.01, 1.0)
+    albedo, value = _zeltner(s.fuzz_roughness, wi, wo, cos_o)
+    share = s.fuzz_weight * albedo
+    return (share * value)[..., None] * s.fuzz_color, 1.0 - share
+
+
+def sheen_value(roughness: float, wi: Floats, wo: Floats) -> Floats:
+    """(...) sheen of [Zeltner2022] alone, cosine included; 0 if either direction is below."""
+    albedo, value = _zeltner(np.asarray(roughness), wi, wo, np.clip(wo[..., 2], SMALLEST, 1.0))
+    return np.where((wi[..., 2] > 0) & (wo[..., 2] > 0), albedo * value, 0.0)
+
+
+def _zeltner(roughness: Floats, wi: Floats, wo: Floats, cos_o: Floats) -> tuple[Floats, Floats]:
+    """(...) directional albedo, and the distribution of the light that it reflects, to light wi."""
+    x, y = cos_o, np.clip(roughness, 0.01, 1.0)
     sigma = y * (0.0206607 + 1.58491 * y) / (0.0379424 + y * (1.32227 + y))
     m = y * (-0.193854 + y * (-1.14885 + y * (1.7932 - 0.95943 * y * y))) / (0.046391 + y)
     o = y * (0.000654023 + (-0.0207818 + 0.119681 * y) * y) / (1.26264 + y * (-1.92021 + y))
@@ -188,8 +201,7 @@ def zeltner(s: Surface, wi: Floats, wo: Floats, cos_o: Floats) -> tuple[Floats, 
     z = wi[..., 2]
     square = (a * along + b * z) ** 2 + (a * across) ** 2 + z * z
     value = np.maximum(z, 0.0) / np.pi * (a / square) ** 2
-    share = s.fuzz_weight * albedo
-    return (share * value)[..., None] * s.fuzz_color, 1.0 - share
+    return np.asarray(albedo), np.asarray(value)
 
 
 def conty_kulla(

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 
@@ -65,21 +66,74 @@ class Node:
 
 
 @dataclass(frozen=True)
+class Definition:
+    """A node definition of ours, with the nodes that implement it.
+
+    inputs : with their defaults; in `nodes` each is a Parameter
+    terminal : name of the node whose output is that of the definition
+    """
+
+    category: str
+    kind: str
+    identifier: str
+    inputs: Mapping[str, Value]
+    nodes: tuple[Node, ...]
+    terminal: str
+
+
+@dataclass(frozen=True)
 class Graph:
     """A network of nodes that ends in a surface.
 
     terminal : name of the surface node; output : name of its output
     context : render context of the material's output in USD, "" for the universal one
+    definitions : of nodes that MaterialX has not; see `unrolled`
     """
 
     nodes: tuple[Node, ...]
     terminal: str
     output: str
     context: str
+    definitions: tuple[Definition, ...] = ()
 
     def node(self, name: str) -> Node:
         """Return the node of that name."""
         return next(n for n in self.nodes if n.name == name)
+
+
+def unrolled(graph: Graph) -> Graph:
+    """Return the graph in standard nodes alone, for readers that know no definition of ours.
+
+    The nodes of a definition take the name of the node that they replace as a prefix.
+    """
+    known = {one.identifier: one for one in graph.definitions}
+    nodes: list[Node] = []
+    ends: dict[str, str] = {}
+    for node in graph.nodes:
+        definition = known.get(node.identifier)
+        if definition is None:
+            nodes.append(replace(node, inputs=_rewired(node.inputs, ends)))
+            continue
+        outside: dict[str, Source] = {**definition.inputs, **_rewired(node.inputs, ends)}
+        for inner in definition.nodes:
+            inputs: dict[str, Source] = {}
+            for name, source in inner.inputs.items():
+                if isinstance(source, Parameter):
+                    inputs[name] = outside[source.name]
+                elif isinstance(source, Link):
+                    inputs[name] = Link(f"{node.name}_{source.node}", source.output)
+                else:
+                    inputs[name] = source
+            nodes.append(replace(inner, name=f"{node.name}_{inner.name}", inputs=inputs))
+        ends[node.name] = f"{node.name}_{definition.terminal}"
+    return replace(graph, nodes=tuple(nodes), definitions=())
+
+
+def _rewired(inputs: Mapping[str, Source], ends: Mapping[str, str]) -> dict[str, Source]:
+    return {
+        name: Link(ends.get(one.node, one.node), one.output) if isinstance(one, Link) else one
+        for name, one in inputs.items()
+    }
 
 
 class Builder:

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
 from fabricusd.files import whole_file
-from fabricusd.materials.networks.graph import Graph, Link, Parameter, Source, Texture, Value
+from fabricusd.materials.networks.graph import (
+    Definition,
+    Graph,
+    Link,
+    Node,
+    Parameter,
+    Source,
+    Texture,
+    Value,
+)
 from fabricusd.materials.targets.paths import asset_path
 
 
@@ -17,14 +26,46 @@ def write_mtlx(
     """Write a document with a `surfacematerial` for each (name, graph, parameters).
 
     A material's parameters are inputs of its node graph; its surface node is outside the graph.
+    The definitions of ours that the graphs use come first, each with a node graph.
     """
     root = ElementTree.Element("materialx", version="1.39", colorspace="lin_rec709")
+    defined = {one.identifier: one for _, graph, _ in materials for one in graph.definitions}
+    for one in defined.values():
+        _define(root, one, path.parent)
     for name, graph, parameters in materials:
         _add(root, name, graph, parameters, path.parent)
     ElementTree.indent(root)
     text = ElementTree.tostring(root, "unicode", xml_declaration=False)
     with whole_file(path, clobber=clobber) as temporary:
         temporary.write_text(f'<?xml version="1.0"?>\n{text}\n', "utf-8")
+
+
+def _define(root: ElementTree.Element, one: Definition, folder: Path) -> None:
+    definition = ElementTree.SubElement(
+        root, "nodedef", name=one.identifier, node=one.category, nodegroup="pbr"
+    )
+    for name, value in one.inputs.items():
+        _input(definition, name, value, folder, {})
+    ElementTree.SubElement(definition, "output", name="out", type=one.kind)
+    inside = ElementTree.SubElement(
+        root, "nodegraph", name=one.identifier.replace("ND_", "NG_"), nodedef=one.identifier
+    )
+    kinds = {node.name: node.kind for node in one.nodes}
+    for node in one.nodes:
+        _node(inside, node, folder, kinds, one.inputs)
+    ElementTree.SubElement(inside, "output", name="out", type=one.kind, nodename=one.terminal)
+
+
+def _node(
+    inside: ElementTree.Element, node: Node, folder: Path, kinds: dict[str, str],
+    parameters: Mapping[str, Value],
+) -> None:  # fmt: skip
+    element = ElementTree.SubElement(inside, node.category, name=node.name, type=node.kind)
+    # State the node definition if the types of the inputs do not determine it.
+    if node.identifier.endswith("FA"):
+        element.set("nodedef", node.identifier)
+    for key, source in node.inputs.items():
+        _input(element, key, source, folder, kinds, parameters)
 
 
 def _add(
@@ -39,12 +80,7 @@ def _add(
     surface = graph.node(graph.terminal)
     for node in graph.nodes:
         if node is not surface:
-            element = ElementTree.SubElement(inside, node.category, name=node.name, type=node.kind)
-            # State the node definition if the types of the inputs do not determine it.
-            if node.identifier.endswith("FA"):
-                element.set("nodedef", node.identifier)
-            for key, source in node.inputs.items():
-                _input(element, key, source, folder, kinds, parameters)
+            _node(inside, node, folder, kinds, parameters)
     outside = ElementTree.SubElement(
         root, surface.category, name=f"{name}_surface", type="surfaceshader"
     )
@@ -82,7 +118,7 @@ def _used(graph: Graph) -> set[str]:
 
 def _input(
     element: ElementTree.Element, name: str, source: Source, folder: Path, kinds: dict[str, str],
-    parameters: dict[str, Value] | None = None,
+    parameters: Mapping[str, Value] | None = None,
 ) -> None:  # fmt: skip
     made = ElementTree.SubElement(element, "input", name=name)
     if isinstance(source, Texture):

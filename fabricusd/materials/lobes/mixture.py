@@ -1,0 +1,157 @@
+"""A sum of tilted anisotropic microfacet lobes, a diffuse part and sheen, and its value.
+
+With the normal `n = sin(tilt) a + cos(tilt) N` of a lobe whose threads run along `a`, and its
+tangent `t = cos(tilt) a - sin(tilt) N`,
+
+    f cos = sum color W D(h) G(wi, wo) / (4 n.wo)
+          + diffuse max(N.wo, 1e-4)^q N.wi / pi + sheen
+    W(wo) = max(n.wo, 1e-4)^p max(1 - (t.wo)^2, 0.06)^r max(N.wo, 0.05)^s
+
+A lobe is 0 where either direction is below its plane or below the cloth. `D` is the distribution of
+GGX, and the sheen is that of [Zeltner2022]. `W` depends on the viewer alone, because that is all
+that a closure's colour may depend on.
+
+Renderers differ in the masking `G`. The masking of Cycles uses both widths of a lobe. MaterialX's
+uses their geometric mean, and MaterialX adds the energy that is scattered more than once, which
+depends on the reflectance `color W`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.materials.fit.models import ggx_albedo, sheen_value
+
+Floats = NDArray[np.float64]
+
+CYCLES, MATERIALX = FORMS = ("cycles", "materialx")
+"""Whose lobes the sum is made of."""
+
+FACING, CROSSING, UPRIGHT, EVEN = 1e-4, 0.06, 0.05, 1e-4
+"""Lower bounds of the bases of the powers p, r, s and q. That of r keeps a lobe finite for a viewer
+who looks along the thread; with 0.01 a fit was 7 % too bright at 89 degrees."""
+
+SMALLEST = 1e-6
+"""Cosine below which a direction is below a plane."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lobe:
+    """A lobe, or two lobes of opposite tilt.
+
+    along : 0 for threads along x, the weft; 1 for threads along y, the warp
+    tilt : of the lobe's normal from N towards the thread's axis [rad]
+    paired : whether there is another lobe whose tilt is the opposite
+    alpha_along, alpha_across : GGX widths along and across the thread
+    color : (3,) factor, not bounded by 1
+    facing, crossing, upright : the powers p, r and s of W
+    """
+
+    along: int
+    tilt: float
+    paired: bool
+    alpha_along: float
+    alpha_across: float
+    color: tuple[float, float, float]
+    facing: float
+    crossing: float
+    upright: float
+
+    @property
+    def tilts(self) -> tuple[float, ...]:
+        """The tilt of each lobe."""
+        return (self.tilt, -self.tilt) if self.paired else (self.tilt,)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mixture:
+    """A sum of lobes.
+
+    form : one of FORMS
+    diffuse : (3,) factor on even reflection; diffuse_power : the power q
+    sheen : (3,) factor on sheen of `sheen_roughness`
+    """
+
+    form: str
+    lobes: tuple[Lobe, ...]
+    diffuse: tuple[float, float, float]
+    diffuse_power: float
+    sheen: tuple[float, float, float]
+    sheen_roughness: float
+
+    @property
+    def count(self) -> int:
+        """Number of lobes, of which a pair is two."""
+        return sum(len(one.tilts) for one in self.lobes)
+
+
+class Reflected(NamedTuple):
+    """One lobe of reflectance 1, without its weight, for n pairs of directions.
+
+    value : (n,) D G / (4 n.wo), 0 below either plane
+    facing, crossing : (n,) bases of the powers p and r
+    spared : (n,) light that a single scattering loses, (1 - E)/E; 0 except for MATERIALX
+    """
+
+    value: Floats
+    facing: Floats
+    crossing: Floats
+    spared: Floats
+
+
+def reflected(
+    form: str, along: int, tilt: float, alphas: tuple[float, float], wi: Floats, wo: Floats
+) -> Reflected:
+    """Return a lobe for wi, wo (n, 3); `alphas` are its widths along and across the thread."""
+    ax, ay = alphas
+    c, s = np.cos(tilt), np.sin(tilt)
+    ti, to = c * wi[:, along] - s * wi[:, 2], c * wo[:, along] - s * wo[:, 2]
+    ni, no = s * wi[:, along] + c * wi[:, 2], s * wo[:, along] + c * wo[:, 2]
+    bi, bo = wi[:, 1 - along], wo[:, 1 - along]
+    above = (ni > SMALLEST) & (no > SMALLEST) & (wi[:, 2] > 0) & (wo[:, 2] > 0)
+    ni, no = np.where(above, ni, 1.0), np.where(above, no, 1.0)
+    ht, hb, hn = ti + to, bi + bo, ni + no
+    square = ht * ht + hb * hb + hn * hn
+    d = square**2 / (np.pi * ax * ay * ((ht / ax) ** 2 + (hb / ay) ** 2 + hn**2) ** 2)
+    if form == CYCLES:
+        tan_i = ((ax * ti) ** 2 + (ay * bi) ** 2) / ni**2
+        tan_o = ((ax * to) ** 2 + (ay * bo) ** 2) / no**2
+        spared = np.zeros_like(d)
+    else:
+        tan_i, tan_o = (ax * ay * (1.0 / cos**2 - 1.0) for cos in (ni, no))
+        single = ggx_albedo(np.minimum(no, 1.0), np.sqrt(ax * ay), 1.0, 1.0)
+        spared = (1.0 - single) / single
+    # [Heitz2014] eq. 72 and 99: height-correlated masking, 1/(1 + lambda_i + lambda_o).
+    unmasked = 0.5 * (np.sqrt(1.0 + tan_i) + np.sqrt(1.0 + tan_o))
+    value = np.where(above, d / (4.0 * no * unmasked), 0.0)
+    crossing = np.maximum(1.0 - to * to, CROSSING)
+    return Reflected(value, np.maximum(np.where(above, no, 0.0), FACING), crossing, spared)
+
+
+def weight(lobe: Lobe, one: Reflected, wo: Floats) -> Floats:
+    """(n,) the factor W of a lobe."""
+    upright = np.maximum(wo[:, 2], UPRIGHT)
+    return np.asarray(one.facing**lobe.facing * one.crossing**lobe.crossing * upright**lobe.upright)
+
+
+def evaluate(mixture: Mixture, wi: Floats, wo: Floats) -> Floats:
+    """(n, 3) radiance per unit `L_i dwi` towards wo, cosine included, for unit wi, wo (n, 3).
+
+    Directions are in the surface frame: x along the weft, y along the warp, z the normal. 0 if
+    either is below the cloth.
+    """
+    even = np.maximum(wo[:, 2], EVEN) ** mixture.diffuse_power * wi[:, 2] / np.pi
+    out = even[:, None] * np.array(mixture.diffuse)
+    out += sheen_value(mixture.sheen_roughness, wi, wo)[:, None] * np.array(mixture.sheen)
+    for lobe in mixture.lobes:
+        alphas = lobe.alpha_along, lobe.alpha_across
+        for tilt in lobe.tilts:
+            one = reflected(mixture.form, lobe.along, tilt, alphas, wi, wo)
+            f = weight(lobe, one, wo)[:, None] * np.array(lobe.color)
+            out += one.value[:, None] * f * (1.0 + f * one.spared[:, None])
+    above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
+    return np.where(above[:, None], out, 0.0)

@@ -1,0 +1,182 @@
+"""A mixture as the numbers that a solver changes, and the derivatives of its value by them.
+
+A lobe has, in turn: its tilt, the logarithms of both widths and of the three channels of its
+colour, and the powers p, r and s. The mixture ends with the logarithms of its diffuse colour, the
+power q, the logarithms of the colour of its sheen, and the roughness of its sheen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.materials.fit.models import sheen_value
+from fabricusd.materials.lobes.mixture import (
+    EVEN,
+    UPRIGHT,
+    Lobe,
+    Mixture,
+    Reflected,
+    reflected,
+    weight,
+)
+
+Floats = NDArray[np.float64]
+
+PER_LOBE, TAIL = 9, 8
+
+_STEP = 1e-5
+"""Of differences, where a derivative has no closed form."""
+
+NAMES = (
+    "tilt", "alpha_along", "alpha_across", "red", "green", "blue", "facing", "crossing", "upright",
+)  # fmt: skip
+TAIL_NAMES = (
+    "diffuse red", "diffuse green", "diffuse blue", "diffuse_power",
+    "sheen red", "sheen green", "sheen blue", "sheen_roughness",
+)  # fmt: skip
+
+_LOG = math.log
+DARK = 1e-5
+"""Least of a colour: as good as none."""
+
+ABSENT = 1e-3
+"""Largest channel of a part that does not show, and whose other numbers do not matter."""
+
+LOBE_BOUNDS = (
+    (-1.5, 1.5), (_LOG(0.015), 0.0), (_LOG(0.015), 0.0),
+    *((_LOG(DARK), _LOG(30.0)),) * 3,
+    (-1.0, 4.0), (-3.0, 3.0), (-2.0, 2.0),
+)  # fmt: skip
+TAIL_BOUNDS = (
+    *((_LOG(DARK), _LOG(2.0)),) * 3, (-0.5, 2.0), *((_LOG(DARK), _LOG(2.0)),) * 3, (0.07, 1.0),
+)  # fmt: skip
+
+
+def pack(mixture: Mixture) -> Floats:
+    """Return the numbers of a mixture."""
+    found: list[float] = []
+    for one in mixture.lobes:
+        found += [one.tilt, _LOG(one.alpha_along), _LOG(one.alpha_across), *_logs(one.color)]
+        found += [one.facing, one.crossing, one.upright]
+    found += [*_logs(mixture.diffuse), mixture.diffuse_power]
+    found += [*_logs(mixture.sheen), mixture.sheen_roughness]
+    return np.array(found)
+
+
+def unpack(x: Floats, like: Mixture) -> Mixture:
+    """Return the mixture of the numbers x; what they do not say is that of `like`."""
+    lobes = []
+    for k, one in enumerate(like.lobes):
+        v = [float(t) for t in x[k * PER_LOBE : (k + 1) * PER_LOBE]]
+        lobes.append(
+            replace(
+                one, tilt=v[0] if one.tilt else 0.0,
+                alpha_along=math.exp(v[1]), alpha_across=math.exp(v[2]),
+                color=(math.exp(v[3]), math.exp(v[4]), math.exp(v[5])),
+                facing=v[6], crossing=v[7], upright=v[8],
+            )
+        )  # fmt: skip
+    v = [float(t) for t in x[len(lobes) * PER_LOBE :]]
+    return replace(
+        like, lobes=tuple(lobes),
+        diffuse=(math.exp(v[0]), math.exp(v[1]), math.exp(v[2])), diffuse_power=v[3],
+        sheen=(math.exp(v[4]), math.exp(v[5]), math.exp(v[6])), sheen_roughness=v[7],
+    )  # fmt: skip
+
+
+def bounds(mixture: Mixture) -> tuple[Floats, Floats]:
+    """Return the least and the greatest of each number; a lobe that stands upright stays so."""
+    low, high = [], []
+    for one in mixture.lobes:
+        at = 1e-9 if one.tilt == 0.0 else None
+        first = (0.0, 1.5) if one.paired else LOBE_BOUNDS[0]
+        for least, most in ((-at, at) if at else first, *LOBE_BOUNDS[1:]):
+            low.append(least)
+            high.append(most)
+    low += [least for least, _ in TAIL_BOUNDS]
+    high += [most for _, most in TAIL_BOUNDS]
+    return np.array(low), np.array(high)
+
+
+def _logs(color: Sequence[float]) -> list[float]:
+    return [_LOG(max(c, DARK)) for c in color]
+
+
+def at_bounds(mixture: Mixture) -> list[str]:
+    """Name the numbers of a mixture that are at a bound, where the bound is not simply none."""
+    low, high = bounds(mixture)
+    x, names = pack(mixture), []
+    for k in range(len(mixture.lobes)):
+        names += [f"{name} of lobe {k}" for name in NAMES]
+    names += TAIL_NAMES
+    # Neither the roughness nor the power of what is not there matters, and a level tilt is fixed.
+    fixed = high - low < 1e-6
+    fixed[-1] = max(mixture.sheen) <= ABSENT
+    fixed[-5] = max(mixture.diffuse) <= ABSENT
+    at_low, at_high = (x < low + 1e-6) & (low != _LOG(DARK)), x > high - 1e-6
+    return [
+        f"{name} is at its {'least' if least else 'greatest'}"
+        for name, least, most, held in zip(names, at_low, at_high, fixed, strict=True)
+        if (least or most) and not held
+    ]
+
+
+def value_and_slopes(
+    mixture: Mixture, wi: Floats, wo: Floats, *, slopes: bool = True
+) -> tuple[Floats, Floats]:
+    """(n, 3) value of a mixture for directions above the cloth, and its derivatives (m, n, 3)."""
+    m = len(mixture.lobes) * PER_LOBE + TAIL
+    d = np.zeros((m if slopes else 0, len(wi), 3))
+    even = np.maximum(wo[:, 2], EVEN)
+    diffuse = (even**mixture.diffuse_power * wi[:, 2] / np.pi)[:, None] * np.array(mixture.diffuse)
+    unit = sheen_value(mixture.sheen_roughness, wi, wo)
+    sheen = unit[:, None] * np.array(mixture.sheen)
+    out = diffuse + sheen
+    if slopes:
+        tail = d[-TAIL:]
+        for c in range(3):
+            tail[c, :, c], tail[4 + c, :, c] = diffuse[:, c], sheen[:, c]
+        tail[3] = diffuse * np.log(even)[:, None]
+        moved = sheen_value(mixture.sheen_roughness - _STEP, wi, wo)
+        tail[7] = ((unit - moved) / _STEP)[:, None] * np.array(mixture.sheen)
+    for k, lobe in enumerate(mixture.lobes):
+        mine = d[k * PER_LOBE : (k + 1) * PER_LOBE]
+        for sign, tilt in zip((1.0, -1.0), lobe.tilts, strict=False):
+            out += _add_lobe(mixture.form, lobe, sign, tilt, wi, wo, mine if slopes else None)
+    return out, d
+
+
+def _add_lobe(
+    form: str, lobe: Lobe, sign: float, tilt: float, wi: Floats, wo: Floats, d: Floats | None
+) -> Floats:
+    """(n, 3) value of one lobe; its derivatives are added to d (PER_LOBE, n, 3)."""
+
+    def lobed(psi: float, ax: float, ay: float) -> tuple[Reflected, Floats]:
+        one = reflected(form, lobe.along, psi, (ax, ay), wi, wo)
+        f = weight(lobe, one, wo)[:, None] * np.array(lobe.color)
+        return one, f
+
+    def value(one: Reflected, f: Floats) -> Floats:
+        return np.asarray(one.value[:, None] * f * (1.0 + f * one.spared[:, None]))
+
+    ax, ay = lobe.alpha_along, lobe.alpha_across
+    one, f = lobed(tilt, ax, ay)
+    got = value(one, f)
+    if d is None:
+        return got
+    grown = math.exp(-_STEP)
+    moves = ((tilt - _STEP, ax, ay), (tilt, ax * grown, ay), (tilt, ax, ay * grown))
+    for j, moved in enumerate(moves):
+        d[j] += (sign if j == 0 else 1.0) * (got - value(*lobed(*moved))) / _STEP
+    by_log = one.value[:, None] * f * (1.0 + 2.0 * f * one.spared[:, None])
+    for c in range(3):
+        d[3 + c, :, c] += by_log[:, c]
+    bases = (one.facing, one.crossing, np.maximum(wo[:, 2], UPRIGHT))
+    for j, base in enumerate(bases, 6):
+        d[j] += by_log * np.log(base)[:, None]
+    return got

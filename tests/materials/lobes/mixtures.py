@@ -1,0 +1,38 @@
+"""Mixtures to test with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fabricusd.materials.lobes.mixture import Lobe, Mixture
+
+PAIR = Lobe(
+    along=0, tilt=0.6, paired=True, alpha_along=0.2, alpha_across=0.9, color=(0.3, 0.6, 0.2),
+    facing=1.2, crossing=-0.8, upright=-0.5,
+)  # fmt: skip
+LEVEL = Lobe(
+    along=1, tilt=0.0, paired=False, alpha_along=0.15, alpha_across=0.8, color=(0.9, 0.1, 1.4),
+    facing=0.4, crossing=0.8, upright=0.5,
+)  # fmt: skip
+
+
+def mixture(form: str, *lobes: Lobe) -> Mixture:
+    return Mixture(
+        form=form, lobes=lobes or (PAIR, LEVEL), diffuse=(0.05, 0.1, 0.2), diffuse_power=0.4,
+        sheen=(0.1, 0.2, 0.3), sheen_roughness=0.5,
+    )  # fmt: skip
+
+
+def bare(form: str, lobe: Lobe) -> Mixture:
+    """One lobe and nothing else."""
+    return Mixture(
+        form=form, lobes=(lobe,), diffuse=(0.0, 0.0, 0.0), diffuse_power=0.0,
+        sheen=(0.0, 0.0, 0.0), sheen_roughness=0.5,
+    )  # fmt: skip
+
+
+def directions(count: int, seed: int = 0) -> np.ndarray:
+    """(2, count, 3) unit vectors above the cloth."""
+    w = np.random.default_rng(seed).normal(size=(2, count, 3))
+    w[..., 2] = np.abs(w[..., 2]) + 0.02
+    return w / np.linalg.norm(w, axis=-1, keepdims=True)

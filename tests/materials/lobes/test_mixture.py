@@ -1,0 +1,81 @@
+"""The value of a mixture, against identities."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from materials.lobes.mixtures import LEVEL, PAIR, bare, directions, mixture
+
+from fabricusd.materials.fit.judge import hemisphere
+from fabricusd.materials.lobes.mixture import CYCLES, FORMS, Mixture, evaluate, reflected
+
+PLAIN = replace(LEVEL, color=(1.0, 1.0, 1.0), facing=0.0, crossing=0.0, upright=0.0)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("tilt", [0.0, 0.4])
+def test_a_narrow_lobe_of_reflectance_one_reflects_all_light(form, tilt):
+    lights = hemisphere(40000)
+    wo = np.tile([0.0, np.sin(0.2), np.cos(0.2)], (len(lights), 1))
+    narrow = replace(PLAIN, tilt=tilt, alpha_along=0.05, alpha_across=0.08)
+    got = evaluate(bare(form, narrow), lights, wo)
+    assert got.mean(axis=0) * 2.0 * np.pi == pytest.approx([1.0] * 3, abs=0.02)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_mixture_of_pairs_is_its_own_mirror_image(axis):
+    wi, wo = directions(200)
+    flip = np.ones(3)
+    flip[axis] = -1.0
+    one = mixture(CYCLES)
+    assert evaluate(one, wi * flip, wo * flip) == pytest.approx(evaluate(one, wi, wo))
+
+
+def test_a_lobe_alone_is_not_its_own_mirror_image():
+    wi, wo = directions(200)
+    one = bare(CYCLES, replace(PAIR, paired=False))
+    flip = np.array([-1.0, 1.0, 1.0])
+    assert not np.allclose(evaluate(one, wi * flip, wo * flip), evaluate(one, wi, wo), rtol=0.1)
+
+
+def test_a_pair_is_two_lobes():
+    wi, wo = directions(200)
+    apart = [bare(CYCLES, replace(PAIR, paired=False, tilt=t)) for t in (PAIR.tilt, -PAIR.tilt)]
+    both = sum(evaluate(one, wi, wo) for one in apart)
+    assert evaluate(bare(CYCLES, PAIR), wi, wo) == pytest.approx(both)
+    assert mixture(CYCLES).count == 3
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_lobe_is_dark_below_its_own_plane(form):
+    low = np.array([[-np.cos(0.3), 0.0, np.sin(0.3)]])
+    up = np.array([[0.0, 0.0, 1.0]])
+    one = bare(form, replace(PAIR, paired=False, tilt=0.5))
+    assert not evaluate(one, low, up).any()
+    assert not evaluate(one, up, low).any()
+    assert evaluate(one, up, up).all()
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_without_its_cosine_a_lobe_is_reciprocal(form):
+    wi, wo = directions(300)
+    there, back = (reflected(form, 1, 0.3, (0.12, 0.2), *w) for w in ((wi, wo), (wo, wi)))
+    assert there.value * there.facing == pytest.approx(back.value * back.facing)
+    assert np.count_nonzero(there.value) > 200
+
+
+def test_the_forms_differ_where_a_lobe_is_anisotropic():
+    wi, wo = directions(200)
+    two = [evaluate(mixture(form), wi, wo) for form in FORMS]
+    assert np.abs(two[0] - two[1]).mean() > 0.02 * two[0].mean()
+
+
+def test_the_diffuse_part_is_lambert_without_its_power():
+    wi, wo = directions(50)
+    one = Mixture(
+        form=CYCLES, lobes=(), diffuse=(0.2, 0.4, 0.6), diffuse_power=0.0, sheen=(0.0,) * 3,
+        sheen_roughness=0.5,
+    )  # fmt: skip
+    assert evaluate(one, wi, wo) == pytest.approx(wi[:, 2:] / np.pi * np.array([[0.2, 0.4, 0.6]]))
