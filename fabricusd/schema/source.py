@@ -15,6 +15,10 @@ from fabricusd.files import readable_file
 from fabricusd.schema.access import kind_of, type_of
 
 PRESETS = Path(__file__).resolve().parent / "presets"
+"""Layers of the published fabrics and threads, and of what is derived from their sources."""
+
+TRADE = PRESETS / "trade"
+"""Layers of cloth of the trade, which `python -m fabricusd.presets` makes."""
 
 PARSER_WORDS = {
     r"parse error matching \S.*? at '": "does not parse at '",
@@ -25,7 +29,22 @@ PARSER_WORDS = {
 
 def preset_names() -> list[str]:
     """Return the names of the fabrics that come with the package."""
+    return sorted([*published_names(), *(path.stem for path in TRADE.glob("*.usda"))])
+
+
+def published_names() -> list[str]:
+    """The names of those that rest on the fabrics of [Bisker2011] and [Sadeghi2013].
+
+    Tables that were measured per preset (the choice of methods, figures of tubes, medians of
+    shares by side) have these alone.
+    """
     return sorted(path.stem for path in PRESETS.glob("*.usda"))
+
+
+def preset_path(name: str) -> Path:
+    """The layer of a preset, which need not exist."""
+    folder = TRADE if (TRADE / f"{name}.usda").exists() else PRESETS
+    return folder / f"{name}.usda"
 
 
 def split_source(source: str | os.PathLike[str]) -> tuple[Path, str]:
@@ -39,7 +58,7 @@ def split_source(source: str | os.PathLike[str]) -> tuple[Path, str]:
         raise FabricError(repr(text), "does not name a file; it must name a USD file or a preset")
     prim = f"/{prim}" if separator else ""
     if not os.path.exists(file) and file in preset_names():
-        return PRESETS / f"{file}.usda", prim
+        return preset_path(file), prim
     return Path(file), prim
 
 

@@ -193,6 +193,20 @@ def houndstooth(words: list[str]) -> Draft:
     return Draft(weave=weave, palette=(DARK, LIGHT), warp_colors=order, weft_colors=order)
 
 
+@named("ripstop", "ripstop 24")
+def ripstop(words: list[str]) -> Draft:
+    """Plain weave in which two neighbours weave as one, at every so many ends and picks: a grid."""
+    form = "ripstop 24"
+    width = _number(words.pop(0), form) if words else 24
+    _expect_none(words, form)
+    if width < 4:
+        raise FabricError("", f"has a pair every {width} threads; that number must be at least 4")
+    # Each pair takes a thread out of the alternation: an even width repeats after two pairs.
+    count = width if width % 2 else 2 * width
+    i, j = (k - k // width - (k % width == width - 1) for k in _grid(count, count))
+    return Draft(weave=Weave((i + j) % 2 == 0, f"ripstop {width}"))
+
+
 def _over(runs: list[int]) -> NDArray[np.bool_]:
     """Alternating runs of over and under: 2/1 -> [True, True, False]."""
     if len(runs) % 2:
