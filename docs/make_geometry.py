@@ -28,7 +28,7 @@ from fabricusd.geometry.tables import (
     table_names,
     views,
 )
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 
 HERE = Path(__file__).resolve().parent
 SHOWN = (0.0, 45.0, 75.0, 85.0)
@@ -178,7 +178,7 @@ def main() -> None:
     for name, t in found.items():
         lines += share_rows(name, t)
     lines.append(REFUSED)
-    for name in sorted(set(preset_names()) - set(found)):
+    for name in sorted(set(published_names()) - set(found)):
         try:
             tubes(load(name))
         except FabricError as reason:

@@ -113,15 +113,14 @@ def _fabric(
     """(the fabric before it is spun and dyed, notes, the colours to dye it with or None)."""
     if options.preset is not None:
         from fabricusd.schema.read import load
-        from fabricusd.schema.source import preset_names
+        from fabricusd.schema.source import preset_hint, preset_names
         from fabricusd.weaves.draft import quoted
 
         if options.preset not in preset_names():
             raise FabricError(
                 "",
-                f"there is no preset {quoted(options.preset)}"
-                f"{did_you_mean(options.preset, preset_names())}; see 'fabricusd new "
-                "--list-presets'",
+                f"there is no preset {quoted(options.preset)}{preset_hint(options.preset)}; see "
+                "'fabricusd new --list-presets'",
             )
         for option in NOT_OF_PRESETS:
             # Compare by identity, since 0 == False.

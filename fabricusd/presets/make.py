@@ -47,7 +47,7 @@ def woven(row: Row) -> Fabric:
     def spun(thread: Thread, _threads: ThreadSet, label: str) -> Thread:
         return _spun(thread, row.warp if label == WARP_LABEL else row.weft, row.fibre)
 
-    return _covered(_named(spun_anew(fabric, spun), row))
+    return _corded(_covered(_named(spun_anew(fabric, spun), row)), row)
 
 
 def made(row: Row, sides: Sides = UNSTATED) -> Fabric:
@@ -110,6 +110,25 @@ def _covered(fabric: Fabric) -> Fabric:
         fabric,
         warp=replace(fabric.warp, coverage=warp),
         weft=replace(fabric.weft, coverage=weft),
+    )
+
+
+def _corded(fabric: Fabric, row: Row) -> Fabric:
+    """`fabric` with the cords of its row: in both sets, the last threads of every so many."""
+    apart, wide, angle = row.cords
+    if not wide:
+        return fabric
+    (name, thread), *others = fabric.threads.items()
+    if others:
+        raise FabricError(f"preset '{row.name}'", "has cords; its warp and weft must be alike")
+    curve = TangentCurve(angles=(-angle * DEGREE, angle * DEGREE))
+    said = _lines(f"{thread.documentation} In the cords, it stands up from the cloth: assumed.")
+    sequence = (0,) * (apart - wide) + (1,) * wide
+    return replace(
+        fabric,
+        threads={name: thread, "Cord": replace(thread, curve=curve, documentation=said)},
+        warp=replace(fabric.warp, sequence=sequence),
+        weft=replace(fabric.weft, sequence=sequence),
     )
 
 

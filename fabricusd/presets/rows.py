@@ -38,6 +38,8 @@ class Row:
     is_named : what the cloth is, as the first words of its documentation
     trade : lightest and heaviest that such cloth is sold [g/m2]
     source : where counts, densities and weight come from; what is assumed beyond that
+    cords : (threads from one cord to the next, threads in a cord, angle [degrees] at which a cord
+        rises and falls); (0, 0, 0) for cloth without cords
     is_open : whether more than 3 % of the cloth may be gap
     """
 
@@ -49,6 +51,7 @@ class Row:
     weft: Yarn
     trade: tuple[float, float]
     source: str
+    cords: tuple[int, int, float] = (0, 0, 0.0)
     is_open: bool = False
 
 
@@ -56,6 +59,9 @@ def _floating(over: int, angle: float = 20.0) -> tuple[tuple[float, ...], tuple[
     """A float over some threads: it rises over the first, lies flat, and falls over the last."""
     return (0.0, 1.0, over - 1.0, float(over)), (-angle, 0.0, 0.0, angle)
 
+
+FLAT = (0.0, 1.0), (-8.0, 8.0)
+"""The curve of a thread that is pressed flat."""
 
 ROWS = (
     Row(
@@ -169,14 +175,14 @@ ROWS = (
         "range of weight are assumed.",
     ),
     Row(
-        name="nylon_ripstop", is_named="Nylon ripstop, orange, the grid 6 to 7 mm wide",
+        name="nylon_ripstop", is_named="Nylon ripstop, orange",
         weave="ripstop 24", fibre="nylon",
-        warp=Yarn(count="70 den", spun="bright", color="#dc6c3a", per=104),
-        weft=Yarn(count="70 den", spun="bright", color="#dc6c3a", per=84),
+        warp=Yarn(count="70 den", spun="bright", color="#dc6c3a", per=104, curve=FLAT),
+        weft=Yarn(count="70 den", spun="bright", color="#dc6c3a", per=84, curve=FLAT),
         trade=(50, 65),
         source="Parachute cloth of ripstop weave weighs at most 1.1 or 1.6 ounces per square yard "
         "[MILC7020H], uncoated cloth for tents up to 1.9. 70 den, densities and the grid are "
-        "assumed.",
+        "assumed, and so is that the doubled threads stand up from a flat, calendered ground.",
     ),
     Row(
         name="organza", is_named="Silk organza, blush", weave="plain", fibre="silk",

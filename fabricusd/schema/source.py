@@ -13,6 +13,7 @@ from pxr import Sdf, Tf, Usd, UsdUtils
 from fabricusd.errors import FabricError, did_you_mean, one_line, reads
 from fabricusd.files import readable_file
 from fabricusd.schema.access import kind_of, type_of
+from fabricusd.weaves.knits import knitted
 
 PRESETS = Path(__file__).resolve().parent / "presets"
 """Layers of the published fabrics and threads, and of what is derived from their sources."""
@@ -47,6 +48,15 @@ def preset_path(name: str) -> Path:
     return folder / f"{name}.usda"
 
 
+def preset_hint(name: str) -> str:
+    """What to say of a name that no preset has: that it is a knit, what was meant, or ""."""
+    if knit := knitted(name):
+        return f"; it {knit}"
+    known = preset_names()
+    within = [each for each in known if name and name.lower() in each]
+    return f" (did you mean '{within[0]}'?)" if within else did_you_mean(name, known)
+
+
 def split_source(source: str | os.PathLike[str]) -> tuple[Path, str]:
     """`FILE[:/PRIM]` or a preset's name -> (file, prim path or "")."""
     text = os.fspath(source)
@@ -72,8 +82,10 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
     path, _ = split_source(source)
     missing = "does not exist"
     if not path.suffix:
-        hint = did_you_mean(str(path), preset_names())
-        missing = f"is neither a file nor a preset{hint}; presets are {', '.join(preset_names())}"
+        hint = preset_hint(str(path))
+        missing = f"is neither a file nor a preset{hint}"
+        if not knitted(str(path)):
+            missing += f"; presets are {', '.join(preset_names())}"
     readable_file(path, missing=missing)
     with usd_errors(str(path)):
         if Sdf.FileFormat.FindByExtension(str(path)) is None:
