@@ -115,18 +115,23 @@ def _covered(fabric: Fabric) -> Fabric:
 
 def _corded(fabric: Fabric, row: Row) -> Fabric:
     """`fabric` with the cords of its row: in both sets, the last threads of every so many."""
-    apart, wide, angle = row.cords
-    if not wide:
+    cords = row.cords
+    if cords is None:
         return fabric
     (name, thread), *others = fabric.threads.items()
     if others:
         raise FabricError(f"preset '{row.name}'", "has cords; its warp and weft must be alike")
-    curve = TangentCurve(angles=(-angle * DEGREE, angle * DEGREE))
-    said = _lines(f"{thread.documentation} In the cords, it stands up from the cloth: assumed.")
-    sequence = (0,) * (apart - wide) + (1,) * wide
+    angle = cords.angle * DEGREE
+    cord = replace(
+        thread,
+        curve=TangentCurve(angles=(-angle, angle)),
+        color=parse_color(cords.color),
+        documentation=_lines(f"{thread.documentation} In cords, it stands up: assumed."),
+    )
+    sequence = (0,) * (cords.apart - cords.wide) + (1,) * cords.wide
     return replace(
         fabric,
-        threads={name: thread, "Cord": replace(thread, curve=curve, documentation=said)},
+        threads={name: thread, "Cord": cord},
         warp=replace(fabric.warp, sequence=sequence),
         weft=replace(fabric.weft, sequence=sequence),
     )

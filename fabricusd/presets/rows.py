@@ -32,14 +32,27 @@ class Yarn:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Cords:
+    """Threads that weave as one, of the yarns of their sets.
+
+    apart, wide : threads from one cord to the next, and in a cord
+    angle : at which a cord rises and falls [degrees]
+    """
+
+    apart: int
+    wide: int
+    angle: float
+    color: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Row:
     """One preset.
 
     is_named : what the cloth is, as the first words of its documentation
     trade : lightest and heaviest that such cloth is sold [g/m2]
     source : where counts, densities and weight come from; what is assumed beyond that
-    cords : (threads from one cord to the next, threads in a cord, angle [degrees] at which a cord
-        rises and falls); (0, 0, 0) for cloth without cords
+    cords : thicker lines in both sets, if there are any
     is_open : whether more than 3 % of the cloth may be gap
     """
 
@@ -51,7 +64,7 @@ class Row:
     weft: Yarn
     trade: tuple[float, float]
     source: str
-    cords: tuple[int, int, float] = (0, 0, 0.0)
+    cords: Cords | None = None
     is_open: bool = False
 
 
@@ -86,9 +99,9 @@ ROWS = (
     Row(
         name="cotton_sateen", is_named="Cotton sateen for bed linen, ivory",
         weave="satin 5 step 2", fibre="cotton",
-        warp=Yarn(count="Ne 60", spun="combed", color="lab(93, 1, 7)", per=173,
+        warp=Yarn(count="Ne 60", spun="combed", color="lab(91, 1, 11)", per=173,
                   curve=_floating(4)),
-        weft=Yarn(count="Ne 60", spun="combed", color="lab(93, 1, 7)", per=120),
+        weft=Yarn(count="Ne 60", spun="combed", color="lab(91, 1, 11)", per=120),
         trade=(110, 135),
         source="Sateen sheets have about 300 threads per square inch, four over and one under "
         "[MatteoSateen]; 173 x 120 of Ne 60 is assumed. Sateen of dress goods is weft-faced.",
@@ -176,13 +189,15 @@ ROWS = (
     ),
     Row(
         name="nylon_ripstop", is_named="Nylon ripstop, orange",
-        weave="ripstop 24", fibre="nylon",
+        weave="ripstop 24/3", fibre="nylon",
+        cords=Cords(apart=24, wide=3, angle=40.0, color="#bc5a33"),
         warp=Yarn(count="70 den", spun="bright", color="#dc6c3a", per=104, curve=FLAT),
         weft=Yarn(count="70 den", spun="bright", color="#dc6c3a", per=84, curve=FLAT),
         trade=(50, 65),
         source="Parachute cloth of ripstop weave weighs at most 1.1 or 1.6 ounces per square yard "
         "[MILC7020H], uncoated cloth for tents up to 1.9. 70 den, densities and the grid are "
-        "assumed, and so is that the doubled threads stand up from a flat, calendered ground.",
+        "assumed, and so are cords of three threads, a shade deeper, that stand up from a flat, "
+        "calendered ground.",
     ),
     Row(
         name="organza", is_named="Silk organza, blush", weave="plain", fibre="silk",
