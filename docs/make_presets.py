@@ -27,7 +27,8 @@ from fabricusd.fabric import Binding, Fabric
 from fabricusd.files import whole_file
 from fabricusd.images.view import encode
 from fabricusd.presets.rows import ROWS, Row
-from fabricusd.reference.render import render_scene
+from fabricusd.reference.denoise import has_denoiser
+from fabricusd.reference.render import render
 from fabricusd.scene.light_kinds import DISTANT, DOME
 from fabricusd.scene.scene import (
     Camera,
@@ -119,10 +120,10 @@ def square(fabric: Fabric, side: float, *, stripes: float) -> Scene:
     )
 
 
-def picture(scene: Scene, size: int, spp: int) -> np.ndarray:
+def picture(scene: Scene, size: int, spp: int, *, denoise: bool = False) -> np.ndarray:
     """(size, size, 3) of a scene, for a screen."""
-    made = render_scene(scene, width=size, height=size, spp=spp)
-    return encode(made.layers["beauty"][..., :3], 0.0)
+    made = render(scene, width=size, height=size, spp=spp, denoise=denoise)
+    return encode(made.layers["denoised" if denoise else "beauty"][..., :3], 0.0)
 
 
 def tile(studio: Scene, fabric: Fabric, spp: int) -> np.ndarray:
@@ -133,7 +134,7 @@ def tile(studio: Scene, fabric: Fabric, spp: int) -> np.ndarray:
         found[-2:] = found[:, :2] = 255
         return found
 
-    hung = picture(dressed(studio, fabric), TALL, spp)
+    hung = picture(dressed(studio, fabric), TALL, max(spp // 3, 1), denoise=has_denoiser())
     sides = [
         np.concatenate([seen(cloth, side) for side in (FAR, NEAR)])
         for cloth in (fabric, back_of(fabric))
