@@ -10,6 +10,7 @@ docs/images/presets_try.png, and the page is left alone.
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import tempfile
 from dataclasses import replace
@@ -22,11 +23,15 @@ matplotlib.use("agg")
 
 from matplotlib import pyplot
 
+from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.lookup import back_of
+from fabricusd.dye import cloth_color
+from fabricusd.dye.difference import code
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.files import whole_file
 from fabricusd.images.view import encode
 from fabricusd.presets.rows import ROWS, Row
+from fabricusd.presets.spinning import SPINNING
 from fabricusd.reference.denoise import has_denoiser
 from fabricusd.reference.render import render
 from fabricusd.scene.light_kinds import DISTANT, DOME
@@ -40,6 +45,7 @@ from fabricusd.scene.scene import (
 )
 from fabricusd.scene.usd.stage import read_usd_scene
 from fabricusd.schema import load
+from fabricusd.weaves.cloth import GRAM, weight
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "samples"))
@@ -165,15 +171,112 @@ def sheet(rows: list[Row], target: Path, spp: int) -> None:
         figure.savefig(temporary, format="png")
 
 
+HEAD = """# Cloth of the trade
+
+Made by `python docs/make_presets.py`.
+
+These presets are *derived*, not published: cloth that people look for, woven from yarn counts and
+densities of the trade by the functions that `fabricusd new` is made of, under the `conserving` law.
+
+    fabricusd new --preset denim -o denim.usda
+    fabricusd set denim.usda warp.colour="#1f2a4d" weight=14oz
+
+![The derived presets](images/presets.png)
+
+Each as a tablecloth; then 60 mm (above) and 12 mm (below) of its face, and the same of its back.
+The squares lie a millimetre above a card of dark and light stripes, which show where light comes
+through.
+
+| preset | what | weave | warp | weft | g/m² | in the trade | colour | gap | sources |
+|---|---|---|---|---|---:|---:|---|---:|---|
+"""
+
+MIDDLE = """
+The weight is computed from counts, densities and the crimp of the curves ([yarns.md](yarns.md)).
+The colour is that of the cloth, folded until opaque ([color.md](color.md)). The layer's `doc` says
+which numbers have a source and which are assumed. The range of weights in the trade has a source
+for canvas, denim, gabardine and organza, and is assumed for the others. Sources are keys of
+[references.bib](references.bib).
+
+## Yarns
+A yarn is as thick as Peirce's ([yarns.md](yarns.md)), of fibres that fill the share *packing* of
+it. In cloth it is pressed flat: *flatness* is its width over its height, and its section keeps its
+area. A set covers what threads of that width cover, written as `fabric:warp:coverage` and
+`fabric:weft:coverage`. Packing and flatness are assumed. CVm and the variation of the count are
+those that are usual for the kind of yarn [UsterStatistics].
+
+| yarn | CVm | count varies by | slubs | packing | flatness | of |
+|---|---:|---:|---|---:|---:|---|
+"""
+
+TAIL = """
+Threads scatter as those that `fabricusd new --fibre` makes ([color.md](color.md)): no fit of
+cotton or nylon is published. Their curves are those of `new`, which rise and fall by 20°, but for
+the warp of sateen, whose floats are flat in the middle, and for ripstop, whose ground is flat and
+whose cords stand up. `fabric:sides:*` are measured on the tubes of each cloth
+([model.md](model.md), section 7).
+
+## Knits
+Jersey, interlock, rib, tricot and fleece are knitted, not woven. Where one is asked for by name,
+as in `--preset jersey`, an error says so, and names the woven preset that is nearest.
+
+## Published and derived
+`fabricusd.schema.preset_names()` names all presets, `published_names()` those that rest on the
+fabrics of [Bisker2011] and [Sadeghi2013], without the ones of this page. Tables that were measured
+for each preset, such as those behind `render --max-error`, have the published ones alone; any other
+cloth, those of this page included, gets the settings that the hardest of them needs.
+
+## To add one
+Add a row to `fabricusd/presets/rows.py`, run `python -m fabricusd.presets --only NAME`, and look at
+what `python docs/make_presets.py NAME` renders. A test holds each layer to its row.
+"""
+
+
+def line(row: Row) -> str:
+    """A preset's line of the table."""
+    fabric = load(row.name)
+    found = weight(fabric)
+    assert found is not None
+    low, high = row.trade
+    keys = ", ".join(re.findall(r"\[\w+\]", row.source)) or "assumed"
+    return (
+        f"| `{row.name}` | {row.is_named} | {row.weave} | {row.warp} | {row.weft} | "
+        f"{found.total / GRAM:.0f} | {low:g} to {high:g} | `{code(cloth_color(fabric))}` | "
+        f"{100 * float(coverage(fabric).gap):.1f} % | {keys} |\n"
+    )
+
+
+def yarn_line(name: str) -> str:
+    """The line of a kind of yarn."""
+    kind = SPINNING[name]
+    amount, length, spacing = kind.slub
+    slubs = f"{100 * amount:g} % wider, {length * 1e3:g} mm long, {spacing * 1e3:g} mm apart"
+    of = [row.name for row in ROWS if name in (row.warp.spun, row.weft.spun)]
+    return (
+        f"| {kind.words} | {100 * kind.cv:g} % | {100 * kind.count:g} % | "
+        f"{slubs if amount else 'none'} | {kind.packing:g} | {kind.flatness:g} | "
+        f"{', '.join(of)} |\n"
+    )
+
+
+def page() -> str:
+    """The text of docs/presets.md."""
+    return "".join((HEAD, *map(line, ROWS), MIDDLE, *map(yarn_line, SPINNING), TAIL))
+
+
 def main() -> None:
     """Make the sheet, and the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="presets (default: all)")
     parser.add_argument("--spp", type=int, default=48)
+    parser.add_argument("--page", action="store_true", help="write the page alone")
     options = parser.parse_args()
     rows = [row for row in ROWS if not options.names or row.name in options.names]
     name = "presets_try.png" if options.names else "presets.png"
-    sheet(rows, HERE / "images" / name, options.spp)
+    if not options.names:
+        (HERE / "presets.md").write_text(page(), encoding="utf-8")
+    if not options.page:
+        sheet(rows, HERE / "images" / name, options.spp)
 
 
 if __name__ == "__main__":

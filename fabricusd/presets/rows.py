@@ -84,7 +84,8 @@ ROWS = (
         weft=Yarn(count="Ne 40", spun="combed", color="lab(95, 0, 0)", per=72),
         trade=(110, 125),
         source="Counts and densities are a usual specification of the trade, C 40x40 133x72: "
-        "about twice as many ends as picks make the fine cross ribs [AmzPoplin].",
+        "about twice as many ends as picks make the fine cross ribs [AmzPoplin]. The range of "
+        "weight is assumed.",
     ),
     Row(
         name="cotton_canvas", is_named="Cotton canvas, ten-ounce duck, unbleached", weave="plain",
@@ -104,7 +105,7 @@ ROWS = (
         weft=Yarn(count="Ne 60", spun="combed", color="lab(91, 1, 11)", per=120),
         trade=(110, 135),
         source="Sateen sheets have about 300 threads per square inch, four over and one under "
-        "[MatteoSateen]; 173 x 120 of Ne 60 is assumed. Sateen of dress goods is weft-faced.",
+        "[MatteoSateen]; 173 x 120 of Ne 60 and the range of weight are assumed.",
     ),
     Row(
         name="denim", is_named="Blue denim, warp of indigo, weft unbleached", weave="twill 3/1 Z",
@@ -123,7 +124,8 @@ ROWS = (
         weft=Yarn(count="Ne 20", spun="carded", color="lab(94, 0, 2)", per=76),
         trade=(150, 200),
         source="Plain weave of a dyed warp and a white weft, nearly square, 80 x 76 [Chambray]. "
-        "Ne 20, of the range that is spun for chambray [CottonInc1010], is assumed.",
+        "Ne 20, of the range that is spun for chambray [CottonInc1010], and the range of "
+        "weight are assumed.",
         is_open=True,
     ),
     Row(
@@ -133,7 +135,7 @@ ROWS = (
         weft=Yarn(count="Ne 12", spun="soft", color="lab(94, 0, 1)", per=50),
         trade=(150, 200),
         source="Two fine ends travel as one over one thicker, softly spun pick [FabricDictionary]. "
-        "Counts and densities are assumed.",
+        "Counts, densities and the range of weight are assumed.",
     ),
     Row(
         name="gauze", is_named="Cotton gauze (cheesecloth of grade 90), bleached", weave="plain",
@@ -141,7 +143,8 @@ ROWS = (
         warp=Yarn(count="Ne 30", spun="carded", color="lab(93, 0, 3)", per=44),
         weft=Yarn(count="Ne 30", spun="carded", color="lab(93, 0, 3)", per=36),
         trade=(50, 70),
-        source="Grade 90 has 44 x 36 threads per inch [Cheesecloth]; Ne 30 is assumed.",
+        source="Grade 90 has 44 x 36 threads per inch [Cheesecloth]; Ne 30 and the range of "
+        "weight are assumed.",
         is_open=True,
     ),
     Row(
@@ -151,8 +154,8 @@ ROWS = (
         weft=Yarn(count="Nm 2/52", spun="worsted", color="lab(24, 2, -13)", per=28,
                   unit=CENTIMETRE),
         trade=(230, 270),
-        source="Suitings are sold by weight; 8 to 9 ounces is a middling one [PermanentStyle]. "
-        "Counts and densities are assumed such that it weighs that.",
+        source="Suitings are sold by weight [PermanentStyle]; counts, densities and the range of "
+        "weight, that of a middling one, are assumed.",
     ),
     Row(
         name="herringbone_tweed", is_named="Herringbone tweed, brown warp and oatmeal weft",
@@ -195,8 +198,8 @@ ROWS = (
         weft=Yarn(count="70 den", spun="bright", color="#dc6c3a", per=84, curve=FLAT),
         trade=(50, 65),
         source="Parachute cloth of ripstop weave weighs at most 1.1 or 1.6 ounces per square yard "
-        "[MILC7020H], uncoated cloth for tents up to 1.9. 70 den, densities and the grid are "
-        "assumed, and so are cords of three threads, a shade deeper, that stand up from a flat, "
+        "[MILC7020H]; 70 den, densities, the grid and the range of weight are assumed, and so "
+        "are cords of three threads, a shade deeper, that stand up from a flat, "
         "calendered ground.",
     ),
     Row(
