@@ -166,8 +166,6 @@ from fabricusd.steps import watched
 def say(name, total, done):
     if name.startswith("horizon table") and done == 1:
         print("table", flush=True)
-    if name.startswith("horizon table") and done == total:
-        print("over", flush=True)
 
 with watched(listener=say):
     sys.exit(main(["render", *sys.argv[1:]]))
@@ -191,7 +189,6 @@ def test_the_tables_of_a_large_repeat_are_broken_off_within_two_seconds(number, 
     (tmp_path / "x.obj").write_text(
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n"
     )
-    before = sorted(p.name for p in tmp_path.iterdir())
     command = [
         sys.executable, "-c", TABLES, "x.obj", "--units", "m", "--fabric", "damask.usda", "-o",
         "x.exr", "--width", "64", "--height", "64", "--level", "weave", "--spp", "4",
@@ -201,4 +198,8 @@ def test_the_tables_of_a_large_repeat_are_broken_off_within_two_seconds(number, 
     process.send_signal(number)
     assert "interrupted" in end(process, 130)
     assert time.perf_counter() - begun < 2.0
-    assert sorted(p.name for p in tmp_path.iterdir()) == before
+    # Pixels that look past the cloth may have been sampled by then, and are kept.
+    if (tmp_path / "x.exr").exists():
+        assert read_exr_layers(tmp_path / "x.exr")[1]["fabricusd:complete"] == 0
+    left = {p.name for p in tmp_path.iterdir()} - {"x.exr", "x.png"}
+    assert left == {"damask.usda", "x.obj"}
