@@ -18,6 +18,7 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from PIL import Image
 
 matplotlib.use("agg")
 
@@ -169,6 +170,8 @@ def sheet(rows: list[Row], target: Path, spp: int) -> None:
         print(row.name, flush=True)
     with whole_file(str(target)) as temporary:
         figure.savefig(temporary, format="png")
+        # Noise makes a file of 16 million colours four times as large.
+        Image.open(temporary).convert("RGB").quantize(256).save(temporary, "PNG", optimize=True)
 
 
 HEAD = """# Cloth of the trade

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 SHOWN = "silk_shot"
 """The preset that the last lines propose to look at."""
 
-EPILOG = """Prints a line for each cloth among the presets, and what to open. Presets of single yarns
-and of backs are written too. With -v, each is described and drawn.
+EPILOG = """Prints a line for each cloth among the presets, and what to open; single yarns and
+backs are written too. With -v, each is described and drawn.
 
 example:
   fabricusd demo -o demo"""

@@ -110,7 +110,7 @@ ROWS = (
     Row(
         name="denim", is_named="Blue denim, warp of indigo, weft unbleached", weave="twill 3/1 Z",
         fibre="cotton",
-        warp=Yarn(count="Ne 7", spun="denim", color="#2c3858", per=72),
+        warp=Yarn(count="Ne 7", spun="denim", color="#2b3c70", per=72),
         weft=Yarn(count="Ne 10", spun="rotor", color="#e0dccf", per=56),
         trade=(370, 440),
         source="Counts and densities are a typical specification, 7x10 72x56 [DaffodilDenim]; "
