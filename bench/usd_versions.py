@@ -40,22 +40,22 @@ print(f"{count} presets")
 LOAD = """
 import hashlib, json, sys, tempfile
 from pathlib import Path
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 from fabricusd.schema.describe import as_dict
-fabrics = [load(name) for name in preset_names()]
+fabrics = [load(name) for name in published_names()]
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder, "aces.usda")
     path.write_text(sys.argv[1])
     fabrics.append(load(path))
 text = json.dumps([as_dict(fabric) for fabric in fabrics], sort_keys=True)
-print(f"{len(preset_names())} presets, digest {hashlib.sha256(text.encode()).hexdigest()[:8]}")
+print(f"{len(published_names())} presets, digest {hashlib.sha256(text.encode()).hexdigest()[:8]}")
 """
 CHECK = """
 import sys
 from pathlib import Path
-from fabricusd.schema import check, preset_names
+from fabricusd.schema import check, published_names
 from fabricusd.schema.rules.rules import RULES
-for name in preset_names():
+for name in published_names():
     assert check(name) == [], (name, check(name))
 for rule in RULES:
     found = check(Path(sys.argv[1]) / f"{rule.function.__name__}.usda")

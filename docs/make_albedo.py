@@ -14,7 +14,7 @@ import numpy as np
 from fabricusd.appearance import surface
 from fabricusd.appearance.albedo import FINE, albedo_by_view, safe_albedo
 from fabricusd.fabric import Fabric
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 
 HERE = Path(__file__).resolve().parent
 THETA = (0.0, 30.0, 60.0, 75.0, 85.0, 89.0, 89.9)
@@ -71,7 +71,7 @@ def main() -> None:
     for model in ("microcylinder", "thesis", "conserving"):
         lines += [f"## {model}", "", f"| preset | {columns} | safe A |"]
         lines += ["|---" * (len(THETA) + 2) + "|"]
-        for name in preset_names():
+        for name in published_names():
             fabric = uniform_model(load(name), model)
             if model == "conserving":
                 lines.append(row(name, conserving(fabric), "1"))

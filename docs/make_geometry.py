@@ -31,7 +31,7 @@ from fabricusd.geometry.tables import (
     views,
 )
 from fabricusd.quality.colors import delta_e_2000
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 
 HERE = Path(__file__).resolve().parent
 SHOWN = (0.0, 45.0, 75.0, 85.0)
@@ -212,7 +212,7 @@ def main() -> None:
     lines.append(SECOND)
     lines += [second_row(name) for name in sorted({*found, *LIKE})]
     lines.append(REFUSED)
-    for name in sorted(set(preset_names()) - set(found)):
+    for name in sorted(set(published_names()) - set(found)):
         try:
             tubes(load(name))
         except FabricError as reason:

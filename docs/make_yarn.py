@@ -23,7 +23,7 @@ from fabricusd.images.files import write_png
 from fabricusd.reference.render import render_scene
 from fabricusd.scene.light_kinds import DISTANT, DOME
 from fabricusd.scene.scene import Camera, FabricSurface, Light, Mesh, Scene
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 from fabricusd.schema.describe import yarn_words
 
 HERE = Path(__file__).resolve().parent
@@ -298,8 +298,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--page", action="store_true")
     options = parser.parse_args()
-    fabrics = [n for n in preset_names() if not n.startswith("thread_") and not n.endswith("back")]
-    singles = [n for n in preset_names() if n.startswith("thread_")]
+    fabrics = [
+        n for n in published_names() if not n.startswith("thread_") and not n.endswith("back")
+    ]
+    singles = [n for n in published_names() if n.startswith("thread_")]
     if not options.page:
         close_ups(fabrics, 2, HERE / "images" / "yarn.png")
         close_ups(singles, 2, HERE / "images" / "yarn_threads.png")
@@ -310,7 +312,7 @@ def main() -> None:
         pairs=len(PAIRS), plied=yarn_words(plied(450.0).thread_list[0]),
         distances=", ".join(f"{x:g}" for x in DISTANCES),
     )  # fmt: skip
-    lines = [words, *(row(name) for name in preset_names()), TAIL]
+    lines = [words, *(row(name) for name in published_names()), TAIL]
     (HERE / "yarn.md").write_text("\n".join(lines))
 
 

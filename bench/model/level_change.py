@@ -18,7 +18,7 @@ from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.chart.cloth_picture import difference, ideal_spectrum, picture, view_of
 from fabricusd.chart.level_errors import LIGHTS, TO_EYE, zoom
 from fabricusd.fabric import even
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 
 REPEATS = (0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6, 0.8)
 SAMPLES = 64
@@ -27,7 +27,7 @@ SAMPLES = 64
 def main() -> None:
     """Print a table for every preset: repeats per pixel, and the errors of the levels."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("presets", nargs="*", default=preset_names())
+    parser.add_argument("presets", nargs="*", default=published_names())
     names = parser.parse_args().presets
     print("| preset, level | " + " | ".join(f"{r:g}" for r in REPEATS) + " |")
     print("|---" * (1 + len(REPEATS)) + "|")

@@ -20,7 +20,7 @@ import numpy as np
 from fabricusd.appearance import surface
 from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.fabric import MODELS, Fabric
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 
 DIRECTIONS = 4000
 VIEWS = [(10, 20), (35, 0), (40, 90), (60, 215), (70, 130), (75, 0), (80, 75)]
@@ -77,7 +77,7 @@ def table() -> str:
         "| preset | model | far | | weave | | thread | |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for name in preset_names():
+    for name in published_names():
         for model in MODELS:
             preset = load(name)
             threads = {k: replace(t, model="") for k, t in preset.threads.items()}

@@ -21,7 +21,7 @@ def write_table(path: Path, quick: bool = True) -> None:
     from fabricusd.chart.level_errors import coarsest
     from fabricusd.chart.panel import Row
     from fabricusd.chart.panels import shadows
-    from fabricusd.schema import load, preset_names
+    from fabricusd.schema import load, published_names
 
     found: dict[str, dict[str, tuple[float, float]]] = {}
     rows: list[Row] = shadows.run(quick, shadows.WOVEN)
@@ -31,7 +31,7 @@ def write_table(path: Path, quick: bool = True) -> None:
             found.setdefault(row.group, {})[row.method] = (cost, error)
     # On pile, every method returns 1.
     found["velvet"] = {m: (found[shadows.WOVEN[0]][m][0], 0.0) for m in METHODS}
-    levels = {name: coarsest(even(load(name)), BOUNDS) for name in preset_names()}
+    levels = {name: coarsest(even(load(name)), BOUNDS) for name in published_names()}
     text = json.dumps({"shadows": found, "levels": levels}, indent=1)
     with whole_file(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")

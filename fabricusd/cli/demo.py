@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 SHOWN = "silk_shot"
 """The preset that the last lines propose to look at."""
 
-EPILOG = """Prints a line for each preset, and what to open. With -v, each is described and drawn.
+EPILOG = """Prints a line for each cloth among the presets, and what to open; single yarns and
+backs are written too. With -v, each is described and drawn.
 
 example:
   fabricusd demo -o demo"""
@@ -54,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
             findings += 1
         if options.verbose:
             print(f"{in_words(fabric)}\n\n{draw(fabric, width=72, height=24, color=False)}\n")
-        elif not options.quiet:
+        elif not options.quiet and not name.startswith("thread_") and not name.endswith("_back"):
             print(_line(fabric))
     if not options.quiet:
         print()

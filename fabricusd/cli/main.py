@@ -23,6 +23,7 @@ from fabricusd import __version__
 from fabricusd.cli.terminal.completion import SHELLS
 from fabricusd.cli.terminal.parser import Parser
 from fabricusd.cli.terminal.stdout import drop_stdout, ready_stdout
+from fabricusd.cli.terminal.steps import shown
 from fabricusd.errors import FabricError, FabricWarning, debugging, described, one_line
 from fabricusd.host import MISSING
 from fabricusd.partial_files import remove_own_partial_files
@@ -100,7 +101,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         commands[command].refuse_unknown(unknown)  # type: ignore[index]
     ready_stdout()
     warnings.formatwarning = _format_warning
-    return _guarded(lambda: int(options.run(options)))
+    return _guarded(lambda: _run(options))
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Run a command whose long steps are shown."""
+    with shown(quiet=options.quiet):
+        return int(options.run(options))
 
 
 def _print_completion(given: list[str]) -> int:

@@ -113,16 +113,15 @@ def _fabric(
     """(the fabric before it is spun and dyed, notes, the colours to dye it with or None)."""
     if options.preset is not None:
         from fabricusd.schema.read import load
-        from fabricusd.schema.source import VARIANTS, preset_names
+        from fabricusd.schema.source import VARIANTS, preset_hint, preset_names
         from fabricusd.weaves.draft import quoted
 
         named = VARIANTS.sub("", options.preset)
         if named not in preset_names():
             raise FabricError(
                 "",
-                f"there is no preset {quoted(named)}"
-                f"{did_you_mean(named, preset_names())}; see 'fabricusd new "
-                "--list-presets'",
+                f"there is no preset {quoted(named)}{preset_hint(named)}; see "
+                "'fabricusd new --list-presets'",
             )
         for option in NOT_OF_PRESETS:
             # Compare by identity, since 0 == False.

@@ -22,7 +22,7 @@ from fabricusd.fabric import MODELS, SURFACE_LAWS, Fabric
 from fabricusd.geometry.nearest import CONSERVING, write_variant
 from fabricusd.geometry.tables import directions
 from fabricusd.quality.colors import delta_e_2000
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 
 Floats = NDArray[np.float64]
 
@@ -112,7 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m fabricusd.geometry.conserve", description=__doc__
     )
-    parser.add_argument("names", nargs="*", metavar="NAME", default=preset_names())
+    parser.add_argument("names", nargs="*", metavar="NAME", default=published_names())
     parser.add_argument("--write", action="store_true", help="change the presets' layers")
     options = parser.parse_args(arguments)
     for name in options.names:

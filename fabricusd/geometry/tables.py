@@ -28,7 +28,7 @@ from fabricusd.fabric import Fabric
 from fabricusd.files import whole_file
 from fabricusd.geometry.cloth import Cloth, tubes
 from fabricusd.geometry.paths import Assumptions, Shares, albedo, reflectance
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 
 Floats = NDArray[np.float64]
 
@@ -203,7 +203,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m fabricusd.geometry.tables", description=__doc__
     )
-    parser.add_argument("--only", nargs="+", metavar="NAME", default=preset_names())
+    parser.add_argument("--only", nargs="+", metavar="NAME", default=published_names())
     folder = Path(__file__).resolve().parent / "data"
     parser.add_argument("-o", "--output", type=Path, default=folder, metavar="FOLDER")
     options = parser.parse_args(arguments)

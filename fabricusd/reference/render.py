@@ -314,6 +314,9 @@ def render_scene(
     stop.hold()
     counts = counters, lost
     complete = _sample(tracer, lens, film, count, counts, most, noise, progress, built, stop)
+    if not complete and not film.samples.any():
+        # Interrupted in the tables that the first samples need: there is no picture to keep.
+        raise KeyboardInterrupt
     seconds, busy = time.perf_counter() - built, time.process_time() - busy
     rays, shadow_rays, not_finite = (int(x) for x in counters.sum(axis=0))
     begun_at = float(film.sums[ALPHA].sum(dtype=np.float64))

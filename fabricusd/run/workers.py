@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.ranges import require_ranges
+from fabricusd.steps import current, watched
 from fabricusd.stop import Stop
 
 
@@ -43,7 +44,8 @@ class Batches:
     """Runs numbered batches on several workers, in any order.
 
     The calling thread waits. On Ctrl-C, or when `stop` is triggered, no further batch is started,
-    the running batches are finished, and `run` returns False. An error in a worker stops the others
+    the running batches are finished (those in a long step of `fabricusd.steps` are given up), and
+    `run` returns False. An error in a worker stops the others
     in the same way and is raised in the calling thread.
     """
 
@@ -56,10 +58,14 @@ class Batches:
 
     def run(self, count: int, progress: Callable[[int], Any] | None = None) -> bool:
         """Call `task(worker, batch)` for every batch below `count`; False if interrupted."""
-        lock = threading.Lock()
+        lock, watch = threading.Lock(), current()
         state: dict[str, Any] = {"next": 0, "done": 0, "error": None}
 
         def work(worker: int) -> None:
+            with watched(watch, stop=self.stop):
+                go_on(worker)
+
+        def go_on(worker: int) -> None:
             while True:
                 with lock:
                     batch = state["next"]
@@ -68,6 +74,10 @@ class Batches:
                     state["next"] += 1
                 try:
                     self.task(worker, batch)
+                except KeyboardInterrupt:
+                    # A long step inside of the batch was broken off.
+                    self.stop.asked = True
+                    return
                 except BaseException as error:
                     with lock:
                         state["error"] = error

@@ -14,7 +14,7 @@ register()
 
 from fabricusd.schema.check import Finding, check  # noqa: E402
 from fabricusd.schema.read import load, read_binding, read_fabric  # noqa: E402
-from fabricusd.schema.source import find_fabric, open_stage, preset_names  # noqa: E402
+from fabricusd.schema.source import find_fabric, open_stage, preset_names, published_names  # noqa: E402
 from fabricusd.schema.write import (  # noqa: E402
     export,
     save,
@@ -32,6 +32,7 @@ __all__ = [
     "load",
     "open_stage",
     "preset_names",
+    "published_names",
     "read_binding",
     "read_fabric",
     "save",

@@ -13,8 +13,13 @@ from pxr import Sdf, Tf, Usd, UsdUtils
 from fabricusd.errors import FabricError, did_you_mean, one_line, reads
 from fabricusd.files import readable_file
 from fabricusd.schema.access import kind_of, type_of
+from fabricusd.weaves.knits import knitted
 
 PRESETS = Path(__file__).resolve().parent / "presets"
+"""Layers of the published fabrics and threads, and of what is derived from their sources."""
+
+TRADE = PRESETS / "trade"
+"""Layers of cloth of the trade, which `python -m fabricusd.presets` makes."""
 
 PARSER_WORDS = {
     r"parse error matching \S.*? at '": "does not parse at '",
@@ -25,11 +30,35 @@ PARSER_WORDS = {
 
 def preset_names() -> list[str]:
     """Return the names of the fabrics that come with the package."""
+    return sorted([*published_names(), *(path.stem for path in TRADE.glob("*.usda"))])
+
+
+def published_names() -> list[str]:
+    """The names of those that rest on the fabrics of [Bisker2011] and [Sadeghi2013].
+
+    Tables that were measured per preset (the choice of methods, figures of tubes, medians of
+    shares by side) have these alone.
+    """
     return sorted(path.stem for path in PRESETS.glob("*.usda"))
 
 
 VARIANTS = re.compile(r"(?:\{[^{}=]*=[^{}=]*\})+$")
 """What chooses variants at the end of a source."""
+
+
+def preset_path(name: str) -> Path:
+    """The layer of a preset, which need not exist."""
+    folder = TRADE if (TRADE / f"{name}.usda").exists() else PRESETS
+    return folder / f"{name}.usda"
+
+
+def preset_hint(name: str) -> str:
+    """What to say of a name that no preset has: that it is a knit, what was meant, or ""."""
+    if knit := knitted(name):
+        return f"; it {knit}"
+    known = preset_names()
+    within = [each for each in known if name and name.lower() in each]
+    return f" (did you mean '{within[0]}'?)" if within else did_you_mean(name, known)
 
 
 def split_source(source: str | os.PathLike[str]) -> tuple[Path, str]:
@@ -43,7 +72,7 @@ def split_source(source: str | os.PathLike[str]) -> tuple[Path, str]:
         raise FabricError(repr(text), "does not name a file; it must name a USD file or a preset")
     prim = f"/{prim}" if separator else ""
     if not os.path.exists(file) and file in preset_names():
-        return PRESETS / f"{file}.usda", prim
+        return preset_path(file), prim
     return Path(file), prim
 
 
@@ -72,8 +101,10 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
     path, prim_path = split_source(source)
     missing = "does not exist"
     if not path.suffix:
-        hint = did_you_mean(str(path), preset_names())
-        missing = f"is neither a file nor a preset{hint}; presets are {', '.join(preset_names())}"
+        hint = preset_hint(str(path))
+        missing = f"is neither a file nor a preset{hint}"
+        if not knitted(str(path)):
+            missing += f"; presets are {', '.join(preset_names())}"
     readable_file(path, missing=missing)
     with usd_errors(str(path)):
         if Sdf.FileFormat.FindByExtension(str(path)) is None:

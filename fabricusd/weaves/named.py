@@ -193,6 +193,27 @@ def houndstooth(words: list[str]) -> Draft:
     return Draft(weave=weave, palette=(DARK, LIGHT), warp_colors=order, weft_colors=order)
 
 
+@named("ripstop", "ripstop 24/3")
+def ripstop(words: list[str]) -> Draft:
+    """Plain weave with a grid of cords: of every so many threads, the last few weave as one."""
+    form = "ripstop 24/3"
+    runs, words = _take_runs(words, form)
+    _expect_none(words, form)
+    if len(runs) > 2:
+        raise FabricError("", f"has {len(runs)} numbers; it must have 2, threads/cord")
+    width, cord = runs[0], (runs[1] if len(runs) > 1 else 2)
+    if not 2 <= cord <= width - 2:
+        raise FabricError(
+            "", f"has cords of {cord} in {width} threads; that number must be from 2 to {width - 2}"
+        )
+    # A cord counts as one thread: where their number is odd, the next cord is the opposite.
+    taken = width - cord + 1
+    count = width if taken % 2 == 0 else 2 * width
+    i, j = (k // width * taken + np.minimum(k % width, taken - 1) for k in _grid(count, count))
+    name = f"ripstop {width}/{cord}"
+    return Draft(weave=Weave((i + j) % 2 == 0, name))
+
+
 def _over(runs: list[int]) -> NDArray[np.bool_]:
     """Alternating runs of over and under: 2/1 -> [True, True, False]."""
     if len(runs) % 2:

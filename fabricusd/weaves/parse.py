@@ -7,6 +7,7 @@ import re
 from fabricusd.errors import FabricError, did_you_mean
 from fabricusd.weaves.draft import Draft, quoted
 from fabricusd.weaves.expression import parse_expression
+from fabricusd.weaves.knits import knitted
 from fabricusd.weaves.named import WEAVES, forms, parse_named
 
 
@@ -20,6 +21,9 @@ def parse_weave(text: str) -> Draft:
         return parse_named(text)
     if re.search(r"[()<>=%]", text):
         return parse_expression(text)
+    # A rib is a weave too.
+    if "rib" not in words and (knit := knitted(text)):
+        raise FabricError(f"weave {quoted(text)}", knit)
     hint = did_you_mean(words[0], WEAVES) if words else ""
     raise FabricError(
         f"weave {quoted(text)}",

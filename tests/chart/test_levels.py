@@ -14,7 +14,7 @@ from fabricusd.appearance.weave.footprint import weights
 from fabricusd.chart.level_errors import LIGHTS, TO_EYE, WIDTHS, Zoom, coarsest, zoom
 from fabricusd.fabric import even
 from fabricusd.reference.choice import choose_limits, read_limits
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 
 PIXELS_PER_THREAD = 1.0 / WIDTHS
 NAMES = ("linen_plain", "polyester_satin_charmeuse")
@@ -106,8 +106,8 @@ def test_the_shipped_limits_are_those_that_are_measured():
 
 
 def test_every_preset_has_limits_that_ask_more_of_a_smaller_bound():
-    assert set(read_limits()) == set(preset_names())
-    for name in preset_names():
+    assert set(read_limits()) == set(published_names())
+    for name in published_names():
         chosen = [choose_limits([name], bound)[0] for bound in (0.5, 0.2, 0.1, 0.05, 0.02)]
         assert [c.repeats for c in chosen] == sorted(c.repeats for c in chosen)
         assert [c.pixels for c in chosen] == sorted((c.pixels for c in chosen), reverse=True)
@@ -115,7 +115,7 @@ def test_every_preset_has_limits_that_ask_more_of_a_smaller_bound():
 
 def test_cloth_that_is_no_preset_takes_the_limits_of_the_hardest():
     hardest, _ = choose_limits([""], 0.1)
-    assert hardest.repeats == max(choose_limits([n], 0.1)[0].repeats for n in preset_names())
+    assert hardest.repeats == max(choose_limits([n], 0.1)[0].repeats for n in published_names())
     never, why = choose_limits([""], 1e-4)
     assert never.repeats == np.inf
     assert never.pixels == 0.0

@@ -9,7 +9,7 @@ from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.footprint import FAR, weights
 from fabricusd.chart.cloth_picture import SIZE, difference, ideal_spectrum, picture, view_of
 from fabricusd.fabric import even
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 from tests.appearance.presets import often
 
 
@@ -70,7 +70,7 @@ def test_a_close_view_is_nearly_its_spectrum():
     assert difference(picture(view, "weave", 4), turned).total > 0.5 * contrast
 
 
-@pytest.mark.parametrize("name", often(preset_names()))
+@pytest.mark.parametrize("name", often(published_names()))
 def test_auto_shows_of_a_repeat_what_a_picture_can_hold(name):
     """All of it from four pixels a repeat on; below two no moire, and nothing that is missing."""
     fabric = even(load(name))

@@ -135,6 +135,7 @@ BAD = {
     "no source": ["new", "-o", "a.usda"],
     "two sources": ["new", "--preset", "velvet", "--weave", "plain"],
     "an unknown preset": ["new", "--preset", "velours"],
+    "a preset that would be a knit": ["new", "--preset", "jersey"],
     "a preset without a name": ["new", "--preset", ""],
     "a preset with an option for drafts": ["new", "--preset", "velvet", "--thickness", "0"],
     "an unknown weave": ["new", "--weave", "twil 2/1"],

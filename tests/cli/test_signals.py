@@ -7,11 +7,15 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from fabricusd.fabric import ThreadSet, Weave
 from fabricusd.images.files import read_exr_layers
+from fabricusd.schema import load, save
 from fabricusd.stop import SIGNALS
 
 ROOT = str(Path(__file__).resolve().parents[2])
@@ -152,3 +156,50 @@ def test_a_layer_that_is_being_written_stays_as_it_was(tmp_path, number):
     assert end(process, 130) == "fabricusd: interrupted\n"
     assert (tmp_path / "velvet.usda").read_text() == "old"
     assert len(list(tmp_path.iterdir())) == 1
+
+
+TABLES = """
+import sys
+from fabricusd.cli.main import main
+from fabricusd.steps import watched
+
+def say(name, total, done):
+    if name.startswith("horizon table") and done == 1:
+        print("table", flush=True)
+
+with watched(listener=say):
+    sys.exit(main(["render", *sys.argv[1:]]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", SIGNALS)
+def test_the_tables_of_a_large_repeat_are_broken_off_within_two_seconds(number, tmp_path):
+    i, j = np.mgrid[0:240, 0:240]
+    figure = np.hypot(i - 120, j - 120) < 80 + 30 * np.sin(5 * np.arctan2(j - 120, i - 120))
+    satin = (5 * i + j) % 8 == 0
+    # No other run of this test has left the table in the cache.
+    density = 4000 + 100 * np.random.default_rng().random()
+    damask = replace(
+        load("silk_crepe_de_chine"),
+        weave=Weave(np.where(figure, ~satin, satin)),
+        warp=ThreadSet(sequence=(0,), density=density),
+    )
+    save(damask, tmp_path / "damask.usda")
+    (tmp_path / "x.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n"
+    )
+    command = [
+        sys.executable, "-c", TABLES, "x.obj", "--units", "m", "--fabric", "damask.usda", "-o",
+        "x.exr", "--width", "64", "--height", "64", "--level", "weave", "--spp", "4",
+    ]  # fmt: skip
+    process = started(command, tmp_path, "table")
+    begun = time.perf_counter()
+    process.send_signal(number)
+    assert "interrupted" in end(process, 130)
+    assert time.perf_counter() - begun < 2.0
+    # Pixels that look past the cloth may have been sampled by then, and are kept.
+    if (tmp_path / "x.exr").exists():
+        assert read_exr_layers(tmp_path / "x.exr")[1]["fabricusd:complete"] == 0
+    left = {p.name for p in tmp_path.iterdir()} - {"x.exr", "x.png"}
+    assert left == {"damask.usda", "x.obj"}

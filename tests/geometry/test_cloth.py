@@ -14,14 +14,14 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import DEGREE, TangentCurve, Weave
 from fabricusd.geometry import tubes
 from fabricusd.geometry.rays import NOTHING, blocked, nearest
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 
 REFUSED = {
     "polyester_satin_charmeuse_back": "pass through one another",
 }
 
 
-@pytest.mark.parametrize("name", sorted(set(preset_names()) - set(REFUSED)))
+@pytest.mark.parametrize("name", sorted(set(published_names()) - set(REFUSED)))
 def test_presets_have_a_geometry(name: str) -> None:
     fabric = load(name)
     cloth = tubes(fabric)

@@ -13,13 +13,13 @@ from fabricusd.geometry import reflectance, tubes
 from fabricusd.geometry import tables as tables_module
 from fabricusd.geometry.judge import judge
 from fabricusd.geometry.tables import directions, main, table, table_names
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 
 WITHOUT = {"polyester_satin_charmeuse_back"}
 
 
 def test_every_preset_with_a_geometry_has_a_table() -> None:
-    assert set(table_names()) == set(preset_names()) - WITHOUT
+    assert set(table_names()) == set(published_names()) - WITHOUT
 
 
 def test_tables_are_small() -> None:

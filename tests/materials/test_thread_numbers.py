@@ -16,7 +16,7 @@ from fabricusd.bake.job import Settings
 from fabricusd.bake.texels.encoding import FORMATS
 from fabricusd.fabric import Binding, Fabric, Thread, ThreadSet
 from fabricusd.reference import render
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 
 TEXELS, PIXELS = 128, 64
 """Of map and picture. With half as many texels the satin's weft lies between their centres."""
@@ -61,7 +61,7 @@ ONE_YARN_IN_BOTH_SETS = Fabric(
     warp=ThreadSet(sequence=(0, 1), coverage=0.4),
     weft=ThreadSet(sequence=(1, 0), coverage=0.3),
 )
-CLOTHS = {name: load(name) for name in preset_names()} | {"one yarn": ONE_YARN_IN_BOTH_SETS}
+CLOTHS = {name: load(name) for name in published_names()} | {"one yarn": ONE_YARN_IN_BOTH_SETS}
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from pxr import Gf, Usd, UsdValidation
 from fabricusd import FabricError
 from fabricusd.schema import check, load, preset_names, save
 from fabricusd.schema.colors import AS_IT_IS, NAMED
-from fabricusd.schema.source import PRESETS
+from fabricusd.schema.source import preset_path
 
 EARLIER = "lin_displayp3_scene"
 """What USD 24.11 calls lin_p3d65_scene."""
@@ -141,7 +141,7 @@ def test_a_color_space_that_the_stage_defines_is_read(tmp_path):
 
 @pytest.mark.parametrize("name", preset_names())
 def test_every_color_of_a_preset_says_its_color_space(name):
-    stage = Usd.Stage.Open(str(PRESETS / f"{name}.usda"))
+    stage = Usd.Stage.Open(str(preset_path(name)))
     colors = [
         attribute
         for prim in stage.Traverse()

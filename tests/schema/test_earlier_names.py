@@ -40,7 +40,7 @@ def with_new_names(problem: str) -> str:
 
 @pytest.mark.parametrize("name", preset_names())
 def test_a_preset_under_the_earlier_names_is_the_same_fabric(name, tmp_path):
-    for path in PRESETS.glob("*.usda"):
+    for path in PRESETS.rglob("*.usda"):
         (tmp_path / path.name).write_text(with_earlier_names(path.read_text()))
     assert "Woven" not in (tmp_path / f"{name}.usda").read_text()
     assert load(tmp_path / f"{name}.usda") == load(name)
@@ -99,7 +99,7 @@ def test_every_other_finding_of_a_layer_is_the_same_under_the_earlier_names(laye
 
     for folder, words in ((tmp_path / "now", str), (tmp_path / "earlier", with_earlier_names)):
         beside = [(path, path.relative_to(layer.parent)) for path in layer.parent.rglob("*.usda")]
-        presets = [(path, Path(path.name)) for path in PRESETS.glob("*.usda")]
+        presets = [(path, Path(path.name)) for path in PRESETS.rglob("*.usda")]
         for path, name in (*beside, *presets):
             (folder / name).parent.mkdir(exist_ok=True, parents=True)
             (folder / name).write_text(words(path.read_text()))

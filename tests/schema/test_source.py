@@ -38,6 +38,9 @@ def write(tmp_path, name, content):
 CASES = {
     "a preset that does not exist": (
         None, "linnen", "is neither a file nor a preset; presets .*linen_plain"),
+    "a knit": (
+        None, "cotton jersey", "is knitted, not woven; .* near is 'cotton_poplin'$"),
+    "a part of a preset's name": (None, "tweed", "did you mean 'herringbone_tweed'"),
     "a missing file": (None, "nowhere.usda", "nowhere.usda does not exist"),
     "an empty file": (("e.usda", b""), "{}", "is empty"),
     "a text that is no USD": (("t.usda", "hello"), "{}", "cannot be parsed as USD"),

@@ -79,7 +79,7 @@ def test_what_is_written_is_uniform():
             assert spec.variability == Sdf.VariabilityUniform, spec.path
 
 
-@pytest.mark.parametrize("path", sorted(PRESETS.glob("*.usda")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted(PRESETS.rglob("*.usda")), ids=lambda path: path.stem)
 def test_presets_are_uniform(path):
     layer = Sdf.Layer.FindOrOpen(str(path))
 

@@ -40,6 +40,11 @@ PICTURES = {
     "herringbone 2/2 4": ["..##..##", ".##.#..#", "##..##..", "#..#.##."],
     "point 1/3 4": ["...#..", "..#.#.", ".#...#", "#....."],
     "houndstooth": ["..##", ".##.", "##..", "#..#"],
+    "ripstop 5": [".#.##", ".#.##", "#.#..", ".#.##", "#.#.."],
+    "ripstop 4/2": [
+        ".#..#.##", ".#..#.##", "#.##.#..", ".#..#.##", "#.##.#..", "#.##.#..", ".#..#.##",
+        "#.##.#..",
+    ],
 }  # fmt: skip
 
 
@@ -116,6 +121,13 @@ def test_houndstooth_has_four_dark_and_four_light_threads_both_ways() -> None:
 
 BAD = {
     "nothing": ("", "weave '' is not known"),
+    "a knit": ("single jersey", "weave 'single jersey' is knitted, not woven"),
+    "a rib, which is woven too": ("rib", "weave 'rib' is not known"),
+    "a ripstop without room": (
+        "ripstop 5/4",
+        "cords of 4 in 5 threads; that number must be from 2",
+    ),
+    "a ripstop of three numbers": ("ripstop 8/2/2", "has 3 numbers; it must have 2, threads/cord"),
     "unknown": ("velvet", "weave 'velvet' is not known; it must be one of plain"),
     "misspelt": ("twil 2/1", "did you mean 'twill'"),
     "extra word": ("plain 2", "'2' is not expected here"),

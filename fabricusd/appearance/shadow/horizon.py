@@ -28,6 +28,7 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.cache import fingerprint
 from fabricusd.kernels.real import KERNEL, PART
+from fabricusd.steps import parts
 
 NO_KINDS = np.zeros((0, 0), np.int32)
 """`Horizon.kinds` of a table that has an entry for each cell."""
@@ -42,7 +43,7 @@ ACROSS = 6
 KEPT_CELLS = 512
 """Cells from which on a table is kept on disk: fewer are computed within half a second."""
 
-CHUNK = 256
+CHUNK = 48
 """Cells that are filled before an interrupt is heard: a fraction of a second."""
 
 SOFTNESS = math.radians(8.0)
@@ -105,7 +106,8 @@ def horizon_table(
 
     def entries() -> NDArray[np.uint8]:
         made = np.zeros((len(cells), *shape), np.uint8)
-        for begin in range(0, len(cells), CHUNK):
+        begins = range(0, len(cells), CHUNK)
+        for begin in parts(f"horizon table of '{fabric.name}'", begins):
             part = slice(begin, begin + CHUNK)
             _fill(cloth, highest, directions, across, lowest, cells[part], made[part])
         return made

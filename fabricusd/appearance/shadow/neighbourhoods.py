@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.weave.compiled import CompiledFabric
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import KERNEL
+from fabricusd.steps import parts
 
 MOST_KINDS = 3072
 """Cells times slots of a table: each takes one to ten milliseconds to compute. A closed repeat of
@@ -69,7 +70,7 @@ def neighbourhoods(
     kinds = np.empty(repeat, np.int32)
     first = np.empty((max(most, 2 * count * count), 2), np.int64)
     found = None
-    for radius in range(MOST_RADIUS + 1):
+    for radius in parts(f"neighbourhoods of '{fabric.name}'", range(MOST_RADIUS + 1)):
         ring = np.array(
             [
                 (a, b)

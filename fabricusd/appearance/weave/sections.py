@@ -20,6 +20,7 @@ from fabricusd.appearance.weave.coverage import coverage, sets, true_repeat
 from fabricusd.appearance.weave.curve import is_pile
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
+from fabricusd.steps import parts
 
 Floats = NDArray[np.float64]
 
@@ -103,7 +104,7 @@ def fitted_sections(fabric: Fabric) -> Sections:
     low, high = flattest, 2.0 * max(used)
     if _fits(crossings, half, high, reach):
         low = high
-    for _ in range(HALVINGS):
+    for _ in parts(f"thickness of the threads of '{fabric.name}'", range(HALVINGS)):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if _fits(crossings, half, middle, reach) else (low, middle)
     bounds = [x for x in _room(crossings, half, low, reach) if np.isfinite(x)]
@@ -203,8 +204,9 @@ def _crossings(fabric: Fabric) -> list[_Crossing]:
     windows: dict[tuple[int, int], tuple[Floats, Floats, Floats]] = {}
     # A line of a figured cloth has thousands of cells: one at a time is held whole.
     for which, numbers, along in ((WARP, *places.T), (WEFT, *places.T[::-1])):
-        for number in np.unique(numbers):
-            whole = line(which, int(number))
+        name = f"lines of the threads of '{fabric.name}'"
+        for number in parts(name, np.unique(numbers).tolist()):
+            whole = line(which, number)
             for at in np.flatnonzero(numbers == number):
                 windows[which, int(at)] = _window(whole, int(along[at]), around[which])
     return [

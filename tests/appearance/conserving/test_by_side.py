@@ -7,7 +7,7 @@ import pytest
 
 from fabricusd.appearance.conserving.by_side import CLOSING, MEDIAN, by_side
 from fabricusd.appearance.weave.coverage import coverage
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 from fabricusd.sides import AZIMUTHS, POLAR, Sides, spread
 from tests.appearance.presets import PRESETS
 
@@ -16,7 +16,7 @@ PHI, THETA = (x.ravel() for x in np.meshgrid(np.radians(AZIMUTHS), np.radians(PO
 
 
 def _stated():
-    found = {name: load(name) for name in preset_names()}
+    found = {name: load(name) for name in published_names()}
     return {name: fabric for name, fabric in found.items() if fabric.sides.gap}
 
 

@@ -23,7 +23,7 @@ from fabricusd.bake.btf.ubo import read_ubo, write_ubo
 from fabricusd.bake.btf.write import FORMS, between, read_form, write_btf
 from fabricusd.bake.error.accuracy import PAIRS, pairs_between
 from fabricusd.errors import FabricError
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 from tests.appearance.presets import often
 
 RINGS = ((0.0, 1), (30.0, 6), (60.0, 10))
@@ -163,7 +163,7 @@ def test_every_form_is_written_with_its_record(tmp_path):
         write_btf(load("linen_plain"), tmp_path, ("dds",))
 
 
-@pytest.mark.parametrize("name", often(preset_names()))
+@pytest.mark.parametrize("name", often(published_names()))
 def test_each_form_is_within_its_stated_bound_on_pairs_held_back(name, tmp_path):
     """Read by its own loader, against level `weave` under twenty pairs of directions."""
     fabric, held_back = load(name), pairs_between(20, skip=PAIRS)

@@ -31,7 +31,7 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import even
 from fabricusd.quality.colors import delta_e_2000
 from fabricusd.schema import load as load_preset
-from fabricusd.schema import preset_names
+from fabricusd.schema import published_names
 from tests.appearance.presets import often
 from tests.bake.meshes import quad_scene
 
@@ -184,7 +184,7 @@ def test_a_low_light_casts_longer_shadows():
 
 
 @pytest.mark.parametrize("texels_per_thread", [1.5, 16.0])
-@pytest.mark.parametrize("name", often(preset_names()))
+@pytest.mark.parametrize("name", often(published_names()))
 def test_a_relit_set_is_within_its_stated_bound_on_pairs_held_back(name, texels_per_thread):
     fabric = load(name)
     one = garments(quad_scene(fabric, 64 / texels_per_thread))[0]
@@ -210,7 +210,7 @@ def test_the_bound_bites_when_the_maps_are_of_another_fabric():
     assert swatch_error(wrong).worst_pair > 5 * swatch_error(right).bound
 
 
-@pytest.mark.parametrize("name", often(preset_names()))
+@pytest.mark.parametrize("name", often(published_names()))
 def test_the_coarsest_level_relit_is_level_far(name):
     fabric = load(name)
     maps, _ = baked(fabric, names=NEEDED, resolution=64, threads=float(2 * true_repeat(fabric)[0]))

@@ -14,7 +14,7 @@ from fabricusd.appearance.weave.yarn.compiled import CUT, compile_yarn
 from fabricusd.appearance.weave.yarn.lay import edges, laid
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, Thread, even
-from fabricusd.schema import load, preset_names
+from fabricusd.schema import load, published_names
 from tests.appearance.presets import often
 
 SPUN = {
@@ -85,7 +85,7 @@ def test_the_mean_over_a_window_is_the_radiance_of_the_even_cloth(name):
         assert found == pytest.approx(true, rel=0.01), level
 
 
-@pytest.mark.parametrize("name", often(n for n in preset_names() if not n.startswith("thread_")))
+@pytest.mark.parametrize("name", often(n for n in published_names() if not n.startswith("thread_")))
 def test_the_mean_of_a_preset_under_a_shadow_is_that_of_the_even_cloth(name):
     """Law and shadow look at one place of the even cloth, so what they have in common is kept."""
     cloth = load(name)
@@ -123,7 +123,7 @@ def test_level_far_has_the_same_bits():
             )
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", published_names())
 def test_an_even_cloth_is_looked_up_as_if_yarn_were_unknown(name):
     """The map of a yarn that varies by nothing is the identity."""
     fabric = even(load(name))
