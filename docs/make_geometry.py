@@ -14,9 +14,9 @@ from fabricusd.appearance import laws, surface
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.geometry import tubes
-from fabricusd.geometry.conserve import reflectance
+from fabricusd.geometry.conserve import refitted_names, reflectance
 from fabricusd.geometry.judge import judge
-from fabricusd.geometry.nearest import APPEARANCE, CONSERVING, LIKE
+from fabricusd.geometry.nearest import APPEARANCE, CONSERVING
 from fabricusd.geometry.tables import (
     AZIMUTHS,
     COUNT,
@@ -210,7 +210,7 @@ def main() -> None:
     for name, t in found.items():
         lines += share_rows(name, t)
     lines.append(SECOND)
-    lines += [second_row(name) for name in sorted({*found, *LIKE})]
+    lines += [second_row(name) for name in refitted_names()]
     lines.append(REFUSED)
     for name in sorted(set(published_names()) - set(found)):
         try:

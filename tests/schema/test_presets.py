@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from fabricusd.geometry.conserve import refit, refitted_names
 from fabricusd.geometry.nearest import LIKE, law_errors, published, scaled, worn
 from fabricusd.schema import load, preset_names, published_names
 
@@ -93,6 +95,26 @@ def test_the_law_is_the_one_nearest_to_the_tubes_and_the_cloth_as_bright_as_publ
     assert load(name).surface_law == law
     first, before = load(name).thread_list[0], published(name).thread_list[0]
     assert first.albedo[0] == pytest.approx(factor * before.albedo[0], rel=1e-3)
+
+
+@pytest.mark.parametrize("name", refitted_names())
+def test_the_second_opinion_is_the_same_cloth_in_conserving_with_its_hues_kept(name):
+    fabric, other = load(name), load(f"{name}{{appearance=conserving}}")
+    assert other.model == "conserving"
+    assert (other.weave, other.warp, other.weft) == (fabric.weave, fabric.warp, fabric.weft)
+    for thread, again in zip(fabric.thread_list, other.thread_list, strict=True):
+        assert max(again.albedo) <= 1.0
+        hue = np.array(thread.albedo) / max(thread.albedo)
+        assert np.array(again.albedo) / max(again.albedo) == pytest.approx(hue, abs=2e-3)
+        assert replace(again, albedo=thread.albedo) == thread
+
+
+@pytest.mark.exhaustive
+def test_the_second_opinion_is_found_again():
+    name = "wool_flannel"
+    found = refit(name).fabric
+    stated = load(f"{name}{{appearance=conserving}}")
+    assert found.thread_list[0].albedo == pytest.approx(stated.thread_list[0].albedo, rel=5e-3)
 
 
 def test_the_published_front_has_the_published_back():
