@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 from fabricusd.chart.panel import Panel
-from fabricusd.chart.panels import baked, materials, pictures, reflectance, shadows, zoom
+from fabricusd.chart.panels import (
+    baked,
+    laws,
+    materials,
+    pictures,
+    reflectance,
+    shadows,
+    yarn,
+    zoom,
+)
 
 PANELS: tuple[Panel, ...] = (
     reflectance.PANEL,
+    laws.PANEL,
     pictures.PANEL,
     zoom.PANEL,
     shadows.PANEL,
+    yarn.PANEL,
     *baked.PANELS,
     materials.PANEL,
 )
