@@ -16,10 +16,10 @@ from fabricusd.chart.draw import pyplot, save
 from fabricusd.chart.highlights import predicted
 from fabricusd.chart.scenes import RADIUS, cloth, curtain, cylinder, facing, sky, sun
 from fabricusd.fabric import Fabric, Thread
+from fabricusd.geometry.nearest import published
 from fabricusd.images.view import encode
 from fabricusd.reference.render import render_scene
 from fabricusd.scene.scene import Scene
-from fabricusd.schema import load
 
 Picture = NDArray[np.float32]
 
@@ -74,7 +74,7 @@ def cylinder_sheet(folder: Path, quick: bool) -> list[Path]:
     across, samples = (99, 8) if quick else (480, 64)
     figure, rows = plt.subplots(3, 1, figsize=(8, 8.2), layout="constrained")
     for axes, name in zip(rows, FILAMENT, strict=True):
-        fabric = load(name)
+        fabric = published(name)
         scene = cylinders(fabric, tuple(wrap_degrees(name, w) for w in WRAPS))
         made = render_scene(scene, width=across, height=round(across / 3.3), spp=samples)
         axes.imshow(_bright(made.layers["beauty"]), extent=(-3.3, 3.3, -1, 1))
@@ -92,7 +92,7 @@ def shadow_sheet(folder: Path, quick: bool) -> list[Path]:
     """Figure 5.3: crepe from above, light from the left: unshadowed, shadowed, and the mask."""
     plt = pyplot()
     size = 60 if quick else 360
-    fabric = load("silk_crepe_de_chine")
+    fabric = published("silk_crepe_de_chine")
     line = (np.arange(size) + 0.5) / size * 2 * fabric.weave.ends
     v, u = np.meshgrid(line, line, indexing="ij")
     uv = np.stack((u.ravel(), v.ravel()), axis=1)
@@ -125,7 +125,7 @@ def drape_sheet(folder: Path, quick: bool) -> list[Path]:
     for axes, name in zip(grid.ravel(), SIX, strict=True):
         scene = Scene(
             meshes=[curtain()],
-            materials=[cloth(load(name))],
+            materials=[cloth(published(name))],
             lights=[sky(0.25), sun((-0.9, 0.8, 1.0), 2.2, 8.0)],
             camera=facing(0.5, 0.5, (0.15, 0.12, 1.0)),
         )

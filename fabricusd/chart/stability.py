@@ -25,6 +25,7 @@ from fabricusd.chart.draw import pyplot, save
 from fabricusd.chart.scenes import cloth, facing
 from fabricusd.fabric import PILE_ANGLE, Fabric, even
 from fabricusd.files import whole_file
+from fabricusd.geometry.nearest import published
 from fabricusd.reference.render import render_scene
 from fabricusd.scene.light_kinds import SPHERE
 from fabricusd.scene.scene import Light, Mesh, Scene
@@ -196,7 +197,7 @@ def far_uv() -> Case:
 def middle_distance() -> Case:
     """Moiré of point samples and of `auto`, 4×4 samples, crepe."""
     widths = np.array([0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 9.0, 17.0])
-    fabric = even(load("silk_crepe_de_chine"))
+    fabric = even(published("silk_crepe_de_chine"))
     point, filtered, real = [], [], []
     for width in widths:
         view = view_of(fabric, float(width))

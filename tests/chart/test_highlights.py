@@ -12,9 +12,9 @@ from fabricusd.chart.highlights import dwells, found, predicted
 from fabricusd.chart.scenes import RADIUS, facing, sun
 from fabricusd.chart.sheets import cylinders, filament, wrap_degrees
 from fabricusd.fabric import Fabric, TangentCurve, even
+from fabricusd.geometry.nearest import published
 from fabricusd.reference.render import render_scene
 from fabricusd.scene.scene import Scene
-from fabricusd.schema import load
 
 SATIN, CREPE, LINEN = "polyester_satin_charmeuse", "silk_crepe_de_chine", "linen_plain"
 NEAR = math.radians(1.5)
@@ -41,7 +41,7 @@ def places(name: str, fabric: Fabric, wrap: str, to_light: np.ndarray) -> tuple[
 @pytest.mark.parametrize(("name", "count"), [(SATIN, 3), (CREPE, 2)])
 @pytest.mark.parametrize("turn", [0, 20])
 def test_highlights_round_the_cylinder_are_as_many_as_predicted_and_there(name, count, turn):
-    fabric, to_light = even(load(name)), lit_from(turn)
+    fabric, to_light = even(published(name)), lit_from(turn)
     wanted = predicted(filament(name, fabric).curve, to_light)
     seen = places(name, fabric, "horizontal", to_light)
     assert len(wanted) == len(seen) == count
@@ -49,7 +49,7 @@ def test_highlights_round_the_cylinder_are_as_many_as_predicted_and_there(name, 
 
 
 def test_another_curve_moves_them_and_the_old_prediction_fails():
-    fabric = load(SATIN)
+    fabric = published(SATIN)
     thread = filament(SATIN, fabric)
     flatter = TangentCurve(
         positions=thread.curve.positions, angles=tuple(0.75 * a for a in thread.curve.angles)
@@ -66,9 +66,9 @@ def test_another_curve_moves_them_and_the_old_prediction_fails():
 
 
 def test_threads_upright_or_without_a_dwell_make_one_broad_highlight():
-    assert predicted(filament(LINEN, load(LINEN)).curve, lit_from(0)) == ()
-    assert len(places(LINEN, load(LINEN), "horizontal", lit_from(0))) == 1
-    seen = places(SATIN, load(SATIN), "vertical", lit_from(0))
+    assert predicted(filament(LINEN, published(LINEN)).curve, lit_from(0)) == ()
+    assert len(places(LINEN, published(LINEN), "horizontal", lit_from(0))) == 1
+    seen = places(SATIN, published(SATIN), "vertical", lit_from(0))
     # The weft, which runs round, brightens the rims.
     assert len([p for p in seen if abs(p) < math.radians(60)]) == 1
 

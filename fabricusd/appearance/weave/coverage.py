@@ -59,26 +59,40 @@ def true_repeat(fabric: Fabric) -> tuple[int, int]:
 def coverage(fabric: Fabric) -> Coverage:
     """The division of the area of `fabric` between its sets, its thread types, and the gap.
 
-    A set without an authored coverage takes `c_j thickness/pitch` (the mean over its visible
-    threads), limited to `c_j` and to what the authored coverage of the other set leaves. A thread
-    of unknown thickness fills its pitch.
+    A set without an authored coverage has bands as wide as its threads are thick, in the mean over
+    them, and covers what such bands show. If the other set has one, its own is limited to what that
+    leaves. A thread of unknown thickness fills its pitch.
     """
     shown, hidden = _type_cells(fabric)
     c = shown.sum(axis=1)
-    a = np.zeros(2)
-    for j, thread_set in enumerate(sets(fabric)):
-        if thread_set.coverage is not None:
-            a[j] = thread_set.coverage
-            continue
-        thickness = np.array([t.thickness for t in fabric.thread_list])
-        fill = np.where(thickness > 0, np.minimum(thickness / thread_set.pitch, 1.0), 1.0)
-        other = sets(fabric)[1 - j].coverage or 0.0
-        a[j] = min(float(shown[j] @ fill), 1.0 - other)
-    x = band_widths(c, a)
+    x = _widths(fabric, c, shown + hidden)
     # Beside a thread on top, what the crossing threads leave of their pitch shows the one beneath.
     type_area = x[:, None] * (shown + hidden * (1.0 - x[::-1])[:, None])
     gap = float((1.0 - x[WEFT]) * (1.0 - x[WARP]))
     return Coverage(c, type_area.sum(axis=1), type_area, gap, x)
+
+
+def _widths(fabric: Fabric, c: Floats, often: Floats) -> Floats:
+    """(2,) widths `x_j`; c : (2,) shares `c_j`; often : (2, k) share of each type in its set."""
+    asked = [s.coverage for s in sets(fabric)]
+    x = np.zeros(2)
+    for j, thread_set in enumerate(sets(fabric)):
+        thickness = np.array([t.thickness for t in fabric.thread_list])
+        fill = np.where(thickness > 0, np.minimum(thickness / thread_set.pitch, 1.0), 1.0)
+        x[j] = min(float(often[j] @ fill), 1.0)
+    if asked[WEFT] is None and asked[WARP] is None:
+        return x
+    a = np.zeros(2)
+    for j, stated in enumerate(asked):
+        if stated is not None:
+            a[j] = stated
+            continue
+        # The other set is as wide as shows its coverage beside bands of this width.
+        other = float(asked[1 - j] or 0.0)
+        beside = c[1 - j] + c[j] * (1.0 - x[j])
+        wide = min(other / beside, 1.0) if beside > 0.0 else 0.0
+        a[j] = min(float(x[j] * (c[j] + c[1 - j] * (1.0 - wide))), 1.0 - other)
+    return band_widths(c, a)
 
 
 def _type_cells(fabric: Fabric) -> tuple[Floats, Floats]:

@@ -56,16 +56,33 @@ def test_areas_and_gap_are_shares_of_one(fabric: Fabric) -> None:
         if thread_set.coverage is not None:
             assert share.area[j] == pytest.approx(thread_set.coverage, abs=1e-7)
         else:
-            assert share.area[j] <= share.cells[j] + 1e-7
+            # No wider than its threads are thick.
+            assert share.width[j] <= min(1.0, 1e-7 + thickest(fabric) / thread_set.pitch)
 
 
-def test_an_unauthored_coverage_is_cells_times_thickness_over_pitch() -> None:
+def thickest(fabric: Fabric) -> float:
+    return max(t.thickness or np.inf for t in fabric.thread_list)
+
+
+def test_bands_without_a_coverage_are_as_wide_as_threads_are_thick() -> None:
     thin = Thread(thickness=0.3e-3)
     fabric = cloth(SATIN_5, None, None, threads={"T": thin})
-    fabric = replace(fabric, warp=ThreadSet(density=1000.0), weft=ThreadSet(density=5000.0))
+    for per_metre, wide in ((1000.0, 0.3), (5000.0, 1.0)):
+        weft = ThreadSet(density=per_metre)
+        share = coverage(replace(fabric, warp=ThreadSet(density=2000.0), weft=weft))
+        np.testing.assert_allclose(share.width, [wide, 0.6])
+        assert share.area[WARP] == pytest.approx(0.6 * (0.8 + 0.2 * (1 - wide)))
+        assert share.area[WEFT] == pytest.approx(wide * (0.2 + 0.8 * 0.4))
+        assert share.gap == pytest.approx((1 - wide) * 0.4)
+
+
+def test_a_set_without_a_coverage_keeps_its_width_beside_one_that_has_one() -> None:
+    thin = Thread(thickness=0.3e-3)
+    fabric = cloth(SATIN_5, 0.5, None, threads={"T": thin})
+    fabric = replace(fabric, weft=ThreadSet(density=1000.0))
     share = coverage(fabric)
-    assert share.area[WARP] == pytest.approx(0.8 * 0.3)
-    assert share.area[WEFT] == pytest.approx(0.2)  # thicker than its pitch: all of its cells
+    assert share.area[WARP] == pytest.approx(0.5)
+    assert share.width[WEFT] == pytest.approx(0.3)
 
 
 def test_a_thread_of_unknown_thickness_fills_its_pitch() -> None:
