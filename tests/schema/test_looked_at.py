@@ -21,7 +21,7 @@ SATIN = "polyester_satin_charmeuse"
 def folder(tmp_path: Path) -> Path:
     """The cases, with the preset that two of them need beside them."""
     shutil.copytree(CASES, tmp_path, dirs_exist_ok=True)
-    save(load(SATIN), tmp_path / f"{SATIN}.usda")
+    save(load(f"{SATIN}{{appearance=published}}"), tmp_path / f"{SATIN}.usda")
     return tmp_path
 
 
