@@ -28,13 +28,6 @@ THROUGH = ("transmission_color", "back_base_color")
 SKY = 4096
 
 
-GAPS_SCATTER = pytest.mark.xfail(
-    strict=True,
-    reason="light that is stopped in a gap scatters as by the whole repeat, which bakes and looks "
-    "of cloth with large gaps do not know yet",
-)
-
-
 def conserving(preset: str = "linen_plain") -> Fabric:
     return replace(even(load(preset)), model="conserving")
 
@@ -80,7 +73,7 @@ def test_maps_of_light_through_are_baked_where_light_comes_through():
 
 @pytest.mark.parametrize(
     "preset",
-    [pytest.param("linen_plain", marks=[GAPS_SCATTER, pytest.mark.exhaustive]), "silk_shot"],
+    [pytest.param("linen_plain", marks=pytest.mark.exhaustive), "silk_shot"],
 )
 def test_texels_relight_conserving_cloth_from_both_sides(preset):
     fabric = conserving(preset)

@@ -37,13 +37,6 @@ from tests.materials.test_models import white
 SIZE = 48
 
 
-GAPS_SCATTER = pytest.mark.xfail(
-    strict=True,
-    reason="light that is stopped in a gap scatters as by the whole repeat, which bakes and looks "
-    "of cloth with large gaps do not know yet",
-)
-
-
 def conserving(preset: str) -> Fabric:
     return replace(even(load(preset)), model="conserving")
 
@@ -124,7 +117,6 @@ def test_a_sheet_lets_as_much_of_an_even_sky_through_as_its_threads(preset):
 
 
 @pytest.mark.exhaustive
-@GAPS_SCATTER
 def test_a_look_lit_from_behind_is_near_its_threads(tmp_path):
     fabric = conserving("linen_plain")
     cloth = write_screen(tmp_path / "cloth.usda", fabric)
@@ -149,7 +141,6 @@ def test_a_look_lit_from_behind_is_near_its_threads(tmp_path):
 
 
 @pytest.mark.exhaustive
-@GAPS_SCATTER
 def test_a_fabric_without_a_bake_lets_as_much_light_through(tmp_path):
     fabric = conserving("linen_plain")
     looks = fitted_looks(fabric)

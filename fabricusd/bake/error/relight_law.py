@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.scattering.columns import GAMMA_SURFACE
+from fabricusd.appearance.scattering.models import any_conserving
 from fabricusd.appearance.scattering.table import pack_threads
 from fabricusd.appearance.shadow.mean import WIDEST
+from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.bake.texels.angle_shape import COUNTS
 from fabricusd.bake.texels.law_values import ClothLaw, cloth_law, law_values
 from fabricusd.bake.texels.moment_indices import PARTS
@@ -70,6 +72,10 @@ def relight_law(
         gamma = np.minimum(gamma, WIDEST)
     out = np.zeros((len(kinds), 3))
     _relight(angle_table(fabric, wi, wo), albedo, gamma, shares, shapes, sets, kinds, out)
+    if any_conserving(fabric):
+        # Light that is stopped in a gap scatters as by the whole repeat.
+        stopped = law_values(_laws(fabric)[1], GAP, 0, np.zeros(1), wi[:, None], wo[:, None])[:, 0]
+        out += np.clip(1.0 - sets[:, :, 3].sum(axis=1), 0.0, 1.0)[:, None] * stopped
     return out
 
 
