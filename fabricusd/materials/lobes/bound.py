@@ -17,11 +17,9 @@ from fabricusd.fabric import Fabric
 from fabricusd.materials.lobes import skies
 from fabricusd.materials.lobes.colors import REC_709
 from fabricusd.materials.lobes.mixture import (
-    MATERIALX,
     POWERS,
     Mixture,
     evaluate,
-    view_factor,
     view_terms,
 )
 from fabricusd.materials.lobes.target import cloth
@@ -29,10 +27,11 @@ from fabricusd.materials.lobes.target import cloth
 Floats = NDArray[np.float64]
 
 POLAR = (
-    0.0, 10.0, 20.0, 30.0, 40.0, 45.0, 50.0, 54.0, 58.0, 61.0, 64.0, 66.5, 69.0, 71.0, 73.0, 75.0,
-    76.5, 78.0, 79.5, 81.0, 82.0, 83.0, 84.0, 85.0, 86.0, 86.75, 87.5, 88.0, 88.5, 89.0,
+    0.0, 12.0, 24.0, 36.0, 44.0, 50.0, 54.0, 58.0, 61.0, 64.0, 66.5, 69.0, 71.0, 73.0, 75.0, 76.5,
+    77.5, 78.5, 79.5, 80.5, 81.25, 82.25, 83.0, 83.75, 84.25, 84.75, 85.25, 85.75, 86.25, 86.75,
+    87.25, 87.75, 88.25, 88.75, 89.0,
 )  # fmt: skip
-AROUND, FEW = 64, 16
+AROUND, FEW = 48, 16
 """Polar angles of the views [degrees], and azimuths of those beyond STEEP and of the others."""
 
 STEEP = 50.0
@@ -43,19 +42,19 @@ LARGEST = 20.0
 SYMMETRIC = 2e-3
 """Logarithm of the ratio of opposite views' albedos below which V needs no odd terms."""
 
-MARGIN = 0.003
+MARGIN = 0.008
 """Logarithm of what is left to the bound, for views between those that it holds at."""
-
-TURNS = 2
-"""Times that V is found. Light that a closure scatters more than once is not linear in V, so the
-first V is a little off in the form of MaterialX."""
 
 DARKEST = 1e-6
 """Luminance that is as good as black."""
 
 
 class Bound:
-    """The albedo of one fabric by view, which its mixtures must not exceed."""
+    """The albedo of one fabric by view, which its mixtures must not exceed.
+
+    views : (n, 3); solid : (n,) their solid angles; most : (n,) luminance of the cloth's albedo
+    terms : (n, m) `view_terms` that V has
+    """
 
     def __init__(self, fabric: Fabric) -> None:
         self.lights = skies.directions()
@@ -67,21 +66,29 @@ class Bound:
 
     def __call__(self, mixture: Mixture) -> Mixture:
         """Return the mixture with the V that makes it least dark, and nowhere too bright."""
-        found = replace(mixture, view=())
-        for _ in range(TURNS if mixture.form == MATERIALX else 1):
-            mine = self._albedo(lambda wi, wo, one=found: evaluate(one, wi, wo))
-            room = np.log(self.most / mine) + np.log(view_factor(found, self.views)) - MARGIN
-            best = linprog(
-                -(self.solid @ self.terms), A_ub=self.terms, b_ub=room,
-                bounds=(-LARGEST, LARGEST), method="highs",
-            )  # fmt: skip
-            found = replace(found, view=tuple(float(c) for c in best.x))
-        return found
+        best = linprog(
+            -(self.solid @ self.terms), A_ub=self.terms, b_ub=np.log(self._room(mixture)) - MARGIN,
+            bounds=(-LARGEST, LARGEST), method="highs",
+        )  # fmt: skip
+        return replace(mixture, view=tuple(float(c) for c in best.x))
+
+    def _room(self, mixture: Mixture) -> Floats:
+        """(views,) largest V."""
+        one, two = (self._brightness(replace(mixture, view=v)) for v in ((), (np.log(2.0),)))
+        # What MaterialX adds to a lobe grows with the square of its reflectance: the albedo is
+        # once V + twice V^2.
+        twice = np.maximum(0.5 * two - one, 0.0)
+        once = one - twice
+        return np.asarray(2.0 * self.most / (once + np.sqrt(once * once + 4.0 * twice * self.most)))
+
+    def _brightness(self, mixture: Mixture) -> Floats:
+        return self._albedo(lambda wi, wo: evaluate(mixture, wi, wo))
 
     def _albedo(self, value: Callable[[Floats, Floats], Floats]) -> Floats:
         """(views,) luminance under an even sky."""
         whole = [value(self.lights, np.tile(v, (len(self.lights), 1))).mean(0) for v in self.views]
-        return np.maximum(np.array(whole) @ REC_709 * 2.0 * np.pi, DARKEST)
+        luminance = np.array(whole) @ REC_709 * 2.0 * np.pi
+        return np.asarray(np.maximum(luminance, DARKEST))
 
     def _symmetric(self) -> bool:
         """Whether opposite views see the same albedo."""
@@ -99,7 +106,7 @@ def _views() -> tuple[Floats, Floats]:
     views, solid = [], []
     for k, (p, ring) in enumerate(zip(polar, rings, strict=True)):
         n = AROUND if p > np.radians(STEEP) else FEW
-        # Rings are turned in turn, so that V is bound between the azimuths of each as well.
+        # Every second ring is turned, so that its views lie between the azimuths of its neighbours.
         a = 2.0 * np.pi * (np.arange(n) + 0.5 * (k % 2)) / n
         s = np.sin(p)
         views.append(np.column_stack((s * np.cos(a), s * np.sin(a), np.full(n, np.cos(p)))))
