@@ -27,11 +27,11 @@ from fabricusd.materials.lobes.target import cloth
 Floats = NDArray[np.float64]
 
 POLAR = (
-    0.0, 12.0, 24.0, 36.0, 44.0, 50.0, 54.0, 58.0, 61.0, 64.0, 66.5, 69.0, 71.0, 73.0, 75.0, 76.5,
+    0.0, 7.5, 15.0, 22.5, 30.0, 37.5, 44.0, 50.0, 54.0, 58.0, 61.0, 64.0, 66.5, 69.0, 71.0, 73.0, 75.0, 76.5,
     77.5, 78.5, 79.5, 80.5, 81.25, 82.25, 83.0, 83.75, 84.25, 84.75, 85.25, 85.75, 86.25, 86.75,
     87.25, 87.75, 88.25, 88.75, 89.0,
 )  # fmt: skip
-AROUND, FEW = 48, 16
+AROUND, FEW = 48, 24
 """Polar angles of the views [degrees], and azimuths of those beyond STEEP and of the others."""
 
 STEEP = 50.0

@@ -49,7 +49,7 @@ def starts(fabric: Fabric, count: int, form: str) -> list[Mixture]:
             for along, width, shapes in chosen
             for wide, (tilt, paired) in enumerate(shapes)
         )
-        lobes += tuple(_flank(along) for along in flanks if lobes)
+        lobes += tuple(flank(along) for along in flanks if lobes)
         mixture = Mixture(
             form=form, lobes=lobes, diffuse=(0.05, 0.05, 0.05), diffuse_power=0.0,
             sheen=(0.01, 0.01, 0.01), sheen_roughness=0.4, sheen_power=0.0,
@@ -100,7 +100,7 @@ def _lobe(along: int, width: float, tilt: float, paired: bool, wide: int) -> Lob
     )  # fmt: skip
 
 
-def _flank(along: int) -> Lobe:
+def flank(along: int) -> Lobe:
     """A pair on the flanks of the threads that `along` crosses: light from low beside them."""
     return Lobe(
         along=along, tilt=0.9, paired=True, alpha_along=0.4, alpha_across=0.4,
