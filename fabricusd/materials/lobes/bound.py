@@ -17,6 +17,7 @@ from fabricusd.fabric import Fabric
 from fabricusd.materials.lobes import skies
 from fabricusd.materials.lobes.colors import REC_709
 from fabricusd.materials.lobes.mixture import (
+    CYCLES,
     POWERS,
     Mixture,
     evaluate,
@@ -27,9 +28,9 @@ from fabricusd.materials.lobes.target import cloth
 Floats = NDArray[np.float64]
 
 POLAR = (
-    0.0, 7.5, 15.0, 22.5, 30.0, 37.5, 44.0, 50.0, 54.0, 58.0, 61.0, 64.0, 66.5, 69.0, 71.0, 73.0, 75.0, 76.5,
-    77.5, 78.5, 79.5, 80.5, 81.25, 82.25, 83.0, 83.75, 84.25, 84.75, 85.25, 85.75, 86.25, 86.75,
-    87.25, 87.75, 88.25, 88.75, 89.0,
+    0.0, 7.5, 15.0, 22.5, 30.0, 37.5, 44.0, 50.0, 54.0, 58.0, 61.0, 64.0, 66.5, 69.0, 71.0, 73.0,
+    75.0, 76.5, 77.5, 78.5, 79.5, 80.5, 81.25, 82.25, 83.0, 83.75, 84.25, 84.75, 85.25, 85.75,
+    86.25, 86.75, 87.25, 87.75, 88.25, 88.75, 89.0,
 )  # fmt: skip
 AROUND, FEW = 48, 24
 """Polar angles of the views [degrees], and azimuths of those beyond STEEP and of the others."""
@@ -74,7 +75,10 @@ class Bound:
 
     def _room(self, mixture: Mixture) -> Floats:
         """(views,) largest V."""
-        one, two = (self._brightness(replace(mixture, view=v)) for v in ((), (np.log(2.0),)))
+        one = self._brightness(replace(mixture, view=()))
+        if mixture.form == CYCLES:
+            return self.most / one
+        two = self._brightness(replace(mixture, view=(np.log(2.0),)))
         # What MaterialX adds to a lobe grows with the square of its reflectance: the albedo is
         # once V + twice V^2.
         twice = np.maximum(0.5 * two - one, 0.0)

@@ -17,7 +17,7 @@ LEVEL = Lobe(
 
 
 VIEW = tuple(0.1 * (-1.0) ** k / (1.0 + k % POWERS) for k in range(5 * POWERS))
-"""Coefficients of a V between 0.8 and 1.3."""
+"""Coefficients of a V between 0.9 and 1.5."""
 
 
 def mixture(form: str, *lobes: Lobe) -> Mixture:
