@@ -16,7 +16,7 @@ LEVEL = Lobe(
 )  # fmt: skip
 
 
-VIEW = tuple(0.1 * (-1.0) ** k / (1.0 + k % POWERS) for k in range(5 * POWERS))
+VIEW = tuple(round(0.1 * (-1.0) ** k / (1.0 + k % POWERS), 6) for k in range(5 * POWERS))
 """Coefficients of a V between 0.9 and 1.5."""
 
 
