@@ -26,7 +26,7 @@ from fabricusd.materials.targets.mtlx import write_mtlx
 from fabricusd.schema import load
 
 PAIRS = 48
-PRESETS = (("silk_shot", 6), ("velvet", 4), ("linen_plain", 4))
+PRESETS = (("silk_crepe_de_chine", 4), ("velvet", 4), ("linen_plain", 4))
 
 MATRIX = ((30.0, 12.0), (-16.0, 40.0))
 """From texture coordinates to threads: turned, and of another density in each set. The threads stay

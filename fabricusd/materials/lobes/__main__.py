@@ -2,9 +2,10 @@
 
 python -m fabricusd.materials.lobes [NAME ...] [--lobes K ...] [--law LAW ...] [--write]
 
-A preset is fitted under the law that it authors, and under each `--law`. Under another law its
-albedos are scaled, so that it is as bright as it was. The table in the package is used for what it
-holds; `--write` fits all again, and replaces the rows of the presets that it is given.
+A preset is fitted under the law that it wears, and under each `--law`. Under another law its
+published albedos are scaled, so that it is as bright as it was under `masked`. The table in the
+package is used for what it holds; `--write` fits all again, and replaces the rows of the presets
+and laws that it is given.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from fabricusd.fabric import SURFACE_LAWS, Fabric
+from fabricusd.geometry.nearest import published, scaled
 from fabricusd.geometry.nearest import refit as albedo_factor
-from fabricusd.geometry.nearest import scaled
 from fabricusd.materials.lobes import known
 from fabricusd.materials.lobes.fit import COUNTS, fit, refit
 from fabricusd.materials.lobes.judge import Judge, Judged
@@ -42,11 +43,11 @@ def _arguments() -> argparse.Namespace:
 
 def _worn(name: str, laws: list[str]) -> Iterator[Fabric]:
     """A preset under its own law and under each of `laws`."""
-    fabric = load(name)
+    fabric, other = load(name), published(name)
     yield fabric
     for law in laws:
         if law != fabric.surface_law:
-            yield scaled(replace(fabric, surface_law=law), albedo_factor(fabric, law))
+            yield scaled(replace(other, surface_law=law), albedo_factor(other, law))
 
 
 def _mixtures(fabric: Fabric, counts: list[int], *, again: bool) -> Iterator[Mixture]:

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+REC_709 = np.array([0.2126, 0.7152, 0.0722])
+"""Luminance of linear Rec. 709."""
+
 BEYOND_WHITE = 0.2
 """Slope beyond a display's white. There delta E does not change any more, but the light that such a
 highlight gives under a sky does."""

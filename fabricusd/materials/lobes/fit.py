@@ -2,10 +2,13 @@
 
 The solver minimises differences of lightness, chroma and hue over pairs of directions and over the
 views under an even sky, reweighted until they are the mean delta E 2000. The solver is
-`scipy.optimize.least_squares`, after [Branch1999].
+`scipy.optimize.least_squares`, after [Branch1999]. What is found is then kept from being brighter
+than the fabric, `bound`.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +16,7 @@ from scipy.optimize import least_squares
 
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
+from fabricusd.materials.lobes.bound import Bound
 from fabricusd.materials.lobes.colors import Colors
 from fabricusd.materials.lobes.mixture import CYCLES, Mixture
 from fabricusd.materials.lobes.parameters import bounds, pack, unpack, value_and_slopes
@@ -36,8 +40,7 @@ GRAZING_SHARE = 0.25
 
 EXCESS, BRIGHTNESS = 5.0, 10.0
 """Delta E that is as bad as being twice as bright as the cloth in each view, and as being twice as
-bright, or dark, in the mean over the views. With three times these, six lobes of the presets are at
-most 14 and not 23 % brighter than the cloth in any view, and 0.1 to 0.2 delta E farther from it."""
+bright, or dark, in the mean over the views. The less bright a fit, the less does `bound` take."""
 
 PULL = 0.02
 """Delta E that a number costs that moves by 1, so that numbers without effect stay."""
@@ -161,27 +164,30 @@ def fit(
 
     max_error : mean delta E 2000 that fewer lobes may have; None takes `count` of them
 
+    It is no brighter than the fabric under an even sky, in any view.
+
     Raises FabricError for a number of lobes out of COUNTS, and for a fabric without threads.
     """
     if count not in COUNTS:
         raise FabricError("lobes", f"is {count}; it must be from {COUNTS[0]} to {COUNTS[-1]}")
-    problem = Problem(fitted_pairs(fabric))
+    problem, bound = Problem(fitted_pairs(fabric)), Bound(fabric)
     fewer = range(1, count) if max_error is not None else ()
     for few in fewer:
         found = _found(problem, starts(fabric, few, form))
+        found = bound(found) if found is not None else None
         if found is not None and problem.delta_e(found) <= (max_error or 0.0):
             return found
     found = _found(problem, starts(fabric, count, form))
     if found is None:
         raise FabricError(f"fabric '{fabric.name}'", f"has no threads for {count} lobes")
-    return found
+    return bound(found)
 
 
 def refit(fabric: Fabric, mixture: Mixture) -> Mixture:
-    """Return the mixture nearest to `fabric` that a solver finds from `mixture`."""
-    found = _found(Problem(fitted_pairs(fabric)), [mixture])
+    """Return the mixture nearest to `fabric` that a solver finds from `mixture`, as `fit` does."""
+    found = _found(Problem(fitted_pairs(fabric)), [replace(mixture, view=())])
     assert found is not None
-    return found
+    return Bound(fabric)(found)
 
 
 def _found(problem: Problem, begun: list[Mixture]) -> Mixture | None:

@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 from fabricusd.fabric import Fabric
 from fabricusd.materials.fit.judge import VIEWS, direction_pairs, hemisphere
 from fabricusd.materials.lobes import skies
+from fabricusd.materials.lobes.colors import REC_709
 from fabricusd.materials.lobes.mixture import Mixture, evaluate
 from fabricusd.materials.lobes.target import cloth
 from fabricusd.quality.colors import delta_e_2000
 
 Floats = NDArray[np.float64]
 
-REC_709 = np.array([0.2126, 0.7152, 0.0722])
-
 STEEP = (0.0, 20.0, 40.0, 55.0, 65.0, 72.0, 78.0, 82.0, 85.0, 87.0, 88.0, 89.0)
-AROUND = 8
+AROUND = 24
 """Views [degrees] and azimuths for which the albedos are compared."""
 
 
@@ -86,7 +85,7 @@ class Judge:
 
 
 def _steep_views() -> Floats:
-    polar, turn = np.meshgrid(np.radians(STEEP), 2.0 * np.pi * (np.arange(AROUND) + 0.25) / AROUND)
+    polar, turn = np.meshgrid(np.radians(STEEP), 2.0 * np.pi * (np.arange(AROUND) + 0.3) / AROUND)
     s = np.sin(polar)
     w = np.stack((s * np.cos(turn), s * np.sin(turn), np.cos(polar)), axis=-1)
     return np.asarray(w.reshape(-1, 3))

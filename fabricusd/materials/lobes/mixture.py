@@ -3,13 +3,14 @@
 With the normal `n = sin(tilt) a + cos(tilt) N` of a lobe whose threads run along `a`, and its
 tangent `t = cos(tilt) a - sin(tilt) N`,
 
-    f cos = sum color W D(h) G(wi, wo) / (4 n.wo)
-          + diffuse max(N.wo, 1e-4)^q N.wi / pi + sheen
+    f cos = V(wo) (sum color W D(h) G(wi, wo) / (4 n.wo)
+                   + diffuse max(N.wo, 1e-4)^q N.wi / pi + sheen max(N.wo, 0.05)^u S)
     W(wo) = max(n.wo, 1e-4)^p max(1 - (t.wo)^2, 0.06)^r max(N.wo, 0.05)^s
 
 A lobe is 0 where either direction is below its plane or below the cloth. `D` is the distribution of
-GGX, and the sheen is that of [Zeltner2022]. `W` depends on the viewer alone, because that is all
-that a closure's colour may depend on.
+GGX, and `S` is the sheen of [Zeltner2022]. `V`, `view_factor`, keeps the mixture from being
+brighter than the cloth. `V` and `W` depend on the viewer alone, because that is all that a
+closure's colour may depend on.
 
 Renderers differ in the masking `G`. The masking of Cycles uses both widths of a lobe. MaterialX's
 uses their geometric mean, and MaterialX adds the energy that is scattered more than once, which
@@ -32,11 +33,18 @@ CYCLES, MATERIALX = FORMS = ("cycles", "materialx")
 """Whose lobes the sum is made of."""
 
 FACING, CROSSING, UPRIGHT, EVEN = 1e-4, 0.06, 0.05, 1e-4
-"""Lower bounds of the bases of the powers p, r, s and q. That of r keeps a lobe finite for a viewer
-who looks along the thread; with 0.01 a fit was 7 % too bright at 89 degrees."""
+"""Lower bounds of the bases of the powers p, r, s and u, and q. That of r keeps a lobe finite for a
+viewer who looks along the thread."""
 
 SMALLEST = 1e-6
 """Cosine below which a direction is below a plane."""
+
+
+SHARP = 0.01
+"""Lower bound of N.wo in V."""
+
+POWERS = 7
+"""Number of coefficients of each polynomial of V."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +81,8 @@ class Mixture:
 
     form : one of FORMS
     diffuse : (3,) factor on even reflection; diffuse_power : the power q
-    sheen : (3,) factor on sheen of `sheen_roughness`
+    sheen : (3,) factor on sheen of `sheen_roughness`; sheen_power : the power u
+    view : (m POWERS,) coefficients of V, polynomial by polynomial, see `view_terms`; none: V is 1
     """
 
     form: str
@@ -82,6 +91,8 @@ class Mixture:
     diffuse_power: float
     sheen: tuple[float, float, float]
     sheen_roughness: float
+    sheen_power: float
+    view: tuple[float, ...] = ()
 
     @property
     def count(self) -> int:
@@ -138,20 +149,44 @@ def weight(lobe: Lobe, one: Reflected, wo: Floats) -> Floats:
     return np.asarray(one.facing**lobe.facing * one.crossing**lobe.crossing * upright**lobe.upright)
 
 
+def view_terms(wo: Floats) -> Floats:
+    """(n, 5 POWERS) factors of the coefficients of V: s^k times 1, d, d^2, x and y.
+
+    x and y are the cosines of wo to the weft and the warp, `d = x^2 - y^2`, and s is the square
+    root of N.wo, because the albedo of cloth changes fastest in grazing views.
+    """
+    s = np.sqrt(np.maximum(wo[:, 2], SHARP))
+    x, y = wo[:, 0], wo[:, 1]
+    d = x * x - y * y
+    around = np.stack((np.ones_like(d), d, d * d, x, y), axis=1)
+    powers = s[:, None] ** np.arange(POWERS)
+    return np.asarray((around[:, :, None] * powers[:, None, :]).reshape(len(wo), -1))
+
+
+def view_factor(mixture: Mixture, wo: Floats) -> Floats:
+    """(n,) V of a mixture: the exponential of the sum of `view_terms` times the coefficients."""
+    if not mixture.view:
+        return np.ones(len(wo))
+    return np.asarray(np.exp(view_terms(wo)[:, : len(mixture.view)] @ np.array(mixture.view)))
+
+
 def evaluate(mixture: Mixture, wi: Floats, wo: Floats) -> Floats:
     """(n, 3) radiance per unit `L_i dwi` towards wo, cosine included, for unit wi, wo (n, 3).
 
     Directions are in the surface frame: x along the weft, y along the warp, z the normal. 0 if
     either is below the cloth.
     """
-    even = np.maximum(wo[:, 2], EVEN) ** mixture.diffuse_power * wi[:, 2] / np.pi
+    seen = view_factor(mixture, wo)
+    even = seen * np.maximum(wo[:, 2], EVEN) ** mixture.diffuse_power * wi[:, 2] / np.pi
     out = even[:, None] * np.array(mixture.diffuse)
-    out += sheen_value(mixture.sheen_roughness, wi, wo)[:, None] * np.array(mixture.sheen)
+    fuzz = seen * np.maximum(wo[:, 2], UPRIGHT) ** mixture.sheen_power
+    fuzz = fuzz * sheen_value(mixture.sheen_roughness, wi, wo)
+    out += fuzz[:, None] * np.array(mixture.sheen)
     for lobe in mixture.lobes:
         alphas = lobe.alpha_along, lobe.alpha_across
         for tilt in lobe.tilts:
             one = reflected(mixture.form, lobe.along, tilt, alphas, wi, wo)
-            f = weight(lobe, one, wo)[:, None] * np.array(lobe.color)
+            f = (seen * weight(lobe, one, wo))[:, None] * np.array(lobe.color)
             out += one.value[:, None] * f * (1.0 + f * one.spared[:, None])
     above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
     return np.where(above[:, None], out, 0.0)

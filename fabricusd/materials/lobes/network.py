@@ -17,6 +17,8 @@ from fabricusd.materials.lobes.mixture import (
     EVEN,
     FACING,
     MATERIALX,
+    POWERS,
+    SHARP,
     SMALLEST,
     UPRIGHT,
     Lobe,
@@ -42,18 +44,24 @@ def lobes(maps: Inputs, opaque: bool, mixture: Mixture, matrix: Floats) -> Graph
     b = Builder()
     eye, normal, upright = _frame(b)
     axes = _axes(b, matrix)
-    parts = [_diffuse(b, mixture, normal, upright)]
+    view = _view(b, mixture, upright, eye, axes) if mixture.view else one(1.0)
+    parts = [_diffuse(b, mixture, normal, upright, view)]
     if max(mixture.sheen) > 1e-4:
         parts.append(
             b.add(
                 "sheen", "sheen_bsdf", "BSDF", "ND_sheen_bsdf",
-                color=_color(mixture.sheen), roughness=one(mixture.sheen_roughness),
+                color=_shaded(
+                    b, "sheen", mixture.sheen, mixture.sheen_power, (upright, UPRIGHT), view
+                ),
+                roughness=one(mixture.sheen_roughness),
                 normal=normal, mode=Value("string", "zeltner"),
             )
         )  # fmt: skip
     for k, lobe in enumerate(mixture.lobes):
         for tilt, side in zip(lobe.tilts, ("", "_back"), strict=False):
-            parts.append(_placed(b, f"lobe{k}{side}", lobe, tilt, axes[lobe.along], normal, eye))
+            parts.append(
+                _placed(b, f"lobe{k}{side}", lobe, tilt, axes[lobe.along], normal, eye, view)
+            )
     inputs: dict[str, Source] = {"bsdf": _sum(b, parts), "thin_walled": Value("boolean", True)}
     if not opaque:
         inputs["opacity"] = Maps(b, maps)("opacity")
@@ -94,12 +102,47 @@ def _axes(b: Builder, matrix: Floats) -> tuple[Link, Link]:
     return found[0], found[1]
 
 
-def _diffuse(b: Builder, mixture: Mixture, normal: Link, upright: Link) -> Link:
-    least = b.math("diffuse_cosine", "max", "float", upright, one(EVEN))
-    power = b.math("diffuse_power", "power", "float", least, one(mixture.diffuse_power))
-    color = b.math(
-        "diffuse_color", "multiply", "color3", _color(mixture.diffuse), power, short=True
-    )
+def _view(b: Builder, mixture: Mixture, upright: Link, eye: Link, axes: tuple[Link, Link]) -> Link:
+    """Return V, `view_factor` of `lobes.mixture`."""
+    most = b.math("view_cosine", "max", "float", upright, one(SHARP))
+    s = b.add("view_s", "sqrt", "float", "ND_sqrt_float", **{"in": most})
+    x, y = (_dot(b, f"view_{k}", eye, axis) for k, axis in zip("xy", axes, strict=True))
+    d = b.math(
+        "view_d", "subtract", "float",
+        b.math("view_xx", "multiply", "float", x, x), b.math("view_yy", "multiply", "float", y, y),
+    )  # fmt: skip
+    around = (None, d, b.math("view_dd", "multiply", "float", d, d), x, y)
+    total: Link | None = None
+    for k in range(len(mixture.view) // POWERS):
+        *low, top = mixture.view[k * POWERS : (k + 1) * POWERS]
+        term: Source = one(top)
+        for power, c in reversed(list(enumerate(low))):
+            by_s = b.math(f"view_{k}_{power}_times", "multiply", "float", term, s)
+            term = b.math(f"view_{k}_{power}", "add", "float", by_s, one(c))
+        assert isinstance(term, Link)
+        factor = around[k]
+        if factor is not None:
+            term = b.math(f"view_{k}_around", "multiply", "float", term, factor)
+        total = term if total is None else b.math(f"view_{k}_sum", "add", "float", total, term)
+    assert total is not None
+    return b.add("view", "exp", "float", "ND_exp_float", **{"in": total})
+
+
+def _shaded(
+    b: Builder, name: str, rgb: tuple[float, float, float], power: float,
+    base: tuple[Link, float], view: Source,
+) -> Link:  # fmt: skip
+    """Return a colour times V and a power of the cosine to the viewer, its lower bound given."""
+    least = b.math(f"{name}_cosine", "max", "float", base[0], one(base[1]))
+    raised = b.math(f"{name}_power", "power", "float", least, one(power))
+    seen = b.math(f"{name}_view", "multiply", "float", raised, view)
+    return b.math(f"{name}_color", "multiply", "color3", _color(rgb), seen, short=True)
+
+
+def _diffuse(b: Builder, mixture: Mixture, normal: Link, upright: Link, view: Source) -> Link:
+    color = _shaded(
+        b, "diffuse", mixture.diffuse, mixture.diffuse_power, (upright, EVEN), view
+    )  # fmt: skip
     return b.add(
         "diffuse", "oren_nayar_diffuse_bsdf", "BSDF", "ND_oren_nayar_diffuse_bsdf",
         color=color, normal=normal,
@@ -107,14 +150,15 @@ def _diffuse(b: Builder, mixture: Mixture, normal: Link, upright: Link) -> Link:
 
 
 def _placed(
-    b: Builder, name: str, lobe: Lobe, tilt: float, axis: Link, normal: Link, eye: Link
-) -> Link:
+    b: Builder, name: str, lobe: Lobe, tilt: float, axis: Link, normal: Link, eye: Link,
+    view: Source,
+) -> Link:  # fmt: skip
     return b.add(
         name, LOBE.category, LOBE.kind, LOBE.identifier,
         color=_color(lobe.color), tilt=one(tilt),
         roughness=Value("vector2", (lobe.alpha_along, lobe.alpha_across)),
         facing=one(lobe.facing), crossing=one(lobe.crossing), upright=one(lobe.upright),
-        axis=axis, normal=normal, eye=eye,
+        axis=axis, normal=normal, eye=eye, view=view,
     )  # fmt: skip
 
 
@@ -161,7 +205,8 @@ def _definition() -> Definition:
     ]  # fmt: skip
     weight = b.math(
         "weight", "multiply", "float",
-        b.math("weight_two", "multiply", "float", factors[0], factors[1]), factors[2],
+        b.math("weight_two", "multiply", "float", factors[0], factors[1]),
+        b.math("weight_view", "multiply", "float", factors[2], Given("view")),
     )  # fmt: skip
     # The node turns a normal that faces away towards the viewer; such a lobe is not seen.
     seen = b.add(
@@ -176,7 +221,7 @@ def _definition() -> Definition:
     inputs = {
         "color": _color((0.1, 0.1, 0.1)), "tilt": one(0.0),
         "roughness": Value("vector2", (0.3, 0.9)), "facing": one(0.0), "crossing": one(0.0),
-        "upright": one(0.0), "axis": _ACROSS, "normal": _UP, "eye": _UP,
+        "upright": one(0.0), "view": one(1.0), "axis": _ACROSS, "normal": _UP, "eye": _UP,
     }  # fmt: skip
     return Definition(
         "fabricusd_lobe", "BSDF", "ND_fabricusd_lobe", inputs, tuple(b.nodes.values()), end.node

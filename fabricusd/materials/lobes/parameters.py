@@ -1,8 +1,10 @@
 """A mixture as the numbers that a solver changes, and the derivatives of its value by them.
 
+The factor V of a mixture stays as it is.
+
 A lobe has, in turn: its tilt, the logarithms of both widths and of the three channels of its
 colour, and the powers p, r and s. The mixture ends with the logarithms of its diffuse colour, the
-power q, the logarithms of the colour of its sheen, and the roughness of its sheen.
+power q, the logarithms of the colour of its sheen, the roughness of its sheen, and its power u.
 """
 
 from __future__ import annotations
@@ -22,12 +24,13 @@ from fabricusd.materials.lobes.mixture import (
     Mixture,
     Reflected,
     reflected,
+    view_factor,
     weight,
 )
 
 Floats = NDArray[np.float64]
 
-PER_LOBE, TAIL = 9, 8
+PER_LOBE, TAIL = 9, 9
 
 _STEP = 1e-5
 """Of differences, where a derivative has no closed form."""
@@ -37,7 +40,7 @@ NAMES = (
 )  # fmt: skip
 TAIL_NAMES = (
     "diffuse red", "diffuse green", "diffuse blue", "diffuse_power",
-    "sheen red", "sheen green", "sheen blue", "sheen_roughness",
+    "sheen red", "sheen green", "sheen blue", "sheen_roughness", "sheen_power",
 )  # fmt: skip
 
 _LOG = math.log
@@ -53,7 +56,8 @@ LOBE_BOUNDS = (
     (-1.0, 4.0), (-3.0, 3.0), (-2.0, 2.0),
 )  # fmt: skip
 TAIL_BOUNDS = (
-    *((_LOG(DARK), _LOG(2.0)),) * 3, (-0.5, 2.0), *((_LOG(DARK), _LOG(2.0)),) * 3, (0.07, 1.0),
+    *((_LOG(DARK), _LOG(2.0)),) * 3, (-0.5, 2.0), *((_LOG(DARK), _LOG(30.0)),) * 3, (0.07, 1.0),
+    (-1.0, 3.0),
 )  # fmt: skip
 
 
@@ -64,7 +68,7 @@ def pack(mixture: Mixture) -> Floats:
         found += [one.tilt, _LOG(one.alpha_along), _LOG(one.alpha_across), *_logs(one.color)]
         found += [one.facing, one.crossing, one.upright]
     found += [*_logs(mixture.diffuse), mixture.diffuse_power]
-    found += [*_logs(mixture.sheen), mixture.sheen_roughness]
+    found += [*_logs(mixture.sheen), mixture.sheen_roughness, mixture.sheen_power]
     return np.array(found)
 
 
@@ -86,6 +90,7 @@ def unpack(x: Floats, like: Mixture) -> Mixture:
         like, lobes=tuple(lobes),
         diffuse=(math.exp(v[0]), math.exp(v[1]), math.exp(v[2])), diffuse_power=v[3],
         sheen=(math.exp(v[4]), math.exp(v[5]), math.exp(v[6])), sheen_roughness=v[7],
+        sheen_power=v[8],
     )  # fmt: skip
 
 
@@ -116,8 +121,8 @@ def at_bounds(mixture: Mixture) -> list[str]:
     names += TAIL_NAMES
     # Neither the roughness nor the power of what is not there matters, and a level tilt is fixed.
     fixed = high - low < 1e-6
-    fixed[-1] = max(mixture.sheen) <= ABSENT
-    fixed[-5] = max(mixture.diffuse) <= ABSENT
+    fixed[-2:] = max(mixture.sheen) <= ABSENT
+    fixed[-6] = max(mixture.diffuse) <= ABSENT
     at_low, at_high = (x < low + 1e-6) & (low != _LOG(DARK)), x > high - 1e-6
     return [
         f"{name} is at its {'least' if least else 'greatest'}"
@@ -133,8 +138,13 @@ def value_and_slopes(
     m = len(mixture.lobes) * PER_LOBE + TAIL
     d = np.zeros((m if slopes else 0, len(wi), 3))
     even = np.maximum(wo[:, 2], EVEN)
-    diffuse = (even**mixture.diffuse_power * wi[:, 2] / np.pi)[:, None] * np.array(mixture.diffuse)
-    unit = sheen_value(mixture.sheen_roughness, wi, wo)
+    seen = view_factor(mixture, wo)
+    diffuse = (seen * even**mixture.diffuse_power * wi[:, 2] / np.pi)[:, None] * np.array(
+        mixture.diffuse
+    )
+    upright = np.maximum(wo[:, 2], UPRIGHT)
+    fuzz = seen * upright**mixture.sheen_power
+    unit = fuzz * sheen_value(mixture.sheen_roughness, wi, wo)
     sheen = unit[:, None] * np.array(mixture.sheen)
     out = diffuse + sheen
     if slopes:
@@ -142,23 +152,25 @@ def value_and_slopes(
         for c in range(3):
             tail[c, :, c], tail[4 + c, :, c] = diffuse[:, c], sheen[:, c]
         tail[3] = diffuse * np.log(even)[:, None]
-        moved = sheen_value(mixture.sheen_roughness - _STEP, wi, wo)
+        moved = fuzz * sheen_value(mixture.sheen_roughness - _STEP, wi, wo)
         tail[7] = ((unit - moved) / _STEP)[:, None] * np.array(mixture.sheen)
+        tail[8] = sheen * np.log(upright)[:, None]
     for k, lobe in enumerate(mixture.lobes):
         mine = d[k * PER_LOBE : (k + 1) * PER_LOBE]
         for sign, tilt in zip((1.0, -1.0), lobe.tilts, strict=False):
-            out += _add_lobe(mixture.form, lobe, sign, tilt, wi, wo, mine if slopes else None)
+            out += _add_lobe(mixture.form, lobe, sign, tilt, wi, wo, seen, mine if slopes else None)
     return out, d
 
 
 def _add_lobe(
-    form: str, lobe: Lobe, sign: float, tilt: float, wi: Floats, wo: Floats, d: Floats | None
-) -> Floats:
-    """(n, 3) value of one lobe; its derivatives are added to d (PER_LOBE, n, 3)."""
+    form: str, lobe: Lobe, sign: float, tilt: float, wi: Floats, wo: Floats, seen: Floats,
+    d: Floats | None,
+) -> Floats:  # fmt: skip
+    """(n, 3) value of one lobe, `seen` being V; its derivatives are added to d (PER_LOBE, n, 3)."""
 
     def lobed(psi: float, ax: float, ay: float) -> tuple[Reflected, Floats]:
         one = reflected(form, lobe.along, psi, (ax, ay), wi, wo)
-        f = weight(lobe, one, wo)[:, None] * np.array(lobe.color)
+        f = (seen * weight(lobe, one, wo))[:, None] * np.array(lobe.color)
         return one, f
 
     def value(one: Reflected, f: Floats) -> Floats:

@@ -20,6 +20,9 @@ STEEPEST = 1.3
 LEVEL = 0.05
 """Tilt below which a group of nodes is taken for level [rad]."""
 
+FLANKS = ((), (0,), (1,), (0, 1))
+"""Axes towards which there are flanks besides."""
+
 LEAST = 0.02
 """Share of the cloth below which threads get no lobe of their own."""
 
@@ -40,15 +43,16 @@ def starts(fabric: Fabric, count: int, form: str) -> list[Mixture]:
             shapes = list(_shapes(nodes.psi0[mine], nodes.weight[mine], count))
             choices.append([(along, width, s) for s in (*shapes, ())])
     found: dict[Mixture, None] = {}
-    for chosen in product(*choices):
+    for chosen, flanks in product(product(*choices), FLANKS):
         lobes = tuple(
             _lobe(along, width, tilt, paired, wide)
             for along, width, shapes in chosen
             for wide, (tilt, paired) in enumerate(shapes)
         )
+        lobes += tuple(flank(along) for along in flanks if lobes)
         mixture = Mixture(
             form=form, lobes=lobes, diffuse=(0.05, 0.05, 0.05), diffuse_power=0.0,
-            sheen=(0.01, 0.01, 0.01), sheen_roughness=0.4,
+            sheen=(0.01, 0.01, 0.01), sheen_roughness=0.4, sheen_power=0.0,
         )  # fmt: skip
         if mixture.count == count:
             found[mixture] = None
@@ -93,4 +97,12 @@ def _lobe(along: int, width: float, tilt: float, paired: bool, wide: int) -> Lob
         along=along, tilt=tilt, paired=paired,
         alpha_along=min(max(1.6 * width, 0.05) * 2.0**wide, 0.9), alpha_across=0.9,
         color=(0.1, 0.1, 0.1), facing=0.5, crossing=0.0, upright=0.0,
+    )  # fmt: skip
+
+
+def flank(along: int) -> Lobe:
+    """A pair on the flanks of the threads that `along` crosses: light from low beside them."""
+    return Lobe(
+        along=along, tilt=0.9, paired=True, alpha_along=0.4, alpha_across=0.4,
+        color=(0.05, 0.05, 0.05), facing=0.3, crossing=0.0, upright=0.0,
     )  # fmt: skip

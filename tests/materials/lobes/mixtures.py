@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fabricusd.materials.lobes.mixture import Lobe, Mixture
+from fabricusd.materials.lobes.mixture import POWERS, Lobe, Mixture
 
 PAIR = Lobe(
     along=0, tilt=0.6, paired=True, alpha_along=0.2, alpha_across=0.9, color=(0.3, 0.6, 0.2),
@@ -16,10 +16,14 @@ LEVEL = Lobe(
 )  # fmt: skip
 
 
+VIEW = tuple(round(0.1 * (-1.0) ** k / (1.0 + k % POWERS), 6) for k in range(5 * POWERS))
+"""Coefficients of a V between 0.9 and 1.5."""
+
+
 def mixture(form: str, *lobes: Lobe) -> Mixture:
     return Mixture(
         form=form, lobes=lobes or (PAIR, LEVEL), diffuse=(0.05, 0.1, 0.2), diffuse_power=0.4,
-        sheen=(0.1, 0.2, 0.3), sheen_roughness=0.5,
+        sheen=(0.1, 0.2, 0.3), sheen_roughness=0.5, sheen_power=0.7, view=VIEW,
     )  # fmt: skip
 
 
@@ -27,7 +31,7 @@ def bare(form: str, lobe: Lobe) -> Mixture:
     """One lobe and nothing else."""
     return Mixture(
         form=form, lobes=(lobe,), diffuse=(0.0, 0.0, 0.0), diffuse_power=0.0,
-        sheen=(0.0, 0.0, 0.0), sheen_roughness=0.5,
+        sheen=(0.0, 0.0, 0.0), sheen_roughness=0.5, sheen_power=0.0,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from fabricusd.materials.lobes.fit import COUNTS, Problem, fit
 from fabricusd.materials.lobes.judge import Judge
 from fabricusd.materials.lobes.mixture import CYCLES, FORMS, evaluate
 from fabricusd.materials.lobes.parameters import pack, unpack
-from fabricusd.materials.lobes.starts import starts
+from fabricusd.materials.lobes.starts import flank, starts
 from fabricusd.materials.lobes.target import GRAZING, VIEWS, Pairs, fitted_directions
 from fabricusd.schema import load
 
@@ -70,9 +70,16 @@ def test_a_symmetric_curve_starts_with_pairs_at_its_plateaus():
 
 def test_pile_that_leans_starts_with_lobes_that_lean():
     found = starts(load("velvet"), 4, CYCLES)
-    leaning = [lobe for one in found for lobe in one.lobes if lobe.along == 0]
+    leaning = [lobe for one in found for lobe in one.lobes if lobe.along == 0 and lobe != flank(0)]
     assert all(lobe.tilt < -0.5 for lobe in leaning)
     assert not any(lobe.paired for lobe in leaning)
+
+
+def test_starts_have_lobes_on_the_flanks_as_well():
+    found = starts(load("linen_plain"), 4, CYCLES)
+    of_one = [one for one in found if sum(flank(a) in one.lobes for a in (0, 1)) == 1]
+    assert len(of_one) >= 2
+    assert all(len(one.lobes) > 1 for one in of_one)
 
 
 @pytest.mark.parametrize("count", [0, 7])

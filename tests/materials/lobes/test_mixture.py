@@ -9,7 +9,15 @@ import pytest
 from materials.lobes.mixtures import LEVEL, PAIR, bare, directions, mixture
 
 from fabricusd.materials.fit.judge import hemisphere
-from fabricusd.materials.lobes.mixture import CYCLES, FORMS, Mixture, evaluate, reflected
+from fabricusd.materials.lobes.mixture import (
+    CYCLES,
+    FORMS,
+    POWERS,
+    Mixture,
+    evaluate,
+    reflected,
+    view_factor,
+)
 
 PLAIN = replace(LEVEL, color=(1.0, 1.0, 1.0), facing=0.0, crossing=0.0, upright=0.0)
 
@@ -30,6 +38,8 @@ def test_a_mixture_of_pairs_is_its_own_mirror_image(axis):
     flip = np.ones(3)
     flip[axis] = -1.0
     one = mixture(CYCLES)
+    # The last polynomials of V are odd in the cosines to the weft and to the warp.
+    one = replace(one, view=one.view[: 3 * POWERS])
     assert evaluate(one, wi * flip, wo * flip) == pytest.approx(evaluate(one, wi, wo))
 
 
@@ -76,6 +86,23 @@ def test_the_diffuse_part_is_lambert_without_its_power():
     wi, wo = directions(50)
     one = Mixture(
         form=CYCLES, lobes=(), diffuse=(0.2, 0.4, 0.6), diffuse_power=0.0, sheen=(0.0,) * 3,
-        sheen_roughness=0.5,
+        sheen_roughness=0.5, sheen_power=0.0,
     )  # fmt: skip
     assert evaluate(one, wi, wo) == pytest.approx(wi[:, 2:] / np.pi * np.array([[0.2, 0.4, 0.6]]))
+
+
+def test_the_factor_of_the_view_multiplies_all_of_a_mixture():
+    wi, wo = directions(200)
+    one = mixture(CYCLES)
+    v = view_factor(one, wo)
+    assert v.max() > 1.2 * v.min() > 0.0
+    without = evaluate(replace(one, view=()), wi, wo)
+    assert evaluate(one, wi, wo) == pytest.approx(v[:, None] * without)
+
+
+def test_sheen_is_weighted_by_the_viewer():
+    wi, wo = directions(100)
+    even = replace(mixture(CYCLES), lobes=(), diffuse=(0.0,) * 3, sheen_power=0.0)
+    fades = replace(even, sheen_power=2.0)
+    upright = np.maximum(wo[:, 2:], 0.05)
+    assert evaluate(fades, wi, wo) == pytest.approx(upright**2 * evaluate(even, wi, wo))

@@ -27,7 +27,9 @@ MATH = {
     "multiply": np.multiply, "add": np.add, "subtract": np.subtract, "max": np.maximum,
     "power": np.power, "dotproduct": np.dot,
 }  # fmt: skip
-PLAIN = {"sin": np.sin, "cos": np.cos, "sign": np.sign, "absval": np.abs}
+PLAIN = {
+    "sin": np.sin, "cos": np.cos, "sign": np.sign, "absval": np.abs, "sqrt": np.sqrt, "exp": np.exp,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("row", RECORDED["rows"], ids=lambda row: row["preset"])
