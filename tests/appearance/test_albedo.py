@@ -18,7 +18,7 @@ from fabricusd.appearance.albedo import (
     safe_albedo,
 )
 from fabricusd.fabric import ThreadSet
-from fabricusd.schema import load
+from fabricusd.geometry.nearest import published
 
 # MODEL section 2: white threads, worst view.
 SAFE = {
@@ -34,13 +34,13 @@ SAFE = {
 @pytest.mark.parametrize("name", SAFE)
 def test_the_largest_safe_albedo_is_the_published_one(name):
     # The two disagree by up to 7 %: a grid of views may step over the worst one.
-    assert safe_albedo(load(name), QUICK) == pytest.approx(SAFE[name], rel=0.08)
+    assert safe_albedo(published(name), QUICK) == pytest.approx(SAFE[name], rel=0.08)
 
 
 @pytest.mark.parametrize("name", ["linen_plain", "wool_flannel"])
 @pytest.mark.parametrize("theta", [0.3, 1.2])
 def test_it_is_what_plain_integration_over_the_sky_gives(name, theta):
-    fabric = load(name)
+    fabric = published(name)
     found = albedo_by_view(fabric, [theta], FINE)[0, 0]
     cosine = (np.arange(160) + 0.5) / 160
     around = (np.arange(320) + 0.5) / 320 * 2 * math.pi
@@ -53,14 +53,14 @@ def test_it_is_what_plain_integration_over_the_sky_gives(name, theta):
 
 
 def test_at_the_safe_albedo_the_worst_view_sends_back_everything():
-    fabric = load("silk_crepe_de_chine")
+    fabric = published("silk_crepe_de_chine")
     surface, volume = directional_albedo(fabric, np.radians([0, 40, 70, 80, 85, 88, 89.5]), QUICK)
     total = surface.sum(axis=2) + safe_albedo(fabric, QUICK) * volume.sum(axis=2)
     assert total.max() == pytest.approx(1.0, rel=1e-9)
 
 
 def test_threads_that_differ_in_color_alone_are_one_group():
-    fabric = load("linen_plain")
+    fabric = published("linen_plain")
     one = fabric.threads["Linen"]
     threads = {f"C{k}": replace(one, albedo=(0.1 * k, 0, 0)) for k in range(1, 5)}
     striped = replace(fabric, threads=threads, warp=ThreadSet(sequence=(0, 1, 2, 3), density=1500))
@@ -70,5 +70,5 @@ def test_threads_that_differ_in_color_alone_are_one_group():
 
 
 def test_a_fabric_without_inner_scattering_is_safe_at_any_albedo():
-    fabric = replace(load("linen_plain"), model="conserving")
+    fabric = replace(published("linen_plain"), model="conserving")
     assert safe_albedo(fabric, QUICK) == math.inf

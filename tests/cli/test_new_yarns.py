@@ -82,7 +82,7 @@ def test_a_preset_can_be_asked_for_a_weight(capsys, tmp_path):
 
 def test_a_gap_that_nobody_asked_for_is_told_by_new_and_found_by_check(capsys, tmp_path):
     _, err = made(capsys, tmp_path, "--weave", "plain", "--thickness", "0.2")
-    assert "The cloth is open, 60 % of it gap: warp of 0.2 mm at a pitch of 0.5" in err
+    assert "The cloth is open, 36 % of it gap: warp of 0.2 mm at a pitch of 0.5" in err
     (finding,) = gaps(tmp_path)
     assert finding.severity == "warning"
     status, _, _ = run(capsys, "check", "--strict", str(tmp_path / "cloth.usda"))

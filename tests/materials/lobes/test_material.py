@@ -56,6 +56,7 @@ def test_beside_openpbr_the_lobes_are_in_the_document(shirt, tmp_path, quick):
     assert [one.count for one in made.lobes.values()] == [4, 4]
 
 
+@pytest.mark.exhaustive
 def test_alone_the_lobes_are_the_network_in_usd(shirt, tmp_path, quick):
     path, made = written(shirt, tmp_path, "lobes", lobes=6)
     found = identifiers(path)
