@@ -181,7 +181,7 @@ def test_the_tables_of_a_large_repeat_are_broken_off_within_two_seconds(number, 
     # No other run of this test has left the table in the cache.
     density = 4000 + 100 * np.random.default_rng().random()
     damask = replace(
-        load("silk_crepe_de_chine"),
+        load("silk_crepe_de_chine{appearance=published}"),
         weave=Weave(np.where(figure, ~satin, satin)),
         warp=ThreadSet(sequence=(0,), density=density),
     )
