@@ -7,6 +7,7 @@ lock. Workers can therefore be plain Python threads, and the scheduler hands out
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,7 +134,8 @@ class Tracer:
         # built. Build the triangles on the main thread: temporary memory that is freed on a worker
         # thread's heap is not returned to the system.
         beside = ThreadPoolExecutor(1)
-        shaders = beside.submit(_shaders, scene, shadow)
+        # Some laws need a table of shadows, a long step: whoever watches this thread watches it.
+        shaders = beside.submit(copy_context().run, _shaders, scene, shadow)
         beside.shutdown(wait=False)
         self.tables = build_tables(scene)
         self.accelerator = Accelerator(self.tables.points, self.tables.triangles)

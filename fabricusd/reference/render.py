@@ -31,6 +31,7 @@ from fabricusd.run.workers import Batches, pixels_along_z_curve, worker_count
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.scene import Camera, Scene
 from fabricusd.scene.staging import Staging, over_background, put
+from fabricusd.steps import watched
 from fabricusd.stop import Stop
 
 BATCH = 1 << 13
@@ -298,10 +299,11 @@ def render_scene(
     begun = time.perf_counter()
     most = spp or (MOST_SAMPLES if noise else 64)
     camera = _furnished(scene, width, height)
-    tracer = Tracer(
-        scene, max_bounces=max_bounces, max_translucent=max_translucent, level=level,
-        shadow=shadow, limits=limits, seed=seed, estimator=estimator, sampler=sampler,
-    )  # fmt: skip
+    with watched(stop=stop):
+        tracer = Tracer(
+            scene, max_bounces=max_bounces, max_translucent=max_translucent, level=level,
+            shadow=shadow, limits=limits, seed=seed, estimator=estimator, sampler=sampler,
+        )  # fmt: skip
     if not len(tracer.tables.triangles):
         scene.note("the scene", "has no triangles to render; only its lights are seen")
     lens = build_lens(camera, width, height, tracer.tables.centre, pixel_filter)

@@ -174,14 +174,15 @@ with watched(listener=say):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", SIGNALS)
-def test_the_tables_of_a_large_repeat_are_broken_off_within_two_seconds(number, tmp_path):
+@pytest.mark.parametrize("worn", ["published", "nearest"])
+def test_the_tables_of_a_large_repeat_are_broken_off_within_two_seconds(number, worn, tmp_path):
     i, j = np.mgrid[0:240, 0:240]
     figure = np.hypot(i - 120, j - 120) < 80 + 30 * np.sin(5 * np.arctan2(j - 120, i - 120))
     satin = (5 * i + j) % 8 == 0
     # No other run of this test has left the table in the cache.
     density = 4000 + 100 * np.random.default_rng().random()
     damask = replace(
-        load("silk_crepe_de_chine{appearance=published}"),
+        load(f"silk_crepe_de_chine{{appearance={worn}}}"),
         weave=Weave(np.where(figure, ~satin, satin)),
         warp=ThreadSet(sequence=(0,), density=density),
     )
