@@ -234,6 +234,8 @@ class Thread:
         next [m]
     plies : int - yarns that are twisted together into the thread; 1 for single yarn
     twist : float - turns of the plies [1/m], Z above 0, S below
+    hairiness : float - Uster's H of the yarn in the finished cloth: length of the fibres that
+        protrude from it, over its own length
     documentation : str - where the numbers come from
     """
 
@@ -262,6 +264,7 @@ class Thread:
     slub_spacing: float = field(default=0.0, metadata=_limits(0.0))
     plies: int = field(default=1, metadata=_limits(1, 12))
     twist: float = field(default=0.0, metadata=_limits(-20000.0, 20000.0))
+    hairiness: float = field(default=0.0, metadata=_limits(0.0, 100.0))
     documentation: str = ""
 
     def __post_init__(self) -> None:
@@ -272,7 +275,7 @@ class Thread:
             object.__setattr__(self, name, value)
         for name in (
             "ior", "isotropic", "gamma_surface", "gamma_volume", "surface_gain", "thickness",
-            "linear_density", *UNEVENNESS, "twist",
+            "linear_density", *UNEVENNESS, "twist", "hairiness",
         ):  # fmt: skip
             object.__setattr__(self, name, float(getattr(self, name)))
         if self.plies != int(self.plies):

@@ -73,6 +73,7 @@ def yarns(draw: st.DrawFn) -> dict[str, float | int]:
         "slub_spacing": slub * apart / 1e4 * 1e-3,
         "plies": draw(st.integers(1, 4)),
         "twist": draw(numbers(-2000, 2000)),
+        "hairiness": draw(numbers(0, 12)),
     }
 
 

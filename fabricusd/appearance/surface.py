@@ -9,6 +9,8 @@ direction is at or below the cloth.
     weave   the thread under a point of the weave
     thread  the same, and the position across the thread
 
+The fuzz of hairy threads lies over all of them.
+
 Arrays are float64, and results are exact to rounding. The kernels behind these functions also take
 float32 and are what the path tracer calls: `far`, `levels`, `mixture`. Source: `docs/model.md`
 sections 4-6.
@@ -16,6 +18,7 @@ sections 4-6.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -26,6 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 from fabricusd.appearance.accuracy import choose_rule
 from fabricusd.appearance.conserving.levels import conserving_level_value
 from fabricusd.appearance.conserving.multiple import conserving_value
+from fabricusd.appearance.fuzz import Fuzz, bald, compile_fuzz, fuzz_over_all, optical_depth
 from fabricusd.appearance.law import (
     CONSERVING_ONLY,
     PUBLISHED_ONLY,
@@ -57,6 +61,7 @@ from fabricusd.appearance.shadow.place_blocks import (
     look_up_block,
 )
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
+from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.lookup import WeaveHit, lookup
 from fabricusd.appearance.weave.place import Places, place_at
 from fabricusd.appearance.weave.yarn.compiled import Yarn, compile_yarn
@@ -122,6 +127,7 @@ def evaluate(
     out = _evaluate(_law(fabric, shadow, max_error, multiple), level, hit, i, o)
     if level != "far" and shadow != "none":
         out *= _lit(fabric, shadow, places, i)
+    under_fuzz(fabric, level, hit, i, o, out)
     return np.ascontiguousarray(out.T)
 
 
@@ -175,8 +181,57 @@ def sample(
     f = _evaluate(law, level, hit, i, o)
     if level != "far" and shadow != "none":
         f *= _lit(fabric, shadow, places, i)
+    under_fuzz(fabric, level, hit, i, o, f)
     p = _density(law, level, hit, i, o)
     return Sample(np.ascontiguousarray(i.T), np.ascontiguousarray(f.T), p)
+
+
+def under_fuzz(
+    fabric: Fabric, level: str, hit: WeaveHit, wi: Floats, wo: Floats, out: Floats
+) -> None:
+    """Lay the fuzz of `fabric` over the values out (3, n) of its cloth; see `fuzz`."""
+    fuzz = fuzz_of(fabric, np.float64)
+    if fuzz is None:
+        return
+    rows = fuzz_rows(fabric, level, hit.set, hit.thread)
+    real: Any = np.float64
+    fuzz_over_all(real, *fuzz, rows, wi, wo, out)
+
+
+def fuzz_rows(fabric: Fabric, level: str, thread_set: Any, thread: Any) -> NDArray[np.int64]:
+    """(n,) rows of `Fuzz.phase` for threads at places; (1,) at level `far`."""
+    if level == "far":
+        return np.array([len(fabric.threads)])
+    return np.where(np.asarray(thread_set) == GAP, -1, np.asarray(thread)).astype(np.int64)
+
+
+@lru_cache(maxsize=32)
+def fuzz_of(fabric: Fabric, precision: type[Any]) -> Fuzz | None:
+    """The fuzz over the cloth of `fabric`, in `precision`; None where its threads have none."""
+    if optical_depth(fabric) == 0.0:
+        return None
+    return compile_fuzz(fabric, _diffuse(bald(fabric)), precision)
+
+
+def _diffuse(fabric: Fabric) -> Floats:
+    """(2, 3) shares of diffuse light that cloth reflects, and that it transmits as threads do."""
+    x, w = np.polynomial.legendre.leggauss(6)
+    mu, weight = 0.5 * (x + 1.0), 0.5 * w
+    phi = (np.arange(12) + 0.5) * (math.pi / 6)
+    z, turn = (a.ravel() for a in np.meshgrid(mu, phi, indexing="ij"))
+    flat, share = np.sqrt(1.0 - z * z), np.repeat(weight, 12) * (2 * math.pi / 12)
+    above = np.stack((flat * np.cos(turn), flat * np.sin(turn), z), axis=-1)
+    # A quarter of the azimuths: the values differ little from turn to turn.
+    views = np.arange(0, len(z), 4)
+    to_viewer = np.repeat(above[views], len(z), axis=0)
+    cosine = share[views] * z[views]
+    found = np.zeros((2, 3))
+    for side, lights in enumerate((above, above * [1.0, 1.0, -1.0])):
+        to_light = np.tile(lights, (len(views), 1))
+        f = evaluate(fabric, to_light, to_viewer, shadow=mean_shadow(fabric))
+        seen = np.einsum("vnc,n->vc", f.reshape(len(views), len(z), 3), share)
+        found[side] = cosine @ seen / cosine.sum()
+    return found
 
 
 def _density(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats) -> Floats:

@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.scattering.models.conserving import plain_albedo
+from fabricusd.dye.fuzz import Fuzzed
 from fabricusd.fabric import Fabric, Thread
 
 Floats = NDArray[np.float64]
-
-VIEW = math.radians(8.0)
-"""Angle between the view and the normal, of a d/8 instrument."""
 
 _INCLINATIONS = 41
 """Entries of the table of E(theta): between them E is linear, and right to 1e-4."""
@@ -31,6 +29,7 @@ class Layer:
     escape : float - `p`
     mean : (k,) - weights of the threads in alpha, which sum to at most 1
     bright : (k,) - mean directional albedo of each thread's surface
+    fuzz : what lies over it where threads are hairy
     """
 
     surface: Floats
@@ -40,6 +39,7 @@ class Layer:
     escape: float
     mean: Floats
     bright: Floats
+    fuzz: Fuzzed | None = None
 
     def of(self, albedo: Floats) -> Floats:
         """(2, 2, ...) R and T by row for albedos (k, ...) of the threads."""
@@ -50,6 +50,8 @@ class Layer:
         grow = (..., *(None,) * (a.ndim - 1))
         found = self.surface[grow] + np.tensordot(self.volume, a, axes=1)
         found = found + self.rest[grow] * strength
+        if self.fuzz is not None:
+            found = self.fuzz.over(found, a)
         found[:, 1] += self.gap[grow]
         return np.asarray(found)
 

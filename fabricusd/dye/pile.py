@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from fabricusd.appearance.conserving.facets import SURFACE, VOLUME, white_facets
 from fabricusd.appearance.conserving.grid import entry_angles, mean_share
 from fabricusd.appearance.weave.coverage import coverage
-from fabricusd.dye.layer import VIEW, Layer, mean_surface
+from fabricusd.dye.fuzz import VIEW
+from fabricusd.dye.layer import Layer, mean_surface
 from fabricusd.fabric import CONSERVING_MODEL, Fabric
 
 Floats = NDArray[np.float64]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from fabricusd.dye.fuzz import fuzzed
 from fabricusd.dye.layer import Layer, alone
 from fabricusd.dye.stack import BASIS
 from fabricusd.dye.woven import woven_layer
@@ -84,8 +85,10 @@ def layer_of(fabric: Fabric) -> Layer:
         # Tracing pile compiles kernels.
         from fabricusd.dye.pile import pile_layer
 
-        return pile_layer(fabric)
-    return woven_layer(fabric)
+        layer = pile_layer(fabric)
+    else:
+        layer = woven_layer(fabric)
+    return replace(layer, fuzz=fuzzed(fabric))
 
 
 def _layer_of_one(fabric: Fabric, name: str, thread: Thread, known: dict[Thread, Layer]) -> Layer:

@@ -97,7 +97,7 @@ class Shares:
         )
 
 
-class _Paths(NamedTuple):
+class Paths(NamedTuple):
     """origin, direction : (n, 3); throughput : (n, 3); group : (n,) - the figure they belong to."""
 
     origin: Floats
@@ -105,8 +105,9 @@ class _Paths(NamedTuple):
     throughput: Floats
     group: NDArray[np.int64]
 
-    def only(self, keep: NDArray[np.bool_]) -> _Paths:
-        return _Paths(
+    def only(self, keep: NDArray[np.bool_]) -> Paths:
+        """Those that a mask chooses."""
+        return Paths(
             self.origin[keep], self.direction[keep], self.throughput[keep], self.group[keep]
         )
 
@@ -130,9 +131,9 @@ def reflectance(
     Raises FabricError for directions that are not unit vectors or lie in the cloth's plane, and for
     a view of the back of a fabric whose back is another one.
     """
-    viewers, lights = np.broadcast_arrays(_directions("wo", wo), _directions("wi", wi))
+    viewers, lights = np.broadcast_arrays(directions("wo", wo), directions("wi", wi))
     _check_side(cloth, viewers)
-    tracer = _Tracer(cloth, assumptions, _bounces(cloth, bounces), np.random.default_rng(seed))
+    tracer = Tracer(cloth, assumptions, bounces_of(cloth, bounces), np.random.default_rng(seed))
     each = max(1, BLOCK // count)
     found = np.concatenate(
         [
@@ -140,7 +141,7 @@ def reflectance(
             for k in range(0, len(viewers), each)
         ]
     )
-    value, error = _mean(found)
+    value, error = mean_of(found)
     return Reflectance(value=value, error=error, rays=tracer.rays)
 
 
@@ -159,15 +160,15 @@ def albedo(
     sky : directions (k, 3) -> (k,) radiance that is used in its place; None for 1
     The other arguments and errors are those of `reflectance`.
     """
-    viewers = _directions("wo", wo)
+    viewers = directions("wo", wo)
     _check_side(cloth, viewers)
-    tracer = _Tracer(cloth, assumptions, _bounces(cloth, bounces), np.random.default_rng(seed))
+    tracer = Tracer(cloth, assumptions, bounces_of(cloth, bounces), np.random.default_rng(seed))
     each = max(1, BLOCK // count)
     found = np.concatenate(
         [tracer.escaped(viewers[k : k + each], sky, count) for k in range(0, len(viewers), each)]
     )
-    mean, _ = _mean(found)
-    _, error = _mean(found[:, :, 0] + found[:, :, 1])
+    mean, _ = mean_of(found)
+    _, error = mean_of(found[:, :, 0] + found[:, :, 1])
     return Shares(
         **{name: mean[:, k] for k, name in enumerate(_WAYS[:-1])},
         gap=mean[:, len(_WAYS) - 1, 0],
@@ -191,15 +192,15 @@ def radiance_at(
     uv_threads : (n, 2) float - in threads; wo, wi : (3,) unit vectors in the surface frame
     The other arguments and errors are those of `reflectance`; a place is traced once.
     """
-    viewer, light = _directions("wo", wo), _directions("wi", wi)
+    viewer, light = directions("wo", wo), directions("wi", wi)
     _check_side(cloth, viewer)
     uv = np.asarray(uv_threads, np.float64)
-    tracer = _Tracer(cloth, assumptions, _bounces(cloth, bounces), np.random.default_rng(seed))
+    tracer = Tracer(cloth, assumptions, bounces_of(cloth, bounces), np.random.default_rng(seed))
     found = []
     for begin in range(0, len(uv), BLOCK):
         part = uv[begin : begin + BLOCK] * cloth.pitch / cloth.patch.size
         towards = np.repeat(viewer, len(part), axis=0)
-        paths = _Paths(
+        paths = Paths(
             from_outside(cloth, part, towards), -towards, np.ones_like(towards),
             np.arange(len(part)),
         )  # fmt: skip
@@ -213,7 +214,8 @@ _WAYS = (
 _REFLECTED, _TRANSMITTED, _R_ONCE, _T_ONCE, _LOST, _LEFT, _GAP = range(len(_WAYS))
 
 
-def _bounces(cloth: Cloth, bounces: int | None) -> int:
+def bounces_of(cloth: Cloth, bounces: int | None) -> int:
+    """How often light scatters at most, given what was asked for."""
     if bounces is None:
         return BOUNCES if cloth.conserving else 1
     if bounces < 1:
@@ -221,7 +223,7 @@ def _bounces(cloth: Cloth, bounces: int | None) -> int:
     return bounces
 
 
-def _directions(name: str, w: ArrayLike) -> Floats:
+def directions(name: str, w: ArrayLike) -> Floats:
     """(n, 3) unit vectors out of the cloth's plane."""
     rows = np.atleast_2d(np.asarray(w, np.float64))
     if rows.ndim != 2 or rows.shape[1] != 3:
@@ -252,13 +254,13 @@ def _check_side(cloth: Cloth, viewers: Floats) -> None:
         )
 
 
-def _mean(batches: Floats) -> tuple[Floats, Floats]:
+def mean_of(batches: Floats) -> tuple[Floats, Floats]:
     """Mean over axis 1 and its standard error."""
     spread = batches.std(axis=1, ddof=1) / np.sqrt(batches.shape[1])
     return batches.mean(axis=1), spread
 
 
-class _Tracer:
+class Tracer:
     """Traces blocks of paths through one cloth; counts its rays."""
 
     def __init__(
@@ -277,35 +279,35 @@ class _Tracer:
         out = self.gathered(paths, np.repeat(lights, BATCHES, axis=0))
         return out.reshape(len(viewers), BATCHES, 3) / per
 
-    def gathered(self, paths: _Paths, towards: Floats) -> Floats:
+    def gathered(self, paths: Paths, towards: Floats) -> Floats:
         """(g, 3) sums of what the paths of each group pick up from its light, `towards` (g, 3)."""
         out = np.zeros((len(towards), 3))
         for depth in range(self.bounces):
             hits = self._meet(paths)
             on = (hits.primitive != NOTHING) & ~hits.back
             paths, hits = paths.only(on), hits.only(on)
-            n = len(paths.group)
-            if n == 0:
+            if len(paths.group) == 0:
                 break
-            origin, value = np.empty((2 * n, 3)), np.empty((2, n))
-            light = towards[paths.group]
-            arrive(
-                *self._scene(), *hits[:3], paths.direction, light, self.rng.random(n), origin, value
-            )
-            shadowed = np.ones(2 * n, np.bool_)
-            # Most of a narrow lobe's light is nothing: no ray is needed to know that.
-            asked = value.ravel() != 0
-            self.rays += int(asked.sum())
-            shadowed[asked] = blocked(
-                self.cloth, origin[asked], np.concatenate((light, light))[asked]
-            )
-            pick_up(
-                self.cloth.lines, self.cloth.mesh.rings, self.cloth.threads, hits.primitive, value,
-                shadowed, paths.throughput, paths.group, out,
-            )  # fmt: skip
+            self._light(paths, hits, towards, out)
             if depth + 1 < self.bounces:
                 paths = self._scattered(paths, hits, depth)
         return out
+
+    def _light(self, paths: Paths, hits: Hits, towards: Floats, out: Floats) -> None:
+        """Add to out (g, 3) what hits pick up from the lights `towards` (g, 3)."""
+        n = len(paths.group)
+        origin, value = np.empty((2 * n, 3)), np.empty((2, n))
+        light = towards[paths.group]
+        arrive(*self._scene(), *hits[:3], paths.direction, light, self.rng.random(n), origin, value)
+        shadowed = np.ones(2 * n, np.bool_)
+        # Most of a narrow lobe's light is nothing: no ray is needed to know that.
+        asked = value.ravel() != 0
+        self.rays += int(asked.sum())
+        shadowed[asked] = blocked(self.cloth, origin[asked], np.concatenate((light, light))[asked])
+        pick_up(
+            self.cloth.lines, self.cloth.mesh.rings, self.cloth.threads, hits.primitive, value,
+            shadowed, paths.throughput, paths.group, out,
+        )  # fmt: skip
 
     def escaped(self, viewers: Floats, sky: Sky | None, count: int) -> Floats:
         """(n, BATCHES, ways, 3) light by its way."""
@@ -331,38 +333,42 @@ class _Tracer:
         cloth = self.cloth
         return cloth.mesh.rings, cloth.lines, cloth.threads, self.by_width, self.correlated
 
-    def _start(self, viewers: Floats, count: int) -> _Paths:
+    def _start(self, viewers: Floats, count: int) -> Paths:
         """`count` paths a viewer, in BATCHES shifted copies of one even set of places."""
         per = max(1, count // BATCHES)
         shift = self.rng.random((len(viewers) * BATCHES, 1, 2))
         uv = (shift + np.arange(per)[:, None] * STEP) % 1.0
         group = np.repeat(np.arange(len(viewers) * BATCHES), per)
         towards = viewers[group // BATCHES]
-        return _Paths(
+        return Paths(
             from_outside(self.cloth, uv.reshape(-1, 2), towards),
             -towards,
             np.ones((len(group), 3)),
             group,
         )
 
-    def _meet(self, paths: _Paths) -> Hits:
+    def _meet(self, paths: Paths) -> Hits:
         self.rays += len(paths.group)
         return nearest(self.cloth, paths.origin, paths.direction)
 
-    def _scattered(self, paths: _Paths, hits: Hits, depth: int) -> _Paths:
+    def _scattered(self, paths: Paths, hits: Hits, depth: int) -> Paths:
         n = len(paths.group)
         onward = np.empty((n, 3))
         go_on(
             *self._scene(), *hits[:3], paths.direction, self.rng.random((n, RANDOMS)),
             paths.throughput, paths.origin, onward,
         )  # fmt: skip
-        paths = _Paths(paths.origin, onward, paths.throughput, paths.group)
+        paths = Paths(paths.origin, onward, paths.throughput, paths.group)
+        return self._survivors(paths, depth)
+
+    def _survivors(self, paths: Paths, depth: int) -> Paths:
+        """The paths that go on: after some scatterings, dim ones end at random."""
         brightest: Floats = np.asarray(np.abs(paths.throughput).max(axis=1))
         # The conditions are such that NaN goes on, and shows in the sums.
         if depth < ROULETTE:
             return paths.only(~(brightest <= 0.0))
         chance = np.minimum(brightest, 1.0)
-        paths = paths.only(~(self.rng.random(n) >= chance))
+        paths = paths.only(~(self.rng.random(len(chance)) >= chance))
         paths.throughput[:] /= np.minimum(np.abs(paths.throughput).max(axis=1), 1.0)[:, None]
         return paths
 

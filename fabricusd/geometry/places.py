@@ -13,7 +13,7 @@ from fabricusd.appearance.frame import to_thread
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.errors import FabricError
 from fabricusd.geometry.cloth import Cloth
-from fabricusd.geometry.paths import _directions
+from fabricusd.geometry.paths import directions
 from fabricusd.geometry.rays import NOTHING, Hits, blocked, from_outside, nearest
 from fabricusd.geometry.section import leave, squeezed, tube_point
 from fabricusd.kernels.real import KERNEL
@@ -61,7 +61,7 @@ def lit_share(
     count : places across the side of the thread that faces the light, over which the share is
         taken. That its far side is dark is the thread's own doing, and no shadow. NaN in gaps
     """
-    lights = _directions("wi", wi)
+    lights = directions("wi", wi)
     hits = _from_above(cloth, uv_threads)
     on = np.flatnonzero(hits.primitive != NOTHING)
     found = np.full((len(lights), len(hits.primitive)), math.nan)

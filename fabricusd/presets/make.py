@@ -84,7 +84,8 @@ def _spun(thread: Thread, yarn: Yarn, fibre: str) -> Thread:
             f"{thread.documentation} Derived: {spinning.words}, {count_words(count)}; "
             f"packing {spinning.packing:g} and width over height "
             f"{spinning.flatness:g} assumed, so that {round_one * 1e3:.3g} mm by Peirce become the "
-            "thickness; unevenness usual for such yarn (Uster statistics)."
+            "thickness; unevenness usual for such yarn (Uster statistics), hairiness what "
+            "finishing leaves of the usual."
         ),
         **spinning.fields(),
     )

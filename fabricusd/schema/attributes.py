@@ -75,6 +75,7 @@ THREAD = (
     Attribute("thread:slub:spacing", "double", Thread, "slub_spacing", MILLIMETRE, "mm"),
     Attribute("thread:plies", "int", Thread, "plies"),
     Attribute("thread:twist", "double", Thread, "twist", unit="turns/m"),
+    Attribute("thread:hairiness", "double", Thread, "hairiness"),
 )
 """Numbers of a WovenThread; its curve, its model and the tokens of its target are read apart."""
 

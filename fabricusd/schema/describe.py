@@ -189,6 +189,8 @@ def yarn_words(thread: Thread) -> str:
     if thread.shows_plies:
         way = "Z" if thread.twist > 0 else "S"
         words.append(f"{thread.plies} plies, {way} twist {abs(thread.twist):.4g} turns/m")
+    if thread.hairiness:
+        words.append(f"hairiness {thread.hairiness:.3g}")
     return ", ".join(words)
 
 
@@ -267,5 +269,6 @@ def _thread_dict(name: str, thread: Thread, fabric: Fabric) -> dict[str, Any]:
         },
         "plies": thread.plies,
         "twist": thread.twist,
+        "hairiness": thread.hairiness,
         "documentation": thread.documentation,
     }

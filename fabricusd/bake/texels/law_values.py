@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from fabricusd.appearance.fuzz import Fuzz, fuzz_over_all
 from fabricusd.appearance.law import PUBLISHED_ONLY, SurfaceLaw, law_value, surface_law
 from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.laws.lit import column_of, level_of, mean_over
@@ -24,8 +25,8 @@ from fabricusd.appearance.levels import WEAVE
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.shadow.mean import angle_groups
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
-from fabricusd.appearance.surface import evaluate, places_of, points_all
-from fabricusd.appearance.weave.coverage import WARP, WEFT
+from fabricusd.appearance.surface import evaluate, fuzz_of, places_of, points_all
+from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
 from fabricusd.appearance.weave.place import Places, place_at
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import BLOCK, KERNEL
@@ -41,16 +42,19 @@ class ClothLaw:
     """The surface law of a fabric in float64, and what holds light back under it.
 
     shadow : None where the law masks
+    fuzz : None where no thread is hairy
     """
 
     law: SurfaceLaw
     fabric: Fabric
     shadow: Shadow | None
+    fuzz: Fuzz | None
 
     @property
     def linear(self) -> bool:
-        """Whether the volume term is proportional to `A`, as under all laws but `conserving`."""
-        return self.law.kind == PUBLISHED_ONLY
+        """Whether the volume term is proportional to `A`: under all laws but `conserving`, if no
+        fuzz hands light back and forth."""
+        return self.law.kind == PUBLISHED_ONLY and self.fuzz is None
 
 
 @lru_cache(maxsize=8)
@@ -66,7 +70,7 @@ def cloth_law(fabric: Fabric, albedo: float | None = None, *, multiple: bool = T
         # The divisor against too bright views is that of the cloth, not of the replacement.
         whole: Any = surface_tables(fabric, precision=np.float64, shadow=shadow)
         law = law._replace(published=law.published._replace(excess=whole.excess))
-    return ClothLaw(law=law, fabric=fabric, shadow=shadow)
+    return ClothLaw(law=law, fabric=fabric, shadow=shadow, fuzz=fuzz_of(worn, np.float64))
 
 
 @lru_cache(maxsize=4)
@@ -98,6 +102,9 @@ def law_values(
     else:
         _all_values(real, *law, places, wi, wo, out)
     _shade(cloth, thread_set, thread, np.asarray(psi0), wi, out)
+    if cloth.fuzz is not None:
+        row = np.array([-1 if thread_set == GAP else thread])
+        fuzz_over_all(real, *cloth.fuzz, row, wi, wo, out)
     return out
 
 

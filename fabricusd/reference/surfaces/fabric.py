@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabricusd.appearance.fuzz import Fuzz, optical_depth
 from fabricusd.appearance.law import (
     PUBLISHED_ONLY,
     SurfaceLaw,
@@ -28,6 +29,7 @@ from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.sampling.blocks import Drawn, sample_points
 from fabricusd.appearance.scattering.models import translucent
 from fabricusd.appearance.shadow.methods import NONE, Shadow, compile_shadow, shade
+from fabricusd.appearance.surface import fuzz_of
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
 from fabricusd.appearance.weave.lookup import back_of, find, move_along
@@ -63,6 +65,7 @@ from fabricusd.reference.rays.wave import (
     Wave,
 )
 from fabricusd.reference.surfaces.fabric_far import STRAIGHT, gather, shade_far
+from fabricusd.reference.surfaces.fabric_fuzz import lay_fuzz
 from fabricusd.reference.surfaces.fabric_gap import gap_table, pass_far, pass_gaps, pass_places
 
 R = np.float32
@@ -145,7 +148,7 @@ class _Side:
     ) -> None:
         self.fabric, self.method, self.make_ready = fabric, shadow, make_ready
         self.yarn = compile_yarn(fabric, back_of=front) if fabric.is_uneven else None
-        self.types = len(fabric.threads)
+        self.types, self.hairy = len(fabric.threads), optical_depth(fabric) > 0.0
         self._law: SurfaceLaw | None = None
         self._near: tuple[CompiledFabric, Shadow] | None = None
 
@@ -157,6 +160,14 @@ class _Side:
                 held = self._made()[1] if law_of(self.fabric).absolute else None
                 self._law = surface_law(self.fabric, precision=np.float32, shadow=held)
             return self._law
+
+    @property
+    def fuzz(self) -> Fuzz | None:
+        """The fuzz over this side, made like the law; None where no thread is hairy."""
+        if not self.hairy:
+            return None
+        with _ONE_AT_A_TIME:
+            return fuzz_of(self.fabric, np.float32)
 
     @property
     def near(self) -> tuple[CompiledFabric, Shadow]:
@@ -202,6 +213,13 @@ class FabricShader:
 
     def __call__(self, level: int, back: int, wave: Wave, first: int, last: int) -> None:
         """Shade the hits from `first` to before `last`, all on one side and at one level."""
+        side = self.sides[back]
+        self._shade(level, back, wave, first, last)
+        fuzz = side.fuzz
+        if fuzz is not None:
+            lay_fuzz(R, fuzz, level == FAR_LEVEL, side.types, wave.hits.rows, first, last)
+
+    def _shade(self, level: int, back: int, wave: Wave, first: int, last: int) -> None:
         side, hits = self.sides[back], wave.hits.rows
         if level == FAR_LEVEL and side.law.kind == PUBLISHED_ONLY:
             shade_far(R, side.law.published, side.law.lobes, self.is_open, hits, first, last)
