@@ -133,8 +133,9 @@ that is there, and `weave_coordinate` the place on the even cloth. A BTF is made
 is even.
 
 ## What is missing
-Fibres that stand off the yarn, and fibres on its surface: from 40 pixels a thread on, spun yarn
-looks too smooth. Heights and horizons are those of even threads, so a slub is wider but no higher.
+Fibres on the yarn's surface: from 40 pixels a thread on, spun yarn looks too smooth. (Fibres that
+stand off it are [fuzz](fuzz.md).) Heights and horizons are those of even threads, so a slub is
+wider but no higher.
 """
 
 

@@ -23,7 +23,7 @@ from fabricusd.appearance.plain import white
 from fabricusd.appearance.surface import evaluate, fuzz_of, mean_shadow, sample
 from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.dye.solve import layer_of
-from fabricusd.fabric import Fabric
+from fabricusd.fabric import Fabric, even
 from fabricusd.schema import load
 
 Floats = NDArray[np.float64]
@@ -133,10 +133,8 @@ def test_white_fibres_on_white_cloth_lose_little() -> None:
     assert (fuzz.again > 1.025).all()
 
 
-def test_fuzz_lightens_dark_cloth_at_grazing_views_only() -> None:
+def test_fuzz_shows_at_grazing_views() -> None:
     fabric = load("cotton_poplin")
-    threads = {n: replace(t, albedo=(0.3,) * 3) for n, t in fabric.threads.items()}
-    fabric = replace(fabric, threads=threads)
     change = {
         degrees: float(
             white_sky(hairy(fabric, 6.0), math.cos(math.radians(degrees)))[0, 0]
@@ -144,17 +142,16 @@ def test_fuzz_lightens_dark_cloth_at_grazing_views_only() -> None:
         )
         for degrees in (0, 80)
     }
-    assert change[80] > 1.1 > change[0]
+    assert change[80] > 1.1
+    assert 0.98 < change[0] < 1.05
 
 
 @pytest.mark.parametrize("name", ["denim", "gauze", "silk_shot{appearance=published}"])
 def test_the_mean_over_the_repeat_is_level_far(name: str) -> None:
-    fabric = hairy(load(name), 5.0)
+    fabric = even(hairy(load(name), 5.0))
     wi, wo = directions(6, 6, 70), directions(6, 7, 70)
-    side = 60
-    ends, picks = true_repeat(fabric)
-    grid = (np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1) + 0.5) / side
-    uv = grid.reshape(-1, 2) * (ends, picks)
+    even_places = np.arange(1 << 14)[:, None] * [0.7548776662466927, 0.5698402909980532] % 1.0
+    uv = even_places * true_repeat(fabric)
     fuzz = fuzz_of(fabric, np.float64)
     assert fuzz is not None
     bare = bald(fabric)

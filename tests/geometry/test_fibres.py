@@ -39,8 +39,8 @@ def test_albedo_at_grazing_views_changes_as_that_of_tubes_with_fibres() -> None:
     degrees = (0, 75, 83)
     mu = np.cos(np.radians(degrees))
     wo = np.stack((0.8 * np.sqrt(1 - mu * mu), 0.6 * np.sqrt(1 - mu * mu), mu), axis=-1)
-    with_fibres = fibres.white_sky(fibres.hairy_tubes(fabric, (24, 24)), wo)[:, 0, 1]
-    without = paths.albedo(tubes(bald(fabric)), wo, count=1 << 14).reflected[:, 1]
+    with_fibres = fibres.white_sky(fibres.hairy_tubes(fabric, (24, 24)), wo, count=1 << 17)[:, 0, 1]
+    without = paths.albedo(tubes(bald(fabric)), wo, count=1 << 17).reflected[:, 1]
     true = with_fibres - without
     law = [
         float((white_sky(fabric, float(m)) - white_sky(bald(fabric), float(m)))[0, 1]) for m in mu

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fabricusd.chart.panel import Panel
 from fabricusd.chart.panels import (
     baked,
+    fuzz,
     laws,
     materials,
     pictures,
@@ -21,6 +22,7 @@ PANELS: tuple[Panel, ...] = (
     zoom.PANEL,
     shadows.PANEL,
     yarn.PANEL,
+    fuzz.PANEL,
     *baked.PANELS,
     materials.PANEL,
 )
