@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fabricusd.appearance.frame import diamond
 from fabricusd.kernels.real import INLINE, asin, index
 
-GROUPS = 16
+GROUPS = 24
 """Groups of places that scatter alike: the mean of g is then off by .002, see docs/shadowing.md."""
 
 LIGHT_FIELDS = ("horizons", "columns", "lit_nodes", "groups", "softness")

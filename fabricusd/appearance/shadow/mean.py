@@ -5,7 +5,7 @@ takes each stretch's mean of g, and cloth keeps its light if g is divided by it:
 which a surface law may treat a shadow, `laws.Law.absolute`.
 
 Each linear piece of each thread type's curve is cut into stretches over which the tangent angle
-changes by no more than the surface lobe is wide. For each set that shows the type, the horizons of
+changes by no more than a quarter of the surface lobe's width. For each set that shows the type, the horizons of
 places of all its runs are sorted and put into groups of equal size, by azimuth: the mean of g is
 that over the groups. A table of the mean itself, by elevation and azimuth, would need a hundred
 times the entries, because the light that enters the channel between two threads does so at once.
@@ -30,10 +30,10 @@ from fabricusd.kernels.real import INLINE
 
 Floats = NDArray[np.float64]
 
-WIDEST, NARROWEST = math.radians(2.0), math.radians(1.0)
+WIDEST, NARROWEST = math.radians(2.0), math.radians(0.5)
 """Bounds on the change of tangent angle over a stretch [rad]."""
 
-MOST_STRETCHES = 64
+MOST_STRETCHES = 256
 """Largest number of stretches on one piece of a curve."""
 
 PLACES = 1 << 16
@@ -69,7 +69,7 @@ def stretches(fabric: Fabric, longest: int) -> Stretches:
     scale, totals = np.zeros(shape), np.zeros(len(kinds), np.int64)
     for k, thread in enumerate(kinds):
         p = pieces(thread.curve)
-        step = min(max(thread.gamma_surface, NARROWEST), WIDEST)
+        step = min(max(thread.gamma_surface / 4.0, NARROWEST), WIDEST)
         count = np.ceil(np.abs(p.last - p.first) / step - 1e-9).astype(np.int64)
         count = np.clip(count, 1, MOST_STRETCHES)
         used = slice(0, len(count))
