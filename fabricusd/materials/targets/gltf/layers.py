@@ -1,0 +1,116 @@
+"""What glTF's metallic-roughness material and its extensions read, from the maps of a bake.
+
+glTF counts the rougher direction: along it the alpha is `mix(roughness^2, 1, strength^2)`, across
+it `roughness^2`. The bake's `tangent` is the smoother one, so the direction is a quarter turn on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.images.files import read_mip_level
+from fabricusd.materials.networks.graph import Texture, Value
+from fabricusd.materials.networks.look import Look
+from fabricusd.materials.networks.surfaces import Inputs
+
+Floats = NDArray[np.float64]
+
+MASK_ERROR = 0.02
+"""Largest error of the mean cover for which gaps are cut out by MASK, which needs no sorting."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Layers:
+    """(h, w, c) arrays from 0 to 1, linear, row 0 at the top; 1 x 1 where a constant will do.
+
+    base, tint : colours; cover : (h, w, 1)
+    roughness : (h, w, 1) - its square is the alpha of the smoother direction
+    direction : (h, w, 2) - unit vectors along which the cloth is rougher, from -1 to 1
+    strength : (h, w, 1) - of the anisotropy
+    normal : (h, w, 3) - (n + 1)/2
+    through : (h, w, 3) or None - diffuse transmittance
+    """
+
+    base: Floats
+    cover: Floats
+    roughness: Floats
+    direction: Floats
+    strength: Floats
+    normal: Floats
+    tint: Floats
+    through: Floats | None
+
+
+def layers_of(inputs: Inputs, look: Look, tile: int) -> Layers:
+    """Read the maps of one UDIM tile, and apply the factors of the look."""
+
+    def read(name: str) -> Floats:
+        source = inputs[name]
+        if isinstance(source, Value):
+            return np.atleast_1d(np.asarray(source.value, np.float64))[None, None]
+        assert isinstance(source, Texture)
+        file = source.path.with_name(source.path.name.replace("<UDIM>", str(tile)))
+        pixels = read_mip_level(file).astype(np.float64)
+        return pixels / 65535.0 if pixels.max(initial=0.0) > 2.0 else pixels
+
+    smooth, rough = alphas(read("roughness_along")[..., :1], read("roughness_across")[..., :1], look)
+    through = None
+    if look.transmission_scale is not None:
+        through = np.clip(read("transmission_color")[..., :3] * look.transmission_scale, 0.0, 1.0)
+        through = through if through.max() > 0.0 else None
+    return Layers(
+        base=np.clip(read("base_color")[..., :3] * look.base_color_scale, 0.0, 1.0),
+        cover=np.clip(read("opacity")[..., :1], 0.0, 1.0),
+        roughness=np.sqrt(smooth),
+        direction=rougher(read("tangent")),
+        strength=strength(smooth, rough),
+        normal=np.clip(read("normal")[..., :3], 0.0, 1.0),
+        tint=read("specular_tint")[..., :3],
+        through=through,
+    )
+
+
+def alphas(along: Floats, across: Floats, look: Look) -> tuple[Floats, Floats]:
+    """(smoother, rougher) microfacet alphas, from the maps of the roots and a look's factors."""
+    smooth = np.minimum((along * look.smooth_scale) ** 2, 1.0)
+    rough = np.minimum((across * look.rough_scale) ** 2, 1.0)
+    return smooth, np.maximum(rough, smooth)
+
+
+def strength(smooth: Floats, rough: Floats) -> Floats:
+    """The anisotropy's strength s, for which `mix(smooth, 1, s^2) = rough`."""
+    return np.sqrt(np.clip((rough - smooth) / np.maximum(1.0 - smooth, 1e-6), 0.0, 1.0))
+
+
+def rougher(tangent: Floats) -> Floats:
+    """(h, w, 2) unit vectors a quarter turn from the map `tangent`; (1, 0) where there is none."""
+    turned = np.stack((-tangent[..., 1], tangent[..., 0]), axis=-1)
+    length = np.linalg.norm(turned, axis=-1, keepdims=True)
+    return np.where(length > 1e-6, turned / np.maximum(length, 1e-6), (1.0, 0.0))
+
+
+def alpha_mode(cover: Floats, *, opaque: bool) -> str:
+    """How gaps are shown: "OPAQUE", "MASK" or "BLEND".
+
+    MASK cuts out what is less than half covered, needs no sorting, and casts right shadows. It is
+    chosen where texels resolve the gaps, so that cutting changes the mean cover by MASK_ERROR at
+    most. Where a texel is the mean of threads and gaps, MASK would close the cloth: BLEND.
+    """
+    if opaque:
+        return "OPAQUE"
+    cut = cover >= 0.5
+    return "MASK" if abs(float(np.mean(cut - cover))) <= MASK_ERROR else "BLEND"
+
+
+def beside_through(base: Floats, through: Floats) -> tuple[Floats, Floats, Floats]:
+    """(base, weight, colour) for `mix(base, colour, weight)` of a diffuse sheet.
+
+    The largest channel of the transmittance is the weight, so that of the colour is 1. The base is
+    brighter by what the mix takes from it.
+    """
+    weight = through.max(axis=-1, keepdims=True)
+    color = through / np.maximum(weight, 1e-6)
+    return np.clip(base / np.maximum(1.0 - weight, 1e-6), 0.0, 1.0), weight, color
