@@ -68,7 +68,7 @@ TARGETS = (
         help="also write a U3M swatch of each fabric, for garment CAD",
     ),
     Target(
-        name="swatch", metavar="FOLDER", module="swatch", fits=("gltf_pbr",),
+        name="swatch", metavar="FOLDER", module="swatch",
         help="also write one seamless tile of each fabric as PNG, for Substance, Unreal, Unity",
     ),
 )  # fmt: skip
