@@ -154,7 +154,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("build/glb"))
     parser.add_argument("--presets", nargs="+", default=list(PRESETS))
     parser.add_argument("--subjects", nargs="+", default=["cylinder", "garment"])
-    parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--spp", type=int, default=256)
     options = parser.parse_args()
     folder = options.out.resolve()
     folder.mkdir(parents=True, exist_ok=True)

@@ -38,6 +38,9 @@ BAKED, THROUGH, PROCEDURAL, OFF = "baked", "baked_translucent", "procedural", "o
 
 VARIANTS = (BAKED, THROUGH, PROCEDURAL, OFF)
 
+REACH = 1e-5
+"""UV by which a triangle may reach beyond its tile unnoticed."""
+
 
 def check(where: Path, clobber: bool) -> None:
     """Raise FabricError if the suffix is not .glb, or the file cannot be written."""
@@ -95,11 +98,18 @@ class _Maker:
 
     def add(self, maps: MapSet, name: str, corners: Corners) -> None:
         """Add a mesh: a primitive for each fabric and tile."""
-        made = [
-            (vertices(part, up_axis=self.up_axis), self._worn(maps, lay, tile))
-            for lay, tile, part in parts(corners, udim=maps.udim)
-        ]
+        made = []
+        crossing = 0
+        for lay, tile, part in parts(corners, udim=maps.udim):
+            made.append((vertices(part, up_axis=self.up_axis), self._worn(maps, lay, tile)))
+            outside = (part.uv < -REACH) | (part.uv > 1.0 + REACH)
+            crossing += int(outside.any(axis=(1, 2)).sum())
         self._meshes.append((name, made))
+        if crossing:
+            self.job.note(
+                f"{name} has {crossing} triangles that cross UDIM tiles; glTF has no tiles, so each "
+                "shows the tile of its middle, whose border goes on beyond"
+            )
 
     def finish(self) -> bytes:
         """Write what was added. A mesh that lacks a variant shows the baked material in it."""
