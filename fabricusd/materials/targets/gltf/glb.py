@@ -15,7 +15,7 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from fabricusd.errors import FabricError
 from fabricusd.files import require_writable, whole_file
-from fabricusd.images.files import read_mip_level
+from fabricusd.images.files import read_mip_level, shape_of
 from fabricusd.materials.bake_folder import MapSet
 from fabricusd.materials.targets import Job
 from fabricusd.materials.targets.gltf.corners import (
@@ -27,7 +27,7 @@ from fabricusd.materials.targets.gltf.corners import (
     vertices,
 )
 from fabricusd.materials.targets.gltf.document import Document, require_pygltflib
-from fabricusd.materials.targets.gltf.layers import alpha_mode, layers_of
+from fabricusd.materials.targets.gltf.layers import alpha_mode, layers_of, lobe_level
 from fabricusd.materials.targets.gltf.material import cloth, plain
 from fabricusd.materials.targets.layer import VARIANT_SET
 from fabricusd.scene.scene import PreviewSurface, Scene
@@ -139,7 +139,10 @@ class _Maker:
             recipe = self.job.recipes[maps.name, lay, variant]
             name = recipe.name if not maps.udim else f"{recipe.name}_{tile}"
             look = recipe.looks["gltf_pbr"]
-            layers = layers_of(recipe.inputs, look, tile)
+            layers = layers_of(
+                recipe.inputs, look, tile,
+                normals=maps.textures.get("normal", {}).get(tile), level=_lobe_level(maps, lay, tile),
+            )  # fmt: skip
             mode = alpha_mode(layers.cover[_worn_texels(maps, lay, tile, layers.cover)],
                               opaque=recipe.opaque)  # fmt: skip
             found[variant] = cloth(self.document, name, layers, look, mode)
@@ -169,6 +172,11 @@ class _Maker:
         if key not in self._off:
             self._off[key] = plain(self.document, key, surface)
         return self._off[key]
+
+
+def _lobe_level(maps: MapSet, lay: int, tile: int) -> int:
+    file = maps.textures.get("roughness_along", {}).get(tile)
+    return 0 if file is None else lobe_level(maps.lays[lay].matrix, shape_of(file)[1])
 
 
 def _worn_texels(

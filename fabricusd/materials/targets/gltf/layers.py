@@ -6,11 +6,14 @@ it `roughness^2`. The bake's `tangent` is the smoother one, so the direction is 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.errors import FabricError
 from fabricusd.images.files import read_mip_level
 from fabricusd.materials.networks.graph import Texture, Value
 from fabricusd.materials.networks.look import Look
@@ -20,6 +23,12 @@ Floats = NDArray[np.float64]
 
 MASK_ERROR = 0.02
 """Largest error of the mean cover for which gaps are cut out by MASK, which needs no sorting."""
+
+RESOLVED = 4.0
+"""Texels per thread from which lobes are those of single threads."""
+
+SPANNED = 4.0
+"""Threads that a texel of the lobes spans at least, where threads are not resolved."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,33 +53,74 @@ class Layers:
     through: Floats | None
 
 
-def layers_of(inputs: Inputs, look: Look, tile: int) -> Layers:
-    """Read the maps of one UDIM tile, and apply the factors of the look."""
+def layers_of(
+    inputs: Inputs, look: Look, tile: int, *, normals: Path | None = None, level: int = 0
+) -> Layers:
+    """Read the maps of one UDIM tile, and apply the factors of the look.
 
-    def read(name: str) -> Floats:
+    normals : the baked normals (not coded), which have the levels that the coded ones lack
+    level : mip level of the roughness, the direction and the normals, see `lobe_level`
+    """
+
+    def read(name: str, level: int = 0) -> Floats:
         source = inputs[name]
         if isinstance(source, Value):
             return np.atleast_1d(np.asarray(source.value, np.float64))[None, None]
         assert isinstance(source, Texture)
-        file = source.path.with_name(source.path.name.replace("<UDIM>", str(tile)))
-        pixels = read_mip_level(file).astype(np.float64)
-        return pixels / 65535.0 if pixels.max(initial=0.0) > 2.0 else pixels
+        return _pixels(
+            source.path.with_name(source.path.name.replace("<UDIM>", str(tile))), level
+        )
 
-    smooth, rough = alphas(read("roughness_along")[..., :1], read("roughness_across")[..., :1], look)
+    smooth, rough = alphas(
+        read("roughness_along", level)[..., :1], read("roughness_across", level)[..., :1], look
+    )
     through = None
     if look.transmission_scale is not None:
         through = np.clip(read("transmission_color")[..., :3] * look.transmission_scale, 0.0, 1.0)
         through = through if through.max() > 0.0 else None
+    coded = isinstance(inputs["normal"], Texture) and normals is not None and level > 0
     return Layers(
         base=np.clip(read("base_color")[..., :3] * look.base_color_scale, 0.0, 1.0),
         cover=np.clip(read("opacity")[..., :1], 0.0, 1.0),
         roughness=np.sqrt(smooth),
-        direction=rougher(read("tangent")),
+        direction=rougher(read("tangent", level)),
         strength=strength(smooth, rough),
-        normal=np.clip(read("normal")[..., :3], 0.0, 1.0),
+        normal=_coded(_pixels(normals, level)) if coded and normals else read("normal")[..., :3],
         tint=read("specular_tint")[..., :3],
         through=through,
     )
+
+
+def lobe_level(matrix: Floats, width: int) -> int:
+    """The mip level of the maps that shape reflections.
+
+    Readers make the mip levels themselves, and the mean of a warp's direction and a weft's lies at
+    45 degrees. The bake's own levels are means of the threads' moments. So where texels do not
+    resolve threads, these maps come from the level whose texels span SPANNED threads or more.
+
+    matrix : (2, 2) threads per UV; width : texels per side
+    """
+    threads = float(np.linalg.norm(matrix, axis=1).min()) / width
+    if threads * RESOLVED <= 1.0 or threads <= 0.0:
+        return 0
+    return max(0, math.ceil(math.log2(SPANNED / threads)))
+
+
+def _pixels(file: Path, level: int) -> Floats:
+    """(h, w, c) of a mip level, or of the coarsest above it that the file has."""
+    for one in range(level, 0, -1):
+        try:
+            return read_mip_level(file, one).astype(np.float64)
+        except FabricError:
+            continue
+    return read_mip_level(file).astype(np.float64)
+
+
+def _coded(normals: Floats) -> Floats:
+    """Unit normals as (n + 1)/2; texels without one are flat."""
+    length = np.linalg.norm(normals[..., :3], axis=-1, keepdims=True)
+    unit = np.where(length > 1e-6, normals[..., :3] / np.maximum(length, 1e-6), (0.0, 0.0, 1.0))
+    return np.asarray(0.5 * unit + 0.5)
 
 
 def alphas(along: Floats, across: Floats, look: Look) -> tuple[Floats, Floats]:

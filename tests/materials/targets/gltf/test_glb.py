@@ -158,11 +158,12 @@ def test_textures_hold_the_numbers_of_the_bake(cloths, tmp_path):
         (tmp_path / "a.png").write_bytes(file.view(image["bufferView"]))
         return read_mip_level(tmp_path / "a.png")
 
-    def baked(name):
-        return read_mip_level(cloths["satin"].parent / "satin" / f"square.{name}.exr")
+    def baked(name, level=4):
+        # 64 texels for 24 threads do not resolve them: 4 is the level whose texels span 6.
+        return read_mip_level(cloths["satin"].parent / "satin" / f"square.{name}.exr", level)
 
     pbr = material["pbrMetallicRoughness"]
-    color = np.clip(baked("base_color") * fit["base_color_scale"], 0, 1)
+    color = np.clip(baked("base_color", 0) * fit["base_color_scale"], 0, 1)
     assert np.abs(picture(pbr["baseColorTexture"])[..., :3] - srgb_encode(color)).max() < 0.003
     smooth = np.clip((baked("roughness_along") * fit["smooth_scale"]) ** 2, 0, 1)
     rough = np.clip((baked("roughness_across") * fit["rough_scale"]) ** 2, 0, 1)
@@ -178,7 +179,9 @@ def test_textures_hold_the_numbers_of_the_bake(cloths, tmp_path):
     tangent = baked("tangent")[..., :2]
     assert np.abs((turned * tangent).sum(axis=-1)).max() < 0.02
     normal = picture(material["normalTexture"])
-    assert np.abs(normal - (0.5 * baked("normal") + 0.5)).max() < 0.003
+    bare = baked("normal")
+    unit = bare / np.linalg.norm(bare, axis=-1, keepdims=True)
+    assert np.abs(normal - (0.5 * unit + 0.5)).max() < 0.003
 
 
 def test_the_garment_is_as_large_as_in_the_scene_and_y_is_up(shirt, over, tmp_path):

@@ -5,14 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fabricusd.bake.bake import bake
+from fabricusd.bake.job import Settings as BakeSettings
+from fabricusd.fabric import Binding
+from fabricusd.materials.bake_folder import read_bake_folder
 from fabricusd.materials.networks.look import Look
+from fabricusd.materials.recipes import Written, texture_inputs
 from fabricusd.materials.targets.gltf.layers import (
     alpha_mode,
     alphas,
     beside_through,
+    layers_of,
+    lobe_level,
     rougher,
     strength,
 )
+from fabricusd.schema import load, write_binding, write_fabric
+from tests.reference.stages import new_stage, square
 
 RNG = np.random.default_rng(3)
 
@@ -59,3 +68,40 @@ def test_the_sheet_that_lets_light_through_reflects_what_it_did():
     assert np.allclose((1.0 - weight) * made, base)
     assert np.allclose(weight * color, through)
     assert np.allclose(color.max(axis=-1), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("threads", "width", "level"),
+    [(64, 512, 0), (128, 512, 0), (129, 512, 4), (480, 512, 3), (1100, 512, 1), (4096, 512, 0)],
+)
+def test_lobes_are_of_single_threads_or_of_four_and_more(threads, width, level):
+    found = lobe_level(np.diag((threads, 2.0 * threads)), width)
+    assert found == level
+    assert found == 0 or threads / width * 2**found >= 4.0
+
+
+def test_near_a_texel_a_thread_the_lobes_are_means_and_colours_stay_fine(tmp_path):
+    """A GPU's mean of a warp's direction and a weft's is the diagonal, along which nothing lies."""
+    stage = new_stage(tmp_path)
+    mesh = square(stage)
+    fabric = load("linen_plain")
+    write_fabric(stage, "/Looks/Cloth", fabric)
+    binding = Binding(fabric=fabric, threads_per_uv=(60.0, 60.0))
+    write_binding(mesh.GetPrim(), "/Looks/Cloth", binding)
+    stage.GetRootLayer().Save()
+    bake(tmp_path / "scene.usda", tmp_path / "b", BakeSettings(resolution=64), workers=1)
+    maps = read_bake_folder(tmp_path / "b").garments[0]
+    made = Written()
+    inputs = texture_inputs(maps, tmp_path / "look.usda", made)
+    level = lobe_level(maps.lays[0].matrix, 64)
+    assert level == 3
+    fine = layers_of(inputs, Look(), 1001)
+    mean = layers_of(
+        inputs, Look(), 1001, normals=maps.textures["normal"][1001], level=level
+    )
+    assert mean.base.shape == fine.base.shape == (64, 64, 3)
+    for name in ("roughness", "strength", "direction", "normal"):
+        assert getattr(mean, name).shape[:2] == (8, 8), name
+    # Warp and weft cancel out: the far cloth is nearly as rough along one as along the other.
+    assert mean.strength.max() < 0.5 * fine.strength.max()
+    assert np.std(mean.roughness) < 0.25 * np.std(fine.roughness)
