@@ -8,8 +8,8 @@ under one distant light and a uniform sky. fabricusd renders the fabric itself; 
 headless Chromium, draws the .glb of its baked look, with a shadow map but without the shadow that
 the cloth throws on the sky's light, and without bounces. The script prints delta E 2000 over the
 pixels that the cloth covers in both pictures, and writes the pictures side by side: the reference
-on the left, three.js on the right. `--turn 90` turns the direction of the anisotropy, which must make
-the figures worse.
+on the left, three.js on the right. `--turn 90` turns the direction of the anisotropy, which must
+make the figures worse.
 """
 
 from __future__ import annotations

@@ -117,9 +117,7 @@ def find_bound_prims(scene: Path, sets: tuple[MapSet, ...]) -> BoundScene:
                 uv.append(_moved(prim, name, maps, now[path], fabricless=mine[0].worn is None))
     if not found:
         raise FabricError(str(scene), "has none of the prims that were baked; bake it again")
-    return BoundScene(
-        stage=stage, prims=tuple(found), uv=tuple(uv), notes=tuple(notes), placed=now
-    )
+    return BoundScene(stage=stage, prims=tuple(found), uv=tuple(uv), notes=tuple(notes), placed=now)
 
 
 def _garments(scene: Path, sets: tuple[MapSet, ...]) -> dict[str, Garment]:

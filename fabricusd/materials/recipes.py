@@ -194,7 +194,9 @@ def material_recipe(
         name=name,
         graphs=(("", preview(plain, looks["preview"], opaque)), ("", unrolled(graphs[first]))),
         parameters=parameter_values(looks[first]) | parameter_values(looks["principled"], BLENDER),
-        inputs=plain if inputs is None else inputs, looks=looks, opaque=opaque,
+        inputs=plain if inputs is None else inputs,
+        looks=looks,
+        opaque=opaque,
     )
 
 

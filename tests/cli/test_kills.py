@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -131,6 +132,9 @@ def require_readable(path: Path) -> None:
         assert Usd.Stage.Open(str(path)).GetRootLayer()
     elif path.suffix in (".json", ".u3m"):
         json.loads(path.read_text())
+    elif path.suffix == ".u3ma":
+        with zipfile.ZipFile(path) as archive:
+            assert archive.testzip() is None
     elif path.suffix == ".wif":
         read_wif(path)
     elif path.suffix == ".html":

@@ -101,9 +101,9 @@ def write_swatch(
     written = []
     for tail, one in found.items():
         target = where / f"{stem}_{tail}.png"
-        most, kind = (65535, np.uint16) if one.bits == 16 else (255, np.uint8)
-        codes = np.rint(np.clip(one.pixels, 0.0, 1.0) * most).astype(kind)
-        write_png(target, codes, color_space="sRGB" if one.color else "raw", metadata=metadata)
+        codes = np.rint(np.clip(one.pixels, 0.0, 1.0) * (65535 if one.bits == 16 else 255))
+        pixels = codes.astype(np.uint16) if one.bits == 16 else codes.astype(np.uint8)
+        write_png(target, pixels, color_space="sRGB" if one.color else "raw", metadata=metadata)
         written.append(target)
     sidecar = where / f"{stem}_swatch.json"
     write_json(sidecar, _told(fabric, tile, look, stem, found))

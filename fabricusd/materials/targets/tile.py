@@ -51,7 +51,7 @@ class Tile:
     @property
     def resolution(self) -> int:
         """Texels per side."""
-        return next(iter(self.maps.values())).shape[0]
+        return int(next(iter(self.maps.values())).shape[0])
 
 
 def baked_tile(
@@ -93,7 +93,8 @@ def even(fabric: Fabric) -> Fabric:
 def _even_thread(thread: Thread) -> Thread:
     return replace(
         thread, unevenness_cv=0.0, unevenness_length=0.0, unevenness_count=0.0,
-        unevenness_shade=0.0, slub_amount=0.0, slub_length=0.0, slub_spacing=0.0, plies=1, twist=0.0,
+        unevenness_shade=0.0, slub_amount=0.0, slub_length=0.0, slub_spacing=0.0, plies=1,
+        twist=0.0,
     )  # fmt: skip
 
 

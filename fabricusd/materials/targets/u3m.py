@@ -60,9 +60,7 @@ def write(job: Job, where: Path) -> list[Path]:
     made: list[Path] = []
     make_folder("--u3m", where)
     for name, fabric in job.fabrics.items():
-        files = write_u3m(
-            fabric, where / f"{name}.u3m", fitted=job.fitted, progress=job.progress
-        )
+        files = write_u3m(fabric, where / f"{name}.u3m", fitted=job.fitted, progress=job.progress)
         made += [*files, write_u3ma(where / f"{name}.u3ma", files)]
     return made
 
@@ -73,7 +71,9 @@ def write_u3m(
 ) -> list[Path]:  # fmt: skip
     """Write the material `path` (`.u3m`) and its PNG files in `<stem>_u3m/` beside it.
 
-    Returns all files. `progress` gets a line before a step that takes seconds. Raises FabricError for another suffix or a fabric that cannot be baked.
+    progress : gets a line before a step that takes seconds
+
+    Returns all files. Raises FabricError for another suffix or a fabric that cannot be baked.
     """
     if path.suffix != ".u3m":
         raise FabricError(str(path), "is not the name of a U3M material; it must end in .u3m")

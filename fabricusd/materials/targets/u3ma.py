@@ -29,16 +29,15 @@ _CENTRAL = struct.Struct("<4s6H3I5H2I")
 def write_u3ma(path: Path, files: Sequence[Path]) -> Path:
     """Write `files`, which lie in the folder of `path` or below it, as an archive; return `path`.
 
-    Raises FabricError for another suffix, and for files that ZIP without its extensions cannot hold.
+    Raises FabricError for another suffix, and for files that are too large for ZIP without its
+    extension to 64 bits.
     """
     if path.suffix != ".u3ma":
         raise FabricError(str(path), "is not the name of a U3M archive; it must end in .u3ma")
     now = datetime.now(UTC).timetuple()[:6]
     with whole_file(path) as temporary:
         try:
-            with zipfile.ZipFile(
-                temporary, "w", zipfile.ZIP_DEFLATED, allowZip64=False
-            ) as archive:
+            with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, allowZip64=False) as archive:
                 for file in files:
                     name = file.relative_to(path.parent).as_posix()
                     entry = zipfile.ZipInfo(name, now)

@@ -88,9 +88,7 @@ class Document:
         )
         wide = len(vertices.position) > 65535
         flat = vertices.triangles.ravel().astype(np.uint32 if wide else np.uint16)
-        made = lib.Primitive(
-            attributes=attributes, indices=self._accessor(flat), material=material
-        )
+        made = lib.Primitive(attributes=attributes, indices=self._accessor(flat), material=material)
         if variants:
             mappings: dict[int, list[int]] = {}
             for variant, worn in variants.items():

@@ -107,8 +107,8 @@ class _Maker:
         self._meshes.append((name, made))
         if crossing:
             self.job.note(
-                f"{name} has {crossing} triangles that cross UDIM tiles; glTF has no tiles, so each "
-                "shows the tile of its middle, whose border goes on beyond"
+                f"{name} has {crossing} triangles that cross UDIM tiles; glTF has no tiles, so "
+                "each shows the tile of its middle, whose border goes on beyond"
             )
 
     def finish(self) -> bytes:
@@ -139,12 +139,11 @@ class _Maker:
             recipe = self.job.recipes[maps.name, lay, variant]
             name = recipe.name if not maps.udim else f"{recipe.name}_{tile}"
             look = recipe.looks["gltf_pbr"]
-            layers = layers_of(
-                recipe.inputs, look, tile,
-                normals=maps.textures.get("normal", {}).get(tile), level=_lobe_level(maps, lay, tile),
-            )  # fmt: skip
-            mode = alpha_mode(layers.cover[_worn_texels(maps, lay, tile, layers.cover)],
-                              opaque=recipe.opaque)  # fmt: skip
+            normals = maps.textures.get("normal", {}).get(tile)
+            level = _lobe_level(maps, lay, tile)
+            layers = layers_of(recipe.inputs, look, tile, normals=normals, level=level)
+            worn = _worn_texels(maps, lay, tile, layers.cover)
+            mode = alpha_mode(layers.cover[worn], opaque=recipe.opaque)
             found[variant] = cloth(self.document, name, layers, look, mode)
             if variant == BAKED and layers.through is not None:
                 found[THROUGH] = cloth(

@@ -67,9 +67,7 @@ def layers_of(
         if isinstance(source, Value):
             return np.atleast_1d(np.asarray(source.value, np.float64))[None, None]
         assert isinstance(source, Texture)
-        return _pixels(
-            source.path.with_name(source.path.name.replace("<UDIM>", str(tile))), level
-        )
+        return _pixels(source.path.with_name(source.path.name.replace("<UDIM>", str(tile))), level)
 
     smooth, rough = alphas(
         read("roughness_along", level)[..., :1], read("roughness_across", level)[..., :1], look

@@ -1,4 +1,4 @@
-"""glTF materials: cloth with the extensions for anisotropy, sheen and reflection; plain surfaces."""
+"""glTF materials: cloth, with the extensions for its lobes, and plain surfaces."""
 
 from __future__ import annotations
 
