@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,9 +179,7 @@ def _lobe_level(maps: MapSet, lay: int, tile: int) -> int:
     return 0 if file is None else lobe_level(maps.lays[lay].matrix, shape_of(file)[1])
 
 
-def _worn_texels(
-    maps: MapSet, lay: int, tile: int, cover: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _worn_texels(maps: MapSet, lay: int, tile: int, cover: NDArray[Any]) -> NDArray[np.bool_]:
     """(h, w) texels of `cover` that the fabric has."""
     if cover.shape[:2] == (1, 1):
         return np.ones((1, 1), bool)

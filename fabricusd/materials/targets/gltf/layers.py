@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from fabricusd.materials.networks.graph import Texture, Value
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import Inputs
 
-Floats = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
 
 MASK_ERROR = 0.02
 """Largest error of the mean cover for which gaps are cut out by MASK, which needs no sorting."""
@@ -65,7 +66,7 @@ def layers_of(
     def read(name: str, level: int = 0) -> Floats:
         source = inputs[name]
         if isinstance(source, Value):
-            return np.atleast_1d(np.asarray(source.value, np.float64))[None, None]
+            return np.atleast_1d(np.asarray(source.value, np.float32))[None, None]
         assert isinstance(source, Texture)
         return _pixels(source.path.with_name(source.path.name.replace("<UDIM>", str(tile))), level)
 
@@ -74,11 +75,11 @@ def layers_of(
     )
     through = None
     if look.transmission_scale is not None:
-        through = np.clip(read("transmission_color")[..., :3] * look.transmission_scale, 0.0, 1.0)
+        through = _scaled(read("transmission_color"), look.transmission_scale)
         through = through if through.max() > 0.0 else None
     coded = isinstance(inputs["normal"], Texture) and normals is not None and level > 0
     return Layers(
-        base=np.clip(read("base_color")[..., :3] * look.base_color_scale, 0.0, 1.0),
+        base=_scaled(read("base_color"), look.base_color_scale),
         cover=np.clip(read("opacity")[..., :1], 0.0, 1.0),
         roughness=np.sqrt(smooth),
         direction=rougher(read("tangent", level)),
@@ -104,14 +105,19 @@ def lobe_level(matrix: Floats, width: int) -> int:
     return max(0, math.ceil(math.log2(SPANNED / threads)))
 
 
+def _scaled(color: Floats, factors: tuple[float, float, float]) -> Floats:
+    # Textures may have 16 million texels: keep them in single precision.
+    return np.asarray(np.clip(color[..., :3] * np.array(factors, np.float32), 0.0, 1.0))
+
+
 def _pixels(file: Path, level: int) -> Floats:
     """(h, w, c) of a mip level, or of the coarsest above it that the file has."""
     for one in range(level, 0, -1):
         try:
-            return read_mip_level(file, one).astype(np.float64)
+            return read_mip_level(file, one)
         except FabricError:
             continue
-    return read_mip_level(file).astype(np.float64)
+    return read_mip_level(file)
 
 
 def _coded(normals: Floats) -> Floats:
@@ -130,14 +136,17 @@ def alphas(along: Floats, across: Floats, look: Look) -> tuple[Floats, Floats]:
 
 def strength(smooth: Floats, rough: Floats) -> Floats:
     """The anisotropy's strength s, for which `mix(smooth, 1, s^2) = rough`."""
-    return np.sqrt(np.clip((rough - smooth) / np.maximum(1.0 - smooth, 1e-6), 0.0, 1.0))
+    square = (rough - smooth) / np.maximum(1.0 - smooth, 1e-6)
+    return np.asarray(np.sqrt(np.clip(square, 0.0, 1.0)))
 
 
 def rougher(tangent: Floats) -> Floats:
     """(h, w, 2) unit vectors a quarter turn from the map `tangent`; (1, 0) where there is none."""
     turned = np.stack((-tangent[..., 1], tangent[..., 0]), axis=-1)
     length = np.linalg.norm(turned, axis=-1, keepdims=True)
-    return np.where(length > 1e-6, turned / np.maximum(length, 1e-6), (1.0, 0.0))
+    return np.where(
+        length > 1e-6, turned / np.maximum(length, 1e-6), np.array((1, 0), turned.dtype)
+    )
 
 
 def alpha_mode(cover: Floats, *, opaque: bool) -> str:

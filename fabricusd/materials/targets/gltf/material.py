@@ -14,7 +14,7 @@ from fabricusd.materials.targets.gltf.layers import Layers, beside_through
 from fabricusd.scene.scene import PreviewSurface
 from fabricusd.srgb import srgb_encode
 
-Floats = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
 
 LEAST_STRENGTH = 0.02
 """Strength of anisotropy below which the extension is left out."""
@@ -167,4 +167,4 @@ def _stacked(*arrays: Floats) -> Floats:
 
 
 def _codes(pixels: Floats) -> NDArray[np.uint8]:
-    return np.rint(np.clip(pixels, 0.0, 1.0) * 255.0).astype(np.uint8)
+    return np.asarray(np.rint(np.clip(pixels, 0.0, 1.0) * 255.0).astype(np.uint8))
