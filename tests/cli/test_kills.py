@@ -21,6 +21,7 @@ import pytest
 from pxr import Usd
 
 from fabricusd.images.files import read_image, write_png
+from fabricusd.scene.read import read_scene
 from fabricusd.stop import SIGNALS
 from fabricusd.weaves import read_wif
 from tests.fuzz import examples
@@ -43,7 +44,7 @@ COMMANDS = {
     "demo": ["demo", "-o", "out"],
     "bake": [*BAKE, "-o", "out"],
     "material": ["material", "baked", "--no-fit", "-o", "out.usda", "--osl", "--u3m", "swatch",
-                 "--usdz", "out.usdz"],
+                 "--usdz", "out.usdz", "--glb", "out.glb"],
 }  # fmt: skip
 
 pytestmark = [
@@ -132,6 +133,8 @@ def require_readable(path: Path) -> None:
         assert Usd.Stage.Open(str(path)).GetRootLayer()
     elif path.suffix in (".json", ".u3m"):
         json.loads(path.read_text())
+    elif path.suffix == ".glb":
+        assert read_scene(path, fabric="velvet").meshes
     elif path.suffix == ".u3ma":
         with zipfile.ZipFile(path) as archive:
             assert archive.testzip() is None

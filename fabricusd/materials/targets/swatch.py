@@ -93,10 +93,13 @@ def write_swatch(
     tile = baked_tile(fabric, resolution=resolution, level="thread")
     look = tile_look(tile, "gltf_pbr", fitted=fitted, progress=progress)
     found = pictures(tile, look)
-    metadata = {
+    metadata: dict[str, str | float] = {
         "Software": f"fabricusd {__version__}",
         "Title": fabric.name,
         "Description": f"{1e3 * tile.size[0]:.6g} x {1e3 * tile.size[1]:.6g} mm, seamless",
+        "ResolutionUnit": "cm",
+        "XResolution": 0.01 * tile.resolution / tile.size[0],
+        "YResolution": 0.01 * tile.resolution / tile.size[1],
     }
     written = []
     for tail, one in found.items():

@@ -47,6 +47,11 @@ def test_it_has_the_names_that_artists_expect_and_says_what_they_hold(swatch):
         assert (spec.width, spec.nchannels, str(spec.format)) == (64, channels, kind)
         assert told["pictures"][f"linen_plain_{name}.png"]["bits"] == int(kind.strip("uint"))
         assert "fabricusd" in spec.getattribute("Software")
+        # PNG holds whole texels a metre.
+        per_mm = {"cm": 10.0, "inch": 25.4}[spec.getattribute("ResolutionUnit")]
+        assert 64 / (spec.getattribute("XResolution") / per_mm) == pytest.approx(
+            told["size_mm"][0], rel=2e-3
+        )
     fabric = load("linen_plain")
     width = 1e3 * told["threads"]["warp"] * fabric.warp.pitch
     assert told["size_mm"][0] == pytest.approx(width)
