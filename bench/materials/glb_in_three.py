@@ -9,7 +9,8 @@ headless Chromium, draws the .glb of its baked look, with a shadow map but witho
 the cloth throws on the sky's light, and without bounces. The script prints delta E 2000 over the
 pixels that the cloth covers in both pictures, and writes the pictures side by side: the reference
 on the left, three.js on the right. `--turn 90` turns the direction of the anisotropy, which must
-make the figures worse.
+make the figures worse. `--emission L` lets the cloth emit the radiance L, in place of the light of
+the sky that comes through it, which three.js lacks.
 """
 
 from __future__ import annotations
@@ -94,7 +95,7 @@ def handler(served, got, finished):
     return Handler
 
 
-def in_three(glb, subject, three, folder, turn=0.0):
+def in_three(glb, subject, three, folder, turn=0.0, emission=0.0):
     """(h, w, 3) linear radiance, and (h, w) what share of each pixel the garment covers."""
     shot = folder / "shot.json"
     shot.write_text(
@@ -104,7 +105,7 @@ def in_three(glb, subject, three, folder, turn=0.0):
                 "towards": TOWARDS.tolist(), "eye": subject.eye, "at": subject.at,
                 "fov": math.degrees(2 * math.atan(12.0 / subject.focal_length)),
                 "shadows": subject is not CYLINDER,
-                "turn": math.radians(turn),
+                "turn": math.radians(turn), "emission": emission,
             }
         )
     )  # fmt: skip
@@ -158,6 +159,7 @@ def main() -> None:
     parser.add_argument("--subjects", nargs="+", default=["cylinder", "garment"])
     parser.add_argument("--spp", type=int, default=256)
     parser.add_argument("--turn", type=float, default=0.0, metavar="DEGREES")
+    parser.add_argument("--emission", type=float, default=0.0, metavar="L")
     options = parser.parse_args()
     folder = options.out.resolve()
     folder.mkdir(parents=True, exist_ok=True)
@@ -175,8 +177,10 @@ def main() -> None:
                 )  # fmt: skip
             layers, _ = read_exr_layers(truth)
             real = layers["beauty"][..., :3]
-            ours, cover, _ = in_three(baked_glb(scene, folder), subject, options.three, folder,
-                                      options.turn)  # fmt: skip
+            glb = baked_glb(scene, folder)
+            ours, cover, _ = in_three(
+                glb, subject, options.three, folder, options.turn, options.emission
+            )
             worn = (cover > 0.999) & np.isfinite(layers["depth"][..., 0])
             error = difference(ours[worn][None].copy(), real[worn][None].copy())
             mean = float(ours[worn].sum() / real[worn].sum() - 1.0)
