@@ -15,6 +15,7 @@ EPILOG = """example:
   fabricusd material baked --scene coat.usda -o coat_look.usda --surface openpbr gltf_pbr
   fabricusd material baked --surface openpbr lobes --lobes 6
   fabricusd material baked --usdz coat.usdz --osl
+  fabricusd material baked --scene coat.usda -o coat_look.usda --glb coat.glb --swatch tiles
   fabricusd material baked_red --asset assets/coat --colorway red"""
 
 

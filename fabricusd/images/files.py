@@ -85,20 +85,20 @@ def write_png(
     pixels: NDArray[np.uint8] | NDArray[np.uint16],
     *,
     color_space: str = "sRGB",
-    metadata: Mapping[str, str] | None = None,
+    metadata: Mapping[str, str | float] | None = None,
 ) -> None:
     """Write (h, w, c) uint8 or uint16 code values to a PNG, whole or not at all.
 
     color_space : "sRGB" for colours, "raw" for data
-    metadata : texts by their names
+    metadata : texts and numbers by OpenImageIO's names, for example "XResolution"
     """
     kind = oiio.UINT16 if pixels.dtype == np.uint16 else oiio.UINT8
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind)
     spec.attribute("oiio:ColorSpace", color_space)
     # Store the code values as they are: keep OpenImageIO from dividing by the fourth channel.
     spec.attribute("oiio:UnassociatedAlpha", 1)
-    for key, text in (metadata or {}).items():
-        spec.attribute(key, text)
+    for key, value in (metadata or {}).items():
+        spec.attribute(key, value)
     _write(path, spec, np.ascontiguousarray(pixels))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,12 +73,16 @@ class NewUV:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BoundScene:
-    """A scene and the prims in it that a look binds materials to."""
+    """A scene and the prims in it that a look binds materials to.
+
+    placed : the baked garments as they are in the scene now, by prim path
+    """
 
     stage: Usd.Stage
     prims: tuple[BoundPrim, ...]
     uv: tuple[NewUV, ...]
     notes: tuple[str, ...]
+    placed: Mapping[str, Garment]
 
 
 def find_bound_prims(scene: Path, sets: tuple[MapSet, ...]) -> BoundScene:
@@ -112,7 +117,7 @@ def find_bound_prims(scene: Path, sets: tuple[MapSet, ...]) -> BoundScene:
                 uv.append(_moved(prim, name, maps, now[path], fabricless=mine[0].worn is None))
     if not found:
         raise FabricError(str(scene), "has none of the prims that were baked; bake it again")
-    return BoundScene(stage=stage, prims=tuple(found), uv=tuple(uv), notes=tuple(notes))
+    return BoundScene(stage=stage, prims=tuple(found), uv=tuple(uv), notes=tuple(notes), placed=now)
 
 
 def _garments(scene: Path, sets: tuple[MapSet, ...]) -> dict[str, Garment]:

@@ -102,6 +102,7 @@ def _write(
     job = Job(
         look=path, garments=folder.garments, recipes=made_of, fabrics=_fabrics(folder),
         fitted=settings.fitted, clobber=clobber, note=made.notes.append, colorway=settings.colorway,
+        placed=bound.placed if bound is not None else {}, progress=progress,
     )  # fmt: skip
     for target, where in chosen(settings.targets):
         made.files += target.functions.write(job, where)

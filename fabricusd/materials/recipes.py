@@ -35,7 +35,7 @@ from fabricusd.materials.networks.surfaces import (
     preview,
     transmits,
 )
-from fabricusd.materials.targets import Wanted
+from fabricusd.materials.targets import Wanted, chosen
 from fabricusd.materials.targets.layer import MaterialRecipe, Recipes
 from fabricusd.schema.names import prim_name
 
@@ -131,7 +131,7 @@ def recipes(
                 title = name if variant == "baked" else f"{name}_plain"
                 graphs = {s: _graph(s, inputs, opaque, lay, mixture) for s in settings.surfaces}
                 found[maps.name, number, variant] = material_recipe(
-                    title, graphs, plain, looks, opaque
+                    title, graphs, plain, looks, opaque, inputs
                 )
                 for surface, graph in graphs.items():
                     tail = "" if len(graphs) == 1 else f"_{surface}"
@@ -181,17 +181,22 @@ def _note_no_light_through(fabric: str, settings: Settings, made: Written) -> No
 
 
 def material_recipe(
-    name: str, graphs: Mapping[str, Graph], plain: Inputs, looks: Mapping[str, Look], opaque: bool
-) -> MaterialRecipe:
+    name: str, graphs: Mapping[str, Graph], plain: Inputs, looks: Mapping[str, Look], opaque: bool,
+    inputs: Inputs | None = None,
+) -> MaterialRecipe:  # fmt: skip
     """A material of UsdPreviewSurface over `plain` and the first of `graphs`.
 
     looks : by kind of surface, "preview", "principled" and those of `graphs`
+    inputs : the maps of `graphs`, None for `plain`
     """
     first = next(iter(graphs))
     return MaterialRecipe(
         name=name,
         graphs=(("", preview(plain, looks["preview"], opaque)), ("", unrolled(graphs[first]))),
         parameters=parameter_values(looks[first]) | parameter_values(looks["principled"], BLENDER),
+        inputs=plain if inputs is None else inputs,
+        looks=looks,
+        opaque=opaque,
     )
 
 
@@ -272,8 +277,10 @@ def _looks(
 ) -> tuple[dict[str, Look], Factors]:  # fmt: skip
     """Return the look of each surface that is written, and the factors of each thread, if any."""
     lay = maps.lays[number]
-    kinds = ("preview", "principled", *(s for s in settings.surfaces if s in GRAPHS))
-    plain = dict.fromkeys(("preview", "principled", *settings.surfaces), Look())
+    besides = [kind for target, _ in chosen(settings.targets) for kind in target.fits]
+    named = dict.fromkeys((*settings.surfaces, *besides))
+    kinds = ("preview", "principled", *(s for s in named if s in GRAPHS))
+    plain = dict.fromkeys(("preview", "principled", *named), Look())
     if not settings.fitted:
         return plain, {}
     if lay.fabric is None:

@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ import pytest
 from pxr import Usd
 
 from fabricusd.images.files import read_image, write_png
+from fabricusd.scene.read import read_scene
 from fabricusd.stop import SIGNALS
 from fabricusd.weaves import read_wif
 from tests.fuzz import examples
@@ -42,7 +44,7 @@ COMMANDS = {
     "demo": ["demo", "-o", "out"],
     "bake": [*BAKE, "-o", "out"],
     "material": ["material", "baked", "--no-fit", "-o", "out.usda", "--osl", "--u3m", "swatch",
-                 "--usdz", "out.usdz"],
+                 "--usdz", "out.usdz", "--glb", "out.glb"],
 }  # fmt: skip
 
 pytestmark = [
@@ -131,6 +133,11 @@ def require_readable(path: Path) -> None:
         assert Usd.Stage.Open(str(path)).GetRootLayer()
     elif path.suffix in (".json", ".u3m"):
         json.loads(path.read_text())
+    elif path.suffix == ".glb":
+        assert read_scene(path, fabric="velvet").meshes
+    elif path.suffix == ".u3ma":
+        with zipfile.ZipFile(path) as archive:
+            assert archive.testzip() is None
     elif path.suffix == ".wif":
         read_wif(path)
     elif path.suffix == ".html":

@@ -150,4 +150,5 @@ def test_the_command_writes_them_all_and_makes_their_folder(packed, tmp_path, ca
     assert main([*words, "--no-fit", "--u3m", str(tmp_path / "cad")]) == 0
     printed = capsys.readouterr().out.split()
     assert str(tmp_path / "cad" / "velvet.u3m") in printed
+    assert str(tmp_path / "cad" / "velvet.u3ma") in printed
     assert all((tmp_path / p).exists() for p in printed)

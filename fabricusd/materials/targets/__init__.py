@@ -13,12 +13,13 @@ The command line's options are generated from this file, so it imports no USD.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from fabricusd.bake.layout.garment import Garment
     from fabricusd.fabric import Fabric
     from fabricusd.materials.bake_folder import MapSet
     from fabricusd.materials.targets.layer import Recipes
@@ -30,12 +31,14 @@ class Target:
 
     metavar : placeholder of the option's value, "" for a switch
     module : name of its module in this folder
+    fits : surfaces that must be fitted for it, whichever surfaces the look has
     """
 
     name: str
     help: str
     module: str
     metavar: str = ""
+    fits: tuple[str, ...] = ()
 
     @property
     def functions(self) -> Any:
@@ -52,6 +55,10 @@ TARGETS = (
         help="also package it for readers that know no EXR (three.js, AR): 8-bit PNG textures",
     ),
     Target(
+        name="glb", metavar="FILE", module="gltf.glb", fits=("gltf_pbr",),
+        help="also write the garment as binary glTF 2.0, with anisotropy, sheen and variants",
+    ),
+    Target(
         name="asset", metavar="FOLDER", module="asset",
         help="also an asset of payload, geometry and look, or a colourway more in one",
     ),
@@ -59,6 +66,10 @@ TARGETS = (
     Target(
         name="u3m", metavar="FOLDER", module="u3m",
         help="also write a U3M swatch of each fabric, for garment CAD",
+    ),
+    Target(
+        name="swatch", metavar="FOLDER", module="swatch",
+        help="also write one seamless tile of each fabric as PNG, for Substance, Unreal, Unity",
     ),
 )  # fmt: skip
 
@@ -79,6 +90,8 @@ class Job:
     colorway : name of an asset's variant, "" for the fabrics' names
     fitted : whether parameters are sought; otherwise textures stand as they are
     note : gets a line about what the target leaves out
+    placed : with a scene, the garments as they are in the scene now, by prim path, in their own UVs
+    progress : gets a line before a step that takes seconds
     """
 
     look: Path
@@ -89,6 +102,8 @@ class Job:
     clobber: bool
     note: Note
     colorway: str = ""
+    placed: Mapping[str, Garment] = field(default_factory=dict)
+    progress: Note | None = None
 
 
 def chosen(wanted: Wanted) -> list[tuple[Target, Path | None]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,8 @@ from fabricusd.files import whole_file
 from fabricusd.materials.bake_folder import BakedLay, MapSet
 from fabricusd.materials.bound_prims import BoundPrim, BoundScene, NewUV
 from fabricusd.materials.networks.graph import Graph, Value
+from fabricusd.materials.networks.look import Look
+from fabricusd.materials.networks.surfaces import Inputs
 from fabricusd.materials.targets.flat import SCOPE
 from fabricusd.materials.targets.paths import asset_path
 from fabricusd.materials.targets.write_usd import write_material
@@ -38,11 +40,19 @@ VARIANTS = ("baked", "procedural", "off")
 
 @dataclass(frozen=True, kw_only=True)
 class MaterialRecipe:
-    """A material to write: its name, its networks with their name prefixes, and its inputs."""
+    """A material to write: its name, its networks with their name prefixes, and its inputs.
+
+    inputs, looks : what the networks were made of: the maps of all surfaces except
+        UsdPreviewSurface, and the look of each surface
+    opaque : whether the cloth has no gaps
+    """
 
     name: str
     graphs: tuple[tuple[str, Graph], ...]
     parameters: Mapping[str, Value]
+    inputs: Inputs = field(default_factory=dict)
+    looks: Mapping[str, Look] = field(default_factory=dict)
+    opaque: bool = False
 
 
 Recipes = Mapping[tuple[str, int, str], MaterialRecipe]

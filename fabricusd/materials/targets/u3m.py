@@ -2,13 +2,13 @@
 
 The format is Vizoo's open one ([U3M2021]). Its images must be RGB, so data are stored in three
 equal channels; colours are sRGB. The swatch is a whole number of repeats, baked on its own square.
+Each material is also written as an archive, `.u3ma`, which holds it and its images.
 """
 
 from __future__ import annotations
 
 import hashlib
 import math
-import tempfile
 import uuid
 from collections.abc import Iterable
 from datetime import UTC, datetime
@@ -18,23 +18,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.bake.bake import bake
-from fabricusd.bake.job import Settings
 from fabricusd.errors import FabricError
-from fabricusd.fabric import Binding, Fabric
+from fabricusd.fabric import Fabric
 from fabricusd.files import write_json
-from fabricusd.images.files import read_mip_level, write_png
-from fabricusd.materials.bake_folder import MapSet, read_bake_folder
-from fabricusd.materials.fit.fit import fit
-from fabricusd.materials.fit.texels import NEEDED, draw_texels
+from fabricusd.images.files import write_png
 from fabricusd.materials.networks.look import Look
-from fabricusd.materials.targets import Job
+from fabricusd.materials.targets import Job, Note
+from fabricusd.materials.targets.tile import (
+    Tile,
+    baked_tile,
+    check_folder,
+    make_folder,
+    relief,
+    tile_look,
+)
+from fabricusd.materials.targets.u3ma import write_u3ma
 from fabricusd.srgb import srgb_encode
 from fabricusd.weaves.recognise import recognise
-
-THREADS = 32
-"""Smallest number of threads along a side of the swatch; with fewer, it would repeat visibly."""
 
 FIBRES = (
     "Polyester", "Linen", "Silk", "Cotton", "Wool", "Rayon", "Nylon", "Acetate", "Acrylic",
@@ -47,10 +47,7 @@ PILE = "velvet", "velour", "corduroy"
 
 def check(where: Path, clobber: bool) -> None:
     """Raise FabricError if the folder cannot be made."""
-    if where.exists() and not where.is_dir():
-        raise FabricError(f"--u3m '{where}'", "is a file; it must be a folder")
-    if not where.parent.is_dir():
-        raise FabricError(f"--u3m '{where}'", f"is in '{where.parent}', which is not a folder")
+    check_folder("--u3m", where)
 
 
 def folder(look: Path, where: Path) -> Path:
@@ -59,34 +56,33 @@ def folder(look: Path, where: Path) -> Path:
 
 
 def write(job: Job, where: Path) -> list[Path]:
-    """Write a swatch of each fabric and its pictures."""
+    """Write a swatch of each fabric, its pictures, and the archive of both."""
     made: list[Path] = []
-    try:
-        where.mkdir(exist_ok=True)
-    except OSError as error:
-        raise FabricError(f"--u3m '{where}'", f"cannot be made: {error.strerror}") from error
+    make_folder("--u3m", where)
     for name, fabric in job.fabrics.items():
-        made += write_u3m(fabric, where / f"{name}.u3m", fitted=job.fitted)
+        files = write_u3m(fabric, where / f"{name}.u3m", fitted=job.fitted, progress=job.progress)
+        made += [*files, write_u3ma(where / f"{name}.u3ma", files)]
     return made
 
 
 def write_u3m(
-    fabric: Fabric, path: Path, *, resolution: int = 512, fitted: bool = True
-) -> list[Path]:
+    fabric: Fabric, path: Path, *, resolution: int = 512, fitted: bool = True,
+    progress: Note | None = None,
+) -> list[Path]:  # fmt: skip
     """Write the material `path` (`.u3m`) and its PNG files in `<stem>_u3m/` beside it.
+
+    progress : gets a line before a step that takes seconds
 
     Returns all files. Raises FabricError for another suffix or a fabric that cannot be baked.
     """
     if path.suffix != ".u3m":
         raise FabricError(str(path), "is not the name of a U3M material; it must end in .u3m")
-    ends, picks = _threads(fabric)
-    with tempfile.TemporaryDirectory() as folder:
-        maps = _swatch(fabric, Path(folder), ends, picks, resolution)
-        lay = maps.lays[0]
-        texels = draw_texels(maps, 0, lay)
-        look = fit("principled", texels, fabric).look if fitted and texels is not None else Look()
-        images, depth = pictures(maps, look)
-    size = (1e3 * ends * fabric.warp.pitch, 1e3 * picks * fabric.weft.pitch)
+    if progress:
+        progress(f"baking the swatch of {fabric.name}")
+    tile = baked_tile(fabric, resolution=resolution)
+    look = tile_look(tile, "principled", fitted=fitted, progress=progress)
+    images, depth = pictures(tile, look)
+    size = (1e3 * tile.size[0], 1e3 * tile.size[1])
     written = []
     folder_name = f"{path.stem}_u3m"
     try:
@@ -103,57 +99,31 @@ def write_u3m(
     return [path, *written]
 
 
-def _threads(fabric: Fabric) -> tuple[int, int]:
-    """Return the ends and picks of the swatch: whole repeats, nearly square, at least THREADS."""
-    ends, picks = true_repeat(fabric)
-    across = math.ceil(THREADS / ends)
-    width = across * ends * fabric.warp.pitch
-    down = max(1, round(width / (picks * fabric.weft.pitch)))
-    return across * ends, down * picks
-
-
-def _swatch(fabric: Fabric, folder: Path, ends: int, picks: int, resolution: int) -> MapSet:
-    scene = folder / "swatch.obj"
-    w, h = ends * fabric.warp.pitch, picks * fabric.weft.pitch
-    scene.write_text(
-        f"v 0 0 0\nv {w:.9g} 0 0\nv {w:.9g} {h:.9g} 0\nv 0 {h:.9g} 0\n"
-        "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
-    )
-    binding = Binding(fabric=fabric, threads_per_uv=(float(ends), float(picks)))
-    settings = Settings(resolution=resolution, maps=(*NEEDED, "height"))
-    bake(scene, folder / "bake", settings, fabric=binding)
-    return read_bake_folder(folder / "bake").garments[0]
-
-
-def pictures(maps: MapSet, look: Look) -> tuple[dict[str, NDArray[np.float64]], float]:
+def pictures(tile: Tile, look: Look) -> tuple[dict[str, NDArray[np.float64]], float]:
     """(h, w, 3) values from 0 to 1 of each image of the material, and the depth of the relief [mm].
 
     The depth is the height that 1 represents in the image `displacement`.
     """
-    read = {
-        name: read_mip_level(files[1001]).astype(np.float64)
-        for name, files in maps.textures.items()
-    }
+    read = tile.maps
     smooth = np.minimum((read["roughness_along"] * look.smooth_scale) ** 2, 1.0)
     rough = np.maximum(np.minimum((read["roughness_across"] * look.rough_scale) ** 2, 1.0), smooth)
     # In the principled shader aspect^2 = 1 - 0.9 anisotropy; alphas are r^2/aspect and r^2 aspect.
     anisotropy = np.clip((1.0 - smooth / rough) / 0.9, 0.0, 1.0)
     x, y = -read["tangent"][..., 1], read["tangent"][..., 0]
     turn = (np.arctan2(y, x) / (2.0 * math.pi)) % 1.0
-    relief = read["height"] - read["height"].min()
-    depth = float(relief.max())
+    height, depth = relief(tile)
     single = {
         "roughness": np.sqrt(np.sqrt(smooth * rough)),
         "anisotropy": anisotropy,
         "anisotropy_rotation": turn[..., None],
         "alpha": read["opacity"],
-        "displacement": relief / max(depth, 1e-9),
+        "displacement": height,
     }
     found = {name: np.repeat(values, 3, axis=2) for name, values in single.items()}
     color = np.clip(read["base_color"][..., :3] * np.array(look.base_color_scale), 0.0, 1.0)
     found["basecolor"] = np.asarray(srgb_encode(color))
     found["normal"] = 0.5 * read["normal"][..., :3] + 0.5
-    return found, depth
+    return found, 1e3 * depth
 
 
 class _SwatchImages:
