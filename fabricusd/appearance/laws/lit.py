@@ -17,7 +17,8 @@ from fabricusd.appearance.frame import diamond
 from fabricusd.kernels.real import INLINE, asin, index
 
 GROUPS = 24
-"""Groups of places that scatter alike: the mean of g is then off by .002, see docs/shadowing.md."""
+"""Groups of places that scatter alike, see docs/shadowing.md. With 16, `far` takes an eighth less
+time, and is 4 % off `weave` on flannel in the light of a sun at 5 degrees; with 24, 1 %."""
 
 LIGHT_FIELDS = ("horizons", "columns", "lit_nodes", "groups", "softness")
 """Fields of the tables of a law that uses `lit`.

@@ -5,10 +5,11 @@ takes each stretch's mean of g, and cloth keeps its light if g is divided by it:
 which a surface law may treat a shadow, `laws.Law.absolute`.
 
 Each linear piece of each thread type's curve is cut into stretches over which the tangent angle
-changes by no more than a quarter of the surface lobe's width. For each set that shows the type, the horizons of
-places of all its runs are sorted and put into groups of equal size, by azimuth: the mean of g is
-that over the groups. A table of the mean itself, by elevation and azimuth, would need a hundred
-times the entries, because the light that enters the channel between two threads does so at once.
+changes by no more than a quarter of the surface lobe's width. For each set that shows the type, the
+horizons of places of all its runs are sorted and put into groups of equal size, by azimuth: the
+mean of g is that over the groups. A table of the mean itself, by elevation and azimuth, would need
+a hundred times the entries, because the light that enters the channel between two threads does so
+at once.
 """
 
 from __future__ import annotations
