@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-EPILOG = """In Blender: Edit > Preferences > Add-ons > Install from Disk, then File > Import > fabricusd
-look. It needs no other part of fabricusd.
+EPILOG = """In Blender: Edit > Preferences > Add-ons > Install from Disk, then File > Import >
+fabricusd look. It needs no other part of fabricusd.
 
 example:
   fabricusd blender-addon

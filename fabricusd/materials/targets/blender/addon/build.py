@@ -11,7 +11,7 @@ import bpy
 
 from .images import Images
 from .lobes import lays, lobes
-from .looks import Look, Looks
+from .looks import Look
 from .nodes import Nodes
 from .principled import NUMBERS, TITLES, principled
 
@@ -33,7 +33,9 @@ class Made:
     left_out: list[str] = field(default_factory=list)
 
 
-def build(looks: Looks, materials: Mapping[str, Sequence[Any]], surface: str = BEST) -> Made:
+def build(
+    looks: Sequence[Look], materials: Mapping[str, Sequence[Any]], surface: str = BEST
+) -> Made:
     """Replace the nodes of the materials of `looks`.
 
     materials : Blender's materials by the path of the prim, see `materials_by_path`
@@ -42,8 +44,13 @@ def build(looks: Looks, materials: Mapping[str, Sequence[Any]], surface: str = B
     made, images = Made(), Images()
     shared: dict[Any, Any] = {}
     replaced: set[Any] = set()
-    for look in looks.found:
-        for material in materials.get(look.path, ()):
+    others = []
+    for look in looks:
+        mine = materials.get(look.path, ())
+        if mine and not look.is_known:
+            others.append(look.name)
+            continue
+        for material in mine:
             group = _group(look, surface, shared, made)
             replaced |= _images_of(material)
             _wire(material, look, group, images)
@@ -51,16 +58,15 @@ def build(looks: Looks, materials: Mapping[str, Sequence[Any]], surface: str = B
     bpy.data.batch_remove([image for image in replaced if not image.users])
     if images.missing:
         made.left_out.append(f"textures that cannot be read ({', '.join(images.missing)})")
-    if looks.others:
+    if others:
         made.left_out.append(
-            f"the fit of {', '.join(looks.others)}, which needs a look with --surface openpbr or "
-            "lobes"
+            f"the fit of {', '.join(others)}, which needs a look with --surface openpbr or lobes"
         )
     return made
 
 
 def materials_by_path(
-    looks: Looks, prim_map: Mapping[str, Iterable[Any]], new: Iterable[Any]
+    looks: Sequence[Look], prim_map: Mapping[str, Iterable[Any]], new: Iterable[Any]
 ) -> dict[str, list[Any]]:
     """Find Blender's materials of looks by path.
 
@@ -68,7 +74,7 @@ def materials_by_path(
     new : the materials that the import made, which are found by the prim's name if it is not said
     """
     found = {}
-    for look in looks.found:
+    for look in looks:
         mine = [m for m in prim_map.get(look.path, ()) if isinstance(m, bpy.types.Material)]
         found[look.path] = mine or [m for m in new if _is_called(m.name, look.name)]
     return found

@@ -50,9 +50,9 @@ def _absolute(image: Any) -> str:
 
 
 def _load(path: str) -> Any:
-    image = bpy.data.images.load(path.replace(TILE, "1001"))
+    image = bpy.data.images.load(path)
     if TILE in path:
-        # Blender then finds the other tiles beside the first.
+        # Blender then looks for the tiles.
         image.source = "TILED"
     return image
 

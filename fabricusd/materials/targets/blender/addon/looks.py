@@ -6,7 +6,7 @@ This module knows USD and not Blender.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 SURFACE = "ND_open_pbr_surface_surfaceshader"
@@ -90,32 +90,20 @@ class Look:
     warp: tuple[float, float] = (0.0, 1.0)
 
     @property
+    def is_known(self) -> bool:
+        """Whether the look has a surface that this add-on can build."""
+        return bool(self.mixture or self.values)
+
+    @property
     def lit_through(self) -> bool:
         """Whether light that the threads scatter comes through the cloth."""
         return "transmission_scale" in self.values
 
 
-@dataclass
-class Looks:
-    """The looks of a stage, and the names of materials of fabricusd that hold no surface of ours."""
-
-    found: list[Look] = field(default_factory=list)
-    others: list[str] = field(default_factory=list)
-
-
-def read(stage: Any) -> Looks:
+def read(stage: Any) -> list[Look]:
     """Return the looks of a stage."""
-    read_ = Looks()
-    for prim in _materials(stage):
-        one = _Material(prim)
-        if not one.is_fabric:
-            continue
-        look = one.look()
-        if look.mixture is None and not look.values:
-            read_.others.append(look.name)
-        else:
-            read_.found.append(look)
-    return read_
+    found = (_Material(prim) for prim in _materials(stage))
+    return [one.look() for one in found if one.is_fabric]
 
 
 def _materials(stage: Any) -> Iterator[Any]:
@@ -193,8 +181,10 @@ class _Material:
         if asset is None:
             return None
         if "<UDIM>" in asset.path:
+            from pxr import UsdShade
+
             layer = given.GetAttr().GetPropertyStack()[0].layer
-            return str(layer.ComputeAbsolutePath(asset.path))
+            return str(UsdShade.UdimUtils.ResolveUdimPath(asset.path, layer) or asset.path)
         return str(asset.resolvedPath or asset.path)
 
     def _fixed(self, shader: str, name: str) -> Any:

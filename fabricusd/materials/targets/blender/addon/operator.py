@@ -45,10 +45,10 @@ class ImportFabricusd(bpy.types.Operator, ImportHelper):  # type: ignore[misc]
     def execute(self, context: Any) -> set[str]:
         """Import the file."""
         stage, why = _stage(self.filepath)
-        looks = read(stage) if stage else None
-        if looks is not None and not looks.found and not looks.others:
+        looks = read(stage) if stage else []
+        if stage and not looks:
             why = "holds no look of fabricusd; write one with 'fabricusd material'"
-        if why or looks is None:
+        if why:
             self.report({"ERROR"}, f"{self.filepath} {why}")
             return {"CANCELLED"}
         before = set(bpy.data.materials)
