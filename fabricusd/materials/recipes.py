@@ -19,7 +19,7 @@ from fabricusd.materials.fit.thread_maps import COLUMNS, Factors, write_thread_m
 from fabricusd.materials.lobes.fit import COUNT
 from fabricusd.materials.lobes.inputs import inputs as lobe_inputs
 from fabricusd.materials.lobes.known import mixture_of
-from fabricusd.materials.lobes.mixture import CYCLES, MATERIALX, Mixture
+from fabricusd.materials.lobes.mixture import CYCLES, MATERIALX, Mixture, of_covered
 from fabricusd.materials.lobes.network import lobes
 from fabricusd.materials.lobes.parameters import at_bounds
 from fabricusd.materials.networks.graph import Graph, Texture, Value, unrolled
@@ -50,6 +50,9 @@ OF_THREADS = ("hair", "lobes")
 
 OPAQUE = 0.9995
 """Mean cover from which a material is opaque, since blending is expensive for renderers."""
+
+LEAST_COVER = 1e-3
+"""Mean cover of cloth of which nothing is seen."""
 
 NEUTRAL = {
     "base_color": Value("color3", (0.5, 0.5, 0.5)),
@@ -115,12 +118,16 @@ def recipes(
             one = maps.name if len(maps.lays) == 1 else f"{maps.name}_{number}"
             name = prim_name(one, ascii_only=True)
             looks = found_looks[number]
-            mixture = _mixture(maps, number, settings, made, progress)
-            more = _for_cycles(lay, settings) if mixture else {}
             means, of_means = mean_inputs(maps, number), mean_inputs(fitted, number)
             cover = means["opacity"].value
             assert isinstance(cover, float)
             opaque = cover > OPAQUE
+            mixture = _mixture(maps, number, settings, made, progress)
+            more: dict[str, Value] = {}
+            if mixture is not None:
+                covered = 1.0 if opaque else max(cover, LEAST_COVER)
+                mixture = of_covered(mixture, covered)
+                more = _for_cycles(lay, settings, covered)
             dark = {} if transmits(means) else {"transmission_color": NO_TRANSMISSION}
             if not dark:
                 _note_no_light_through(lay.name, settings, made)
@@ -168,11 +175,11 @@ def _mixture(
     return found
 
 
-def _for_cycles(lay: BakedLay, settings: Settings) -> dict[str, Value]:
+def _for_cycles(lay: BakedLay, settings: Settings, cover: float) -> dict[str, Value]:
     """Return the inputs from which Blender's add-on builds the lobes; their fit is at hand."""
     assert lay.fabric is not None
     found = mixture_of(lay.fabric, settings.lobes, CYCLES, max_error=settings.max_error)
-    return lobe_inputs(found, lay.fabric.name, lay.matrix)
+    return lobe_inputs(of_covered(found, cover), lay.fabric.name, lay.matrix)
 
 
 def lit_through(look: Look) -> Look:

@@ -196,6 +196,9 @@ def _widths(group: Group, along: Any, across: Any) -> tuple[Any, Any]:
     return roughness, group.math("MULTIPLY", apart, sign)
 
 
-def lays(look: Look) -> dict[str, tuple[float, float, float]]:
-    """Return the group's inputs that say how the cloth lies."""
-    return {"Weft": (*look.weft, 0.0), "Warp": (*look.warp, 0.0)}
+def lays(look: Look) -> dict[str, Any]:
+    """Return the group's inputs that say how the cloth lies, and its opacity if it is constant."""
+    found: dict[str, Any] = {"Weft": (*look.weft, 0.0), "Warp": (*look.warp, 0.0)}
+    if look.transparent and "opacity" in look.constants:
+        found["Opacity"] = look.constants["opacity"]
+    return found

@@ -22,6 +22,9 @@ def main() -> None:
     importlib.import_module("fabricusd_looks").register()
     answers = [globals()[one.pop("do")](**one) for one in job["steps"]]
     Path(sys.argv[2]).write_text(json.dumps(answers))
+    sys.stdout.flush()
+    # Blender 4.5 as a module may wait for ever when Python ends.
+    os._exit(0)
 
 
 def clear():

@@ -132,8 +132,8 @@ def test_cycles_renders_what_the_formulas_say(rendered, name):
     ours, truth = rendered[name]
     lit = truth.max(axis=1) > 0.01 * truth.max()
     assert lit.sum() > 15
-    assert np.abs(ours - truth)[~lit].max(initial=0.0) < 1e-4 * truth.max()
-    assert np.abs(ours[lit] / truth[lit] - 1.0).max() < 1e-4
+    assert np.abs(ours - truth)[~lit].max(initial=0.0) < 1e-3 * truth.max()
+    assert np.abs(ours[lit] / truth[lit] - 1.0).max() < 1e-3
 
 
 def test_sheen_differs_by_as_much_as_polynomials_do_from_the_table_of_cycles(rendered):
