@@ -53,7 +53,7 @@ def install(package):
     bpy.ops.extensions.package_install_files(
         filepath=package, repo="user_default", enable_on_install=True
     )
-    return [name for name in bpy.context.preferences.addons.keys() if "fabricusd" in name]
+    return [one.module for one in bpy.context.preferences.addons if "fabricusd" in one.module]
 
 
 def counts():

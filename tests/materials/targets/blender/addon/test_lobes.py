@@ -12,7 +12,9 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from fabricusd.images.files import read_exr_layers
 from fabricusd.materials.lobes.inputs import inputs
-from fabricusd.materials.lobes.mixture import CYCLES, evaluate
+from fabricusd.materials.lobes.mixture import CYCLES, MATERIALX, evaluate, of_covered
+from fabricusd.materials.lobes.network import lobes
+from fabricusd.materials.networks.graph import Value, unrolled
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import preview
 from fabricusd.materials.recipes import NEUTRAL
@@ -40,6 +42,7 @@ CASES = {
     "pair": bare(CYCLES, PAIR),
     "wide along": bare(CYCLES, replace(LEVEL, alpha_along=0.8, alpha_across=0.15)),
     "leaning": bare(CYCLES, LEANING),
+    "open": replace(mixture(CYCLES), sheen=DARK),
     "sheen": replace(
         mixture(CYCLES, replace(LEVEL, color=(1e-9,) * 3)), diffuse=DARK, sheen_roughness=0.9
     ),
@@ -63,7 +66,11 @@ def frames(seed=3):
     return np.array(found)
 
 
-def write_sheet(path, one, along):
+COVER = 0.6
+"""Of the case "open"."""
+
+
+def write_sheet(path, one, along, cover):
     """Squares, each with a frame of `along`, in a material of the mixture `one`."""
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
@@ -84,10 +91,14 @@ def write_sheet(path, one, along):
         "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying
     )
     st.Set([tuple(0.5 + 0.35 * c) for _ in along for c in corners.astype(float)])
-    graphs = [("", preview(NEUTRAL, Look(), True))]
+    maps = {**NEUTRAL, "opacity": Value("float", cover)}
+    opaque = cover == 1.0
+    surface = lobes(maps, opaque, replace(one, form=MATERIALX), MATRIX)
+    graphs = [("", preview(maps, Look(), opaque)), ("", unrolled(surface))]
     material = write_material(
-        stage, Sdf.Path("/Sheet/Cloth"), graphs, inputs(one, "cloth", MATRIX), path.parent
-    )
+        stage, Sdf.Path("/Sheet/Cloth"), graphs,
+        inputs(of_covered(one, cover), "cloth", MATRIX), path.parent,
+    )  # fmt: skip
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
     stage.GetRootLayer().Save()
 
@@ -110,7 +121,7 @@ def rendered(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lobes")
     steps = []
     for name, one in CASES.items():
-        write_sheet(folder / f"{name}.usda", one, along)
+        write_sheet(folder / f"{name}.usda", one, along, COVER if name == "open" else 1.0)
         steps += [
             {"do": "clear"}, {"do": "bring", "path": str(folder / f"{name}.usda")},
             {
