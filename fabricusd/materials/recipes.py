@@ -43,7 +43,7 @@ from fabricusd.schema.names import prim_name
 Progress = Callable[[str], None]
 
 BLENDER = "principled:"
-"""Prefix of the material's inputs for Blender's Principled BSDF, which the import hook reads."""
+"""Prefix of the material's inputs for Blender's Principled BSDF, which the add-on reads."""
 
 OF_THREADS = ("hair", "lobes")
 """Surfaces that are made of a fabric and not of the textures of its bake."""

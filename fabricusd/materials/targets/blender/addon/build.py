@@ -51,6 +51,8 @@ def build(
             others.append(look.name)
             continue
         for material in mine:
+            if material.node_tree is None:
+                material.use_nodes = True
             group = _group(look, surface, shared, made)
             replaced |= _images_of(material)
             _wire(material, look, group, images)

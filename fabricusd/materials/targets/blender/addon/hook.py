@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from .build import build, materials_by_path
-from .looks import read
+from .looks import LookError, read
 
 _waiting: list[dict[str, Any]] = []
 """What an import of ours is told, instead of the hook's own work."""
@@ -31,8 +31,13 @@ def told() -> Iterator[dict[str, Any]]:
 
 def rebuild_all(stage: Any, prim_map: Any = None) -> int:
     """Rebuild the materials of `stage` that Blender imported; return their number."""
-    looks = read(stage)
-    found = materials_by_path(looks, prim_map or {}, bpy.data.materials)
+    try:
+        looks = read(stage)
+    except LookError as error:
+        print(f"fabricusd looks: {stage.GetRootLayer().identifier} {error}")
+        return 0
+    # Earlier imports may have materials of the same names.
+    found = materials_by_path(looks, prim_map or {}, () if prim_map else bpy.data.materials)
     made = build(looks, found)
     for line in made.left_out:
         print(f"fabricusd looks: left out {line}")

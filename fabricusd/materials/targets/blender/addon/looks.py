@@ -13,6 +13,17 @@ SURFACE = "ND_open_pbr_surface_surfaceshader"
 
 Color = tuple[float, float, float]
 
+FITTED = (
+    "base_color_scale", "specular_ior", "specular_tint", "smooth_scale", "rough_scale",
+    "fuzz_weight", "fuzz_color", "fuzz_roughness",
+)  # fmt: skip
+"""Parameters that every OpenPBR network of ours has."""
+
+
+class LookError(ValueError):
+    """A look that lacks something; the message says where and what, in one line."""
+
+
 MAPS = (
     "base_color", "roughness_along", "roughness_across", "opacity", "normal", "tangent",
     "specular_tint_map", "transmission_color",
@@ -101,7 +112,7 @@ class Look:
 
 
 def read(stage: Any) -> list[Look]:
-    """Return the looks of a stage."""
+    """Return the looks of a stage; raises LookError if one of them is incomplete."""
     found = (_Material(prim) for prim in _materials(stage))
     return [one.look() for one in found if one.is_fabric]
 
@@ -169,7 +180,15 @@ class _Material:
             if ":" not in name:
                 own = self._input(f"principled:{name}")
                 found[name] = _plain((own or given).Get())
+        for name in FITTED:
+            self._require(found.get(name), name)
         return found
+
+    def _require(self, value: Any, name: str) -> Any:
+        if value is None:
+            where = f"{self.material.GetPath()}.inputs:{name}"
+            raise LookError(f"lacks {where}; write the look again with 'fabricusd material'")
+        return value
 
     def _file(self, name: str) -> str | None:
         """Return a map's texture; None if a constant replaces it."""
@@ -198,7 +217,7 @@ class _Material:
             return None
 
         def value(name: str) -> Any:
-            return _plain(self._value(f"cycles:{name}"))
+            return _plain(self._require(self._value(f"cycles:{name}"), f"cycles:{name}"))
 
         lobes: list[Lobe] = []
         while self._input(f"cycles:lobe{len(lobes)}:tilt"):
@@ -206,8 +225,9 @@ class _Material:
             lobes.append(Lobe(**{name: value(at + name) for name in Lobe.__dataclass_fields__}))
         names = ("diffuse", "diffuse_power", "sheen", "sheen_roughness", "sheen_power")
         return Mixture(
-            lobes=tuple(lobes), view=value("view") or (), **{name: value(name) for name in names}
-        )
+            lobes=tuple(lobes), view=_plain(self._value("cycles:view") or ()),
+            **{name: value(name) for name in names},
+        )  # fmt: skip
 
 
 def _plain(value: Any) -> Any:

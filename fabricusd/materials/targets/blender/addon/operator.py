@@ -10,7 +10,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from .build import BEST, LOBES, PRINCIPLED, build, materials_by_path
 from .hook import told
-from .looks import read
+from .looks import Look, LookError, read
 from .world import bring_dome
 
 ENDS = (".usda", ".usdc", ".usd", ".usdz")
@@ -45,9 +45,13 @@ class ImportFabricusd(bpy.types.Operator, ImportHelper):  # type: ignore[misc]
     def execute(self, context: Any) -> set[str]:
         """Import the file."""
         stage, why = _stage(self.filepath)
-        looks = read(stage) if stage else []
-        if stage and not looks:
-            why = "holds no look of fabricusd; write one with 'fabricusd material'"
+        looks: list[Look] = []
+        try:
+            looks = read(stage) if stage else []
+            if stage and not looks:
+                why = "holds no look of fabricusd; write one with 'fabricusd material'"
+        except LookError as error:
+            why = str(error)
         if why:
             self.report({"ERROR"}, f"{self.filepath} {why}")
             return {"CANCELLED"}

@@ -118,7 +118,10 @@ def test_what_cannot_be_imported_is_said_in_one_line(folder, tmp_path):
     stage = Usd.Stage.CreateNew(str(tmp_path / "bare.usda"))
     UsdGeom.Cube.Define(stage, "/Cube")
     stage.GetRootLayer().Save()
-    paths = [str(tmp_path / name) for name in ("none.usda", "broken.usda", "bare.usda", "a.obj")]
+    lobes = (folder / "lobes.usda").read_text()
+    (tmp_path / "less.usda").write_text(lobes.replace("inputs:cycles:lobe0:color", "inputs:other"))
+    names = ("none.usda", "broken.usda", "bare.usda", "a.obj", "less.usda")
+    paths = [str(tmp_path / name) for name in names]
     told = in_blender(
         tmp_path, *({"do": "bring", "path": path} for path in paths), {"do": "counts"}
     )
@@ -126,6 +129,7 @@ def test_what_cannot_be_imported_is_said_in_one_line(folder, tmp_path):
         assert one["error"].startswith(f"Error: {path} ")
         assert "\n" not in one["error"]
     assert "write one with 'fabricusd material'" in told[2]["error"]
+    assert "lacks /Garment/FabricLooks/Body_0.inputs:cycles:lobe0:color;" in told[4]["error"]
     assert not any(told[-1].values())
 
 
