@@ -45,6 +45,7 @@ from fabricusd.materials.targets.blender.pack import write_addon  # noqa: E402
 from fabricusd.materials.targets.osl import write_osl  # noqa: E402
 from fabricusd.quality.pictures import difference  # noqa: E402
 from fabricusd.reference.render import render  # noqa: E402
+from fabricusd.scene.staging import Staging  # noqa: E402
 from fabricusd.schema import load  # noqa: E402
 from fabricusd.srgb import srgb_encode  # noqa: E402
 
@@ -125,7 +126,7 @@ def sky(stage, folder):
     pixels = np.repeat(radiance[..., None], 3, axis=2) * (0.9, 1.0, 1.15)
     alpha = np.ones((h, w, 1))
     layers = {"beauty": np.concatenate((pixels, alpha), axis=2).astype(np.float32)}
-    write_exr(path, layers, {}, {})
+    write_exr(path, layers, {"beauty": tuple("RGBA")}, {})
     dome = UsdLux.DomeLight.Define(stage, "/World/Sky")
     dome.CreateTextureFileAttr(f"./{path.name}")
 
@@ -160,12 +161,13 @@ def drape(stage, folder):
 
 
 def reference(scene, folder, light, spp):
-    """Render with the bounces and the box filter of Cycles."""
+    """Render with the bounces and the box filter of Cycles, without the sky behind the cloth."""
     picture = folder / f"{scene.stem}.reference.exr"
     if not picture.exists():
         render(
             scene, picture, width=SIZE[0], height=SIZE[1], spp=spp,
             max_bounces=BOUNCES if light == "sky" else 0,
+            staging=Staging(background=(0.0, 0.0, 0.0)),
             level="far", shadow="horizon", pixel_filter="box",
         )  # fmt: skip
     return picture
