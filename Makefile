@@ -64,6 +64,7 @@ build/bpy/.installed:
 
 blender: $(STAMP) build/bpy/.installed  ## Compare Cycles with the reference, into build/blender.
 	$(BIN)/python bench/materials/blender_compare.py --blender build/bpy/bin/python
+	$(BIN)/python bench/materials/blender_compare.py --blender build/bpy/bin/python --light sky
 
 clean:  ## Remove the environment and everything made.
 	rm -rf $(VENV) demo build dist *.egg-info

@@ -3,14 +3,17 @@
     python bench/materials/blender_compare.py --blender PYTHON [--out FOLDER] [--presets NAME ...]
 
 `PYTHON` is an interpreter that can `import bpy`; `make blender` makes one. The subjects are half a
-cylinder wrapped in the fabric, and a draped cloth, under one distant light without bounces. They
-are rendered by fabricusd at level far and, from the baked look, by Cycles in three ways: as
-UsdPreviewSurface, which is what Blender imports; through the hook of
-`fabricusd/materials/targets/blender`; and with the OSL shader. The script prints a table of delta E
-2000 and writes the pictures side by side.
+cylinder wrapped in the fabric, and a draped cloth. They are rendered by fabricusd at level far and,
+from the baked look, by Cycles in four ways: as UsdPreviewSurface, which is what Blender imports; by
+our add-on as the fitted Principled BSDF, and as lobes; and with the OSL shader. The script prints a
+table of delta E 2000 and writes the pictures side by side.
 
-With `--behind`, the fabrics' threads conserve energy and the light stands behind the cloth, which
-shows what comes through. There is no OSL shader of such threads.
+With `--light sun`, the default, the light is one distant light, without bounces. With `--light
+sky`, it is a clear sky with a hazy sun in it, with four bounces, and means of 2 x 2 pixels are
+compared; OSL cannot show it.
+
+With `--behind`, the fabrics' threads conserve energy and the sun stands behind the cloth, which
+shows what comes through. There are no lobes and no OSL shader of such threads.
 """
 
 from __future__ import annotations
@@ -34,11 +37,15 @@ from make_samples import Grid, camera, define_grid, dress, look_at, make_drape  
 
 from fabricusd.bake.bake import bake  # noqa: E402
 from fabricusd.bake.job import Settings as BakeSettings  # noqa: E402
-from fabricusd.images.files import read_exr_layers, write_png  # noqa: E402
+from fabricusd.images.files import read_exr_layers, write_exr, write_png  # noqa: E402
+from fabricusd.materials.lobes.skies import SKIES  # noqa: E402
 from fabricusd.materials.materials import write_materials  # noqa: E402
+from fabricusd.materials.recipes import Settings  # noqa: E402
+from fabricusd.materials.targets.blender.pack import write_addon  # noqa: E402
 from fabricusd.materials.targets.osl import write_osl  # noqa: E402
 from fabricusd.quality.pictures import difference  # noqa: E402
 from fabricusd.reference.render import render  # noqa: E402
+from fabricusd.scene.staging import Staging  # noqa: E402
 from fabricusd.schema import load  # noqa: E402
 from fabricusd.srgb import srgb_encode  # noqa: E402
 
@@ -54,8 +61,15 @@ TOWARDS = np.array([0.45, 0.5, 0.74]) / np.linalg.norm([0.45, 0.5, 0.74])
 BEHIND = TOWARDS * (1.0, 1.0, -1.0)
 IRRADIANCE = math.pi
 SIZE = (300, 200)
-KINDS = ("preview", "hook", "osl")
-KINDS_BEHIND = ("preview", "hook")
+BOUNCES = 4
+"""Under the sky."""
+
+KINDS = {
+    "sun": ("preview", "principled", "lobes", "osl"),
+    "sky": ("preview", "principled", "lobes"),
+    "behind": ("preview", "principled"),
+}
+"""Kinds of material by kind of light."""
 
 
 class Subject:
@@ -74,24 +88,47 @@ def cloth_of(preset, behind):
     return replace(fabric, model="conserving", back=None) if behind else fabric
 
 
-def make_scene(subject, preset, folder, behind):
+def make_scene(subject, preset, folder, light):
     """The scene that fabricusd renders; its mesh is the one that is baked."""
-    path = folder / f"{subject.name}.{preset}.usda"
+    path = folder / f"{subject.name}.{preset}.{light}.usda"
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/World").GetPrim())
     mesh = cylinder(stage) if subject is CYLINDER else drape(stage, folder)
-    dress(stage, mesh, cloth_of(preset, behind))
-    light = UsdLux.DistantLight.Define(stage, "/World/Light")
-    light.CreateIntensityAttr(IRRADIANCE)
-    light.CreateAngleAttr(0.0)
-    light.AddTransformOp().Set(
-        look_at(tuple((BEHIND if behind else TOWARDS).tolist()), (0.0, 0.0, 0.0))
-    )
+    dress(stage, mesh, cloth_of(preset, light == "behind"))
+    if light == "sky":
+        sky(stage, folder)
+    else:
+        sun = UsdLux.DistantLight.Define(stage, "/World/Light")
+        sun.CreateIntensityAttr(IRRADIANCE)
+        sun.CreateAngleAttr(0.0)
+        towards = BEHIND if light == "behind" else TOWARDS
+        sun.AddTransformOp().Set(look_at(tuple(towards.tolist()), (0.0, 0.0, 0.0)))
     camera(stage, subject.eye, subject.at, subject.focal_length)
     stage.GetRootLayer().Save()
     return path
+
+
+def sky(stage, folder):
+    """A dome with the picture of the sky "clear", and a dark ground."""
+    h, w = 256, 512
+    v, u = np.meshgrid((np.arange(h) + 0.5) / h, (np.arange(w) + 0.5) / w, indexing="ij")
+    sine, cosine = np.sin(np.pi * v), np.cos(np.pi * v)
+    a = 2.0 * math.pi * u - 0.5 * math.pi
+    # The sun stands before the subjects, on the camera's right.
+    towards = np.stack((sine * np.sin(a), sine * np.cos(a), np.maximum(cosine, 0.0)), axis=-1)
+    radiance = SKIES["clear"](towards.reshape(-1, 3)).reshape(h, w)
+    radiance = np.where(cosine > 0.0, radiance, 0.3)
+    solid = sine * math.pi / h * 2.0 * math.pi / w
+    radiance *= math.pi / (radiance * solid * np.maximum(cosine, 0.0)).sum()
+    path = folder / "sky.exr"
+    pixels = np.repeat(radiance[..., None], 3, axis=2) * (0.9, 1.0, 1.15)
+    alpha = np.ones((h, w, 1))
+    layers = {"beauty": np.concatenate((pixels, alpha), axis=2).astype(np.float32)}
+    write_exr(path, layers, {"beauty": tuple("RGBA")}, {})
+    dome = UsdLux.DomeLight.Define(stage, "/World/Sky")
+    dome.CreateTextureFileAttr(f"./{path.name}")
 
 
 def cylinder(stage):
@@ -123,34 +160,44 @@ def drape(stage, folder):
     return mesh
 
 
-def reference(scene, folder, spp):
-    """Render direct light only, like Cycles without bounces, with the box filter of Cycles."""
+def reference(scene, folder, light, spp):
+    """Render with the bounces and the box filter of Cycles, without the sky behind the cloth."""
     picture = folder / f"{scene.stem}.reference.exr"
     if not picture.exists():
         render(
-            scene, picture, width=SIZE[0], height=SIZE[1], spp=spp, max_bounces=0,
+            scene, picture, width=SIZE[0], height=SIZE[1], spp=spp,
+            max_bounces=BOUNCES if light == "sky" else 0,
+            staging=Staging(background=(0.0, 0.0, 0.0)),
             level="far", shadow="horizon", pixel_filter="box",
         )  # fmt: skip
     return picture
 
 
-def jobs_of(subject, preset, scene, folder, behind):
-    baked = folder / f"{scene.stem}.bake"
+def jobs_of(subject, preset, scene, folder, light):
+    """What `blender_render.py` renders."""
+    behind = light == "behind"
+    baked = folder / f"{subject.name}.{preset}.{'behind.' if behind else ''}bake"
     if not (baked / "manifest.json").exists():
         bake(scene, baked, BakeSettings(resolution=512, fit=True))
-    written = write_materials(baked)
+    surfaces = ("openpbr",) if behind else ("openpbr", "lobes")
+    if not (baked / "look.usda").exists():
+        write_materials(baked, settings=Settings(surfaces=surfaces))
     shader = folder / f"{preset}.osl"
-    if not behind:
+    if light == "sun":
         write_osl(load(preset), shader)
     made = []
-    for kind in KINDS_BEHIND if behind else KINDS:
+    for kind in KINDS[light]:
         made.append(
             {
                 "material": kind,
+                "addons": str(folder / "addons"),
                 "layer": str(baked / "look.usda"),
+                "scene": str(scene),
+                "light": light,
                 "picture": str(folder / f"{scene.stem}.{kind}.exr"),
                 "size": SIZE,
-                "spp": 64 if kind != "osl" else 16,
+                "spp": {"osl": 16}.get(kind, 96 if light == "sky" else 64),
+                "bounces": BOUNCES if light == "sky" else 0,
                 "irradiance": IRRADIANCE,
                 "towards_light": (BEHIND if behind else TOWARDS).tolist(),
                 "focal_length": subject.focal_length,
@@ -158,22 +205,28 @@ def jobs_of(subject, preset, scene, folder, behind):
                 "shader": str(shader),
             }
         )
-    return made, written
+    return made
 
 
-def compare(picture, truth):
-    """The difference where both pictures are mostly cloth, and that of their mean radiances."""
-    ours, _ = read_exr_layers(picture)
-    real, _ = read_exr_layers(truth)
-    a, b = ours["beauty"], real["beauty"]
+def compare(picture, truth, block):
+    """The difference where both pictures are mostly cloth, and that of their mean radiances.
+
+    block : side of the squares of pixels whose means are compared, because noise is no difference
+    """
+    a, b = (shrunk(read_exr_layers(one)[0]["beauty"], block) for one in (picture, truth))
     both = (a[..., 3] > 0.5) & (b[..., 3] > 0.5)
     found = difference(a[both][None, :, :3].copy(), b[both][None, :, :3].copy())
     relative = float(a[..., :3].sum() / b[..., :3].sum() - 1.0)
     return found, relative
 
 
-def stack(folder, names, kinds):
-    """Write all rows of pictures below one another, at half size, to `side_by_side.png`."""
+def shrunk(pixels, block):
+    h, w = pixels.shape[0] // block, pixels.shape[1] // block
+    return pixels.reshape(h, block, w, block, -1).mean(axis=(1, 3))
+
+
+def stack(folder, names, kinds, light):
+    """Write all rows of pictures below one another, at half size, to `side_by_side.LIGHT.png`."""
     rows = [
         np.concatenate(
             [
@@ -185,9 +238,8 @@ def stack(folder, names, kinds):
         for name in names
     ]
     pixels = np.clip(np.concatenate(rows, axis=0), 0.0, 1.0)
-    h, w = pixels.shape[0] // 2, pixels.shape[1] // 2
-    small = pixels.reshape(h, 2, w, 2, 3).mean(axis=(1, 3))
-    out = folder / "side_by_side.png"
+    small = shrunk(pixels, 2)
+    out = folder / f"side_by_side.{light}.png"
     write_png(out, np.rint(srgb_encode(small) * 255).astype(np.uint8))
 
 
@@ -198,18 +250,22 @@ def main() -> None:
     parser.add_argument("--presets", nargs="+", default=list(PRESETS))
     parser.add_argument("--subjects", nargs="+", default=["cylinder", "garment"])
     parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--light", choices=("sun", "sky"), default="sun")
     parser.add_argument("--behind", action="store_true", help="light through the cloth")
     options = parser.parse_args()
+    light = "behind" if options.behind else options.light
     folder = options.out.resolve()
     folder.mkdir(parents=True, exist_ok=True)
+    (folder / "addons").mkdir(exist_ok=True)
+    write_addon(folder / "addons" / "fabricusd_looks")
     print("| subject | preset | material | mean radiance | delta E mean | 95th |")
     print("|---|---|---|---|---|---|")
     done: list[str] = []
     for subject in (s for s in (CYLINDER, GARMENT) if s.name in options.subjects):
         for preset in options.presets:
-            scene = make_scene(subject, preset, folder, options.behind)
-            truth = reference(scene, folder, options.spp)
-            jobs, _ = jobs_of(subject, preset, scene, folder, options.behind)
+            scene = make_scene(subject, preset, folder, light)
+            truth = reference(scene, folder, light, options.spp)
+            jobs = jobs_of(subject, preset, scene, folder, light)
             job = folder / f"{scene.stem}.json"
             job.write_text(json.dumps(jobs))
             log = folder / f"{scene.stem}.log"
@@ -217,14 +273,14 @@ def main() -> None:
                 run = [options.blender, str(HERE / "blender_render.py"), str(job)]
                 subprocess.run(run, check=True, stdout=stream, stderr=subprocess.STDOUT)
             for one in jobs:
-                error, mean = compare(Path(one["picture"]), truth)
+                error, mean = compare(Path(one["picture"]), truth, 2 if light == "sky" else 1)
                 print(
                     f"| {subject.name} | {preset} | {one['material']} | {100 * mean:+.1f} % "
                     f"| {error.delta_e_mean:.2f} | {error.delta_e_95:.2f} |",
                     flush=True,
                 )
             done.append(scene.stem)
-    stack(folder, done, KINDS_BEHIND if options.behind else KINDS)
+    stack(folder, done, KINDS[light], light)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ python bench/materials/blender_render.py JOB.json
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import json
 import math
 import sys
@@ -15,7 +15,6 @@ import bpy
 from mathutils import Matrix, Vector
 from pxr import Usd
 
-HOOK = Path(__file__).resolve().parents[2] / "fabricusd/materials/targets/blender/fabricusd_hook.py"
 SOCKETS = (
     ("NodeSocketVector", "Tangent"),
     ("NodeSocketVector", "TowardsLight"),
@@ -26,30 +25,33 @@ TO_Z_UP = Matrix.Rotation(math.pi / 2, 4, "X")
 
 
 def main() -> None:
-    for job in json.loads(Path(sys.argv[1]).read_text()):
+    jobs = json.loads(Path(sys.argv[1]).read_text())
+    sys.path.insert(0, jobs[0]["addons"])
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    importlib.import_module("fabricusd_looks").register()
+    for job in jobs:
         render(job)
 
 
 def render(job):
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.ops.wm.usd_import(filepath=job["layer"], import_cameras=False, import_lights=False)
-    # The USD in Blender's wheel has no Python modules, so Blender cannot pass its stage to the
-    # hook's `on_import`. Open the same stage with usd-core instead.
-    if job["material"] == "hook" and not load_hook().rebuild_all(Usd.Stage.Open(job["layer"])):
-        raise SystemExit("the hook found no fabric material")
+    if job["material"] in ("principled", "lobes"):
+        bpy.ops.import_scene.fabricusd(
+            filepath=job["layer"], surface=job["material"].upper(), lights=False, cameras=False,
+            subdivision=False,
+        )  # fmt: skip
+    else:
+        bpy.ops.wm.usd_import(filepath=job["layer"], import_cameras=False, import_lights=False)
     if job["material"] == "osl":
         shade_by_osl(job)
-    add_light(job)
+    if job["light"] == "sky":
+        world = importlib.import_module("fabricusd_looks.world")
+        world.bring_dome(Usd.Stage.Open(job["scene"]), bpy.context.scene)
+    else:
+        add_light(job)
     add_camera(job)
     settings(job)
     bpy.ops.render.render(write_still=True)
-
-
-def load_hook():
-    spec = importlib.util.spec_from_file_location("fabricusd_hook", HOOK)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def shade_by_osl(job):
@@ -119,7 +121,9 @@ def settings(job):
     scene.cycles.samples = job["spp"]
     scene.cycles.use_adaptive_sampling = False
     scene.cycles.use_denoising = False
-    scene.cycles.max_bounces = 0
+    scene.cycles.max_bounces = job["bounces"]
+    for kind in ("diffuse", "glossy", "transmission"):
+        setattr(scene.cycles, f"{kind}_bounces", job["bounces"])
     scene.cycles.sample_clamp_indirect = 0.0
     scene.cycles.pixel_filter_type = "BOX"
     scene.render.film_transparent = True

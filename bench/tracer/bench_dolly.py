@@ -2,11 +2,11 @@
 
     python bench/tracer/bench_dolly.py [--presets NAME ...] [--elevations DEGREES ...]
 
-The path tracer at its default settings (`--level auto`, shadows by `horizon`) looks straight down on
-a flat square of even threads, of whole repeats, from 50 pixels a thread to 50 threads a pixel, in
-the light of one sun without bounces. Each row gives the largest difference of the square's mean from
-that at level `far`, in any channel, and at which distance; `noise` is the standard error of the
-nearest picture's mean. Two azimuths of the sun.
+The path tracer at its default settings (`--level auto`, shadows by `horizon`) looks straight down
+on a flat square of even threads, of whole repeats, from 50 pixels a thread to 50 threads a pixel,
+in the light of one sun without bounces. Each row gives the largest difference of the square's mean
+from that at level `far`, in any channel, and at which distance; `noise` is the standard error of
+the nearest picture's mean. Two azimuths of the sun.
 """
 
 from __future__ import annotations

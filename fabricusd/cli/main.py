@@ -40,6 +40,7 @@ COMMANDS = {
     "sides": "measure where a fabric's light goes, for the conserving model",
     "bake": "bake a fabric on a garment into textures",
     "material": "turn a bake into materials for USD, MaterialX and other tools",
+    "blender-addon": "write the Blender add-on that imports materials with their garment",
     "render": "path-trace a scene for look-dev review",
     "compare": "measure the difference between two pictures",
     "chart": "measure and plot the speed and accuracy of every method",

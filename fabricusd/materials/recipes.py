@@ -17,8 +17,9 @@ from fabricusd.materials.fit.keep import kept_fit, kept_fit_threads
 from fabricusd.materials.fit.texels import draw_texels, mean_texel
 from fabricusd.materials.fit.thread_maps import COLUMNS, Factors, write_thread_maps
 from fabricusd.materials.lobes.fit import COUNT
+from fabricusd.materials.lobes.inputs import inputs as lobe_inputs
 from fabricusd.materials.lobes.known import mixture_of
-from fabricusd.materials.lobes.mixture import MATERIALX, Mixture
+from fabricusd.materials.lobes.mixture import CYCLES, MATERIALX, Mixture, of_covered
 from fabricusd.materials.lobes.network import lobes
 from fabricusd.materials.lobes.parameters import at_bounds
 from fabricusd.materials.networks.graph import Graph, Texture, Value, unrolled
@@ -42,13 +43,16 @@ from fabricusd.schema.names import prim_name
 Progress = Callable[[str], None]
 
 BLENDER = "principled:"
-"""Prefix of the material's inputs for Blender's Principled BSDF, which the import hook reads."""
+"""Prefix of the material's inputs for Blender's Principled BSDF, which the add-on reads."""
 
 OF_THREADS = ("hair", "lobes")
 """Surfaces that are made of a fabric and not of the textures of its bake."""
 
 OPAQUE = 0.9995
 """Mean cover from which a material is opaque, since blending is expensive for renderers."""
+
+LEAST_COVER = 1e-3
+"""Mean cover of cloth of which nothing is seen."""
 
 NEUTRAL = {
     "base_color": Value("color3", (0.5, 0.5, 0.5)),
@@ -114,11 +118,16 @@ def recipes(
             one = maps.name if len(maps.lays) == 1 else f"{maps.name}_{number}"
             name = prim_name(one, ascii_only=True)
             looks = found_looks[number]
-            mixture = _mixture(maps, number, settings, made, progress)
             means, of_means = mean_inputs(maps, number), mean_inputs(fitted, number)
             cover = means["opacity"].value
             assert isinstance(cover, float)
             opaque = cover > OPAQUE
+            mixture = _mixture(maps, number, settings, made, progress)
+            more: dict[str, Value] = {}
+            if mixture is not None:
+                covered = 1.0 if opaque else max(cover, LEAST_COVER)
+                mixture = of_covered(mixture, covered)
+                more = _for_cycles(lay, settings, covered)
             dark = {} if transmits(means) else {"transmission_color": NO_TRANSMISSION}
             if not dark:
                 _note_no_light_through(lay.name, settings, made)
@@ -131,7 +140,7 @@ def recipes(
                 title = name if variant == "baked" else f"{name}_plain"
                 graphs = {s: _graph(s, inputs, opaque, lay, mixture) for s in settings.surfaces}
                 found[maps.name, number, variant] = material_recipe(
-                    title, graphs, plain, looks, opaque, inputs
+                    title, graphs, plain, looks, opaque, inputs, more
                 )
                 for surface, graph in graphs.items():
                     tail = "" if len(graphs) == 1 else f"_{surface}"
@@ -166,6 +175,13 @@ def _mixture(
     return found
 
 
+def _for_cycles(lay: BakedLay, settings: Settings, cover: float) -> dict[str, Value]:
+    """Return the inputs from which Blender's add-on builds the lobes; their fit is at hand."""
+    assert lay.fabric is not None
+    found = mixture_of(lay.fabric, settings.lobes, CYCLES, max_error=settings.max_error)
+    return lobe_inputs(of_covered(found, cover), lay.fabric.name, lay.matrix)
+
+
 def lit_through(look: Look) -> Look:
     """A look of cloth that light comes through; without a fit the map stays as it is."""
     return replace(look, transmission_scale=look.transmission_scale or (1.0, 1.0, 1.0))
@@ -182,18 +198,20 @@ def _note_no_light_through(fabric: str, settings: Settings, made: Written) -> No
 
 def material_recipe(
     name: str, graphs: Mapping[str, Graph], plain: Inputs, looks: Mapping[str, Look], opaque: bool,
-    inputs: Inputs | None = None,
+    inputs: Inputs | None = None, more: Mapping[str, Value] | None = None,
 ) -> MaterialRecipe:  # fmt: skip
     """A material of UsdPreviewSurface over `plain` and the first of `graphs`.
 
     looks : by kind of surface, "preview", "principled" and those of `graphs`
     inputs : the maps of `graphs`, None for `plain`
+    more : inputs of the material that no network reads
     """
     first = next(iter(graphs))
+    fitted = parameter_values(looks[first]) | parameter_values(looks["principled"], BLENDER)
     return MaterialRecipe(
         name=name,
         graphs=(("", preview(plain, looks["preview"], opaque)), ("", unrolled(graphs[first]))),
-        parameters=parameter_values(looks[first]) | parameter_values(looks["principled"], BLENDER),
+        parameters={**fitted, **(more or {})},
         inputs=plain if inputs is None else inputs,
         looks=looks,
         opaque=opaque,

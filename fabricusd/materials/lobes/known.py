@@ -52,11 +52,13 @@ def mixture_of(
                 return from_dict(held)
 
     def made() -> NDArray[np.uint8]:
-        if progress:
-            progress(f"fitting {count} lobes to {fabric.name}")
-        found = fit(fabric, count, CYCLES, max_error=max_error)
         if form != CYCLES:
-            found = refit(fabric, in_form(found, form))
+            first = mixture_of(fabric, count, max_error=max_error, progress=progress)
+            found = refit(fabric, in_form(first, form))
+        else:
+            if progress:
+                progress(f"fitting {count} lobes to {fabric.name}")
+            found = fit(fabric, count, CYCLES, max_error=max_error)
         return np.frombuffer(json.dumps(asdict(found)).encode(), np.uint8)
 
     key = (_sources(), count, form, max_error, np.round(probes(fabric), 6))

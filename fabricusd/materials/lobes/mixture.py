@@ -19,7 +19,8 @@ depends on the reflectance `color W`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -190,3 +191,12 @@ def evaluate(mixture: Mixture, wi: Floats, wo: Floats) -> Floats:
             out += one.value[:, None] * f * (1.0 + f * one.spared[:, None])
     above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
     return np.where(above[:, None], out, 0.0)
+
+
+def of_covered(mixture: Mixture, cover: float) -> Mixture:
+    """Return the mixture per area of thread, for a surface whose opacity has the mean `cover`.
+
+    A mixture is the radiance of the whole cloth, gaps included, and an opacity dims it once more.
+    """
+    view = mixture.view or (0.0,) * POWERS
+    return replace(mixture, view=(view[0] - math.log(cover), *view[1:]))

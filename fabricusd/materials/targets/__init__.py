@@ -64,6 +64,10 @@ TARGETS = (
     ),
     Target(name="osl", module="osl", help="also write each fabric's threads as an OSL shader"),
     Target(
+        name="mitsuba", metavar="FOLDER", module="mitsuba.export",
+        help="also write each fabric's threads for Mitsuba 3, and the plugin that reads them",
+    ),
+    Target(
         name="u3m", metavar="FOLDER", module="u3m",
         help="also write a U3M swatch of each fabric, for garment CAD",
     ),

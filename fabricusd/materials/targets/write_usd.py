@@ -22,6 +22,7 @@ _TYPES = {
     "vector2": Sdf.ValueTypeNames.Float2,
     "vector3": Sdf.ValueTypeNames.Float3,
     "float4": Sdf.ValueTypeNames.Float4,
+    "floats": Sdf.ValueTypeNames.FloatArray,
     "boolean": Sdf.ValueTypeNames.Bool,
     "integer": Sdf.ValueTypeNames.Int,
     "string": Sdf.ValueTypeNames.String,

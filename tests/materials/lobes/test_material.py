@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -12,9 +13,13 @@ from pxr import Usd, UsdShade
 
 from fabricusd.errors import FabricError
 from fabricusd.materials import recipes
-from fabricusd.materials.lobes.known import from_dict
+from fabricusd.materials.bake_folder import read_bake_folder
+from fabricusd.materials.lobes.known import from_dict, mixture_of
+from fabricusd.materials.lobes.mixture import CYCLES
 from fabricusd.materials.materials import write_materials
-from fabricusd.materials.recipes import Settings
+from fabricusd.materials.recipes import Settings, mean_inputs
+from fabricusd.materials.targets.blender.addon import looks
+from fabricusd.schema import load
 
 
 @pytest.fixture(scope="module")
@@ -97,3 +102,19 @@ def test_a_bound_that_a_fit_met_is_a_remark_and_not_a_note(shirt, tmp_path, quic
     made = written(shirt, tmp_path, "lobes")[1]
     assert sum("facing of lobe 0 is at its greatest" in line for line in made.remarks) == 2
     assert not any("facing" in line for line in made.notes)
+
+
+def test_gaps_do_not_dim_the_lobes_twice(shirt, tmp_path, quick):
+    """A mixture is the radiance of the whole cloth; the opacity of the look covers its share."""
+    path = written(shirt, tmp_path, "openpbr", "lobes")[0]
+    cover = mean_inputs(read_bake_folder(shirt[1]).garments[0], 0)["opacity"].value
+    assert cover < 0.9
+    linen = mixture_of(load("linen_plain"), 4, CYCLES)
+    (look,) = [one for one in looks.read(Usd.Stage.Open(str(path))) if one.name == "Body_0"]
+    assert look.mixture.view[0] == pytest.approx(linen.view[0] - math.log(cover), rel=1e-5)
+    assert look.mixture.view[1:] == pytest.approx(linen.view[1:], rel=1e-5)
+    (velvet,) = [one for one in looks.read(Usd.Stage.Open(str(path))) if one.name == "Body_1"]
+    assert not velvet.transparent
+    assert velvet.mixture.view == pytest.approx(
+        mixture_of(load("velvet"), 4, CYCLES).view, rel=1e-5
+    )

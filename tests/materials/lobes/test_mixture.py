@@ -15,6 +15,7 @@ from fabricusd.materials.lobes.mixture import (
     POWERS,
     Mixture,
     evaluate,
+    of_covered,
     reflected,
     view_factor,
 )
@@ -106,3 +107,10 @@ def test_sheen_is_weighted_by_the_viewer():
     fades = replace(even, sheen_power=2.0)
     upright = np.maximum(wo[:, 2:], 0.05)
     assert evaluate(fades, wi, wo) == pytest.approx(upright**2 * evaluate(even, wi, wo))
+
+
+def test_an_opacity_dims_the_mixture_of_covered_cloth_to_the_whole():
+    wi, wo = directions(64)
+    for one in (mixture(CYCLES), replace(mixture(CYCLES), view=())):
+        dimmed = 0.7 * evaluate(of_covered(one, 0.7), wi, wo)
+        assert np.allclose(dimmed, evaluate(one, wi, wo), rtol=1e-9)

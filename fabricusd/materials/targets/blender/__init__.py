@@ -1,4 +1,4 @@
-"""Files to install in Blender: the USD import hook, and the thread model as an OSL shader.
+"""Files for Blender: the add-on that imports looks, and the thread model as an OSL shader.
 
-These files run inside Blender; fabricusd does not import them.
+They run inside Blender; `pack` writes the add-on as a file to install.
 """

@@ -1,0 +1,126 @@
+"""Node trees, node by node."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+UV = "st"
+"""The UV map of a look."""
+
+
+class Nodes:
+    """Adds nodes to a tree; values are constants or sockets of other nodes."""
+
+    def __init__(self, tree: Any) -> None:
+        self.tree = tree
+
+    def add(self, kind: str, **inputs: Any) -> Any:
+        """Add a node with `inputs` by their names, `_` for a space; return it."""
+        node = self.tree.nodes.new(kind)
+        for name, value in inputs.items():
+            self.set(node.inputs[name.replace("_", " ")], value)
+        return node
+
+    def set(self, socket: Any, value: Any) -> None:
+        """Connect an input to a socket, or set it to a constant."""
+        if isinstance(value, bpy.types.NodeSocket):
+            self.tree.links.new(value, socket)
+        elif socket.type == "RGBA":
+            socket.default_value = (*value[:3], 1.0)
+        else:
+            socket.default_value = value
+
+    def math(self, operation: str, *values: Any) -> Any:
+        """Add a Math node; return its output."""
+        node = self.add("ShaderNodeMath")
+        node.operation = operation
+        for socket, value in zip(node.inputs, values, strict=False):
+            self.set(socket, value)
+        return node.outputs[0]
+
+    def vector(self, operation: str, *values: Any) -> Any:
+        """Add a Vector Math node; return its output."""
+        node = self.add("ShaderNodeVectorMath")
+        node.operation = operation
+        for socket, value in zip(node.inputs, values, strict=False):
+            self.set(socket, value)
+        return node.outputs["Value" if operation == "DOT_PRODUCT" else "Vector"]
+
+    def scaled(self, vector: Any, by: Any) -> Any:
+        """Return a vector or a colour times a number."""
+        node = self.add("ShaderNodeVectorMath")
+        node.operation = "SCALE"
+        self.set(node.inputs[0], vector)
+        self.set(node.inputs["Scale"], by)
+        return node.outputs["Vector"]
+
+    def joined(self, x: Any, y: Any, z: Any) -> Any:
+        """Return the vector of three numbers."""
+        return self.add("ShaderNodeCombineXYZ", X=x, Y=y, Z=z).outputs[0]
+
+    def world(self, code: Any) -> Any:
+        """Convert a tangent-space direction, encoded as (d + 1)/2, to world space."""
+        node = self.add("ShaderNodeNormalMap", Color=code)
+        node.uv_map = UV
+        return node.outputs[0]
+
+    def sum(self, shaders: list[Any]) -> Any:
+        """Return the sum of closures."""
+        total = shaders[0]
+        for one in shaders[1:]:
+            node = self.add("ShaderNodeAddShader")
+            self.tree.links.new(total, node.inputs[0])
+            self.tree.links.new(one, node.inputs[1])
+            total = node.outputs[0]
+        return total
+
+    def image(self, image: Any) -> Any:
+        """Add an image node; return its colour."""
+        uv = self.tree.nodes.get("UV") or self.add("ShaderNodeUVMap")
+        uv.name, uv.uv_map = "UV", UV
+        node = self.add("ShaderNodeTexImage", Vector=uv.outputs[0])
+        node.image, node.extension = image, "EXTEND"
+        return node.outputs["Color"]
+
+    def arrange(self) -> None:
+        """Lay the nodes out in columns, in the order in which they were added."""
+        for number, node in enumerate(self.tree.nodes):
+            node.location = (-260 * (number // 8), -220 * (number % 8))
+
+
+class Group(Nodes):
+    """A node group with one shader as its output."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(bpy.data.node_groups.new(name, "ShaderNodeTree"))
+        self.given = self.add("NodeGroupInput")
+
+    def panel(self, name: str) -> Any:
+        """Add a closed panel for inputs."""
+        return self.tree.interface.new_panel(name, default_closed=True)
+
+    def input(
+        self, name: str, default: Any, *, low: float | None = None, high: float | None = None,
+        panel: Any = None, color: bool = False,
+    ) -> Any:  # fmt: skip
+        """Add an input of the group; return the socket that has its value inside."""
+        is_number = isinstance(default, int | float)
+        kind = "Color" if color else "Float" if is_number else "Vector"
+        made = self.tree.interface.new_socket(
+            name, in_out="INPUT", socket_type=f"NodeSocket{kind}", parent=panel
+        )
+        made.default_value = default if not color else (*default, 1.0)
+        if is_number:
+            made.min_value = made.min_value if low is None else low
+            made.max_value = made.max_value if high is None else high
+        return next(one for one in self.given.outputs if one.identifier == made.identifier)
+
+    def end(self, shader: Any) -> Any:
+        """Make `shader` the group's output; return the group's tree."""
+        self.tree.interface.new_socket("Surface", in_out="OUTPUT", socket_type="NodeSocketShader")
+        output = self.add("NodeGroupOutput")
+        self.tree.links.new(shader, output.inputs["Surface"])
+        self.arrange()
+        return self.tree

@@ -1,0 +1,172 @@
+"""Steps that tests run in Blender's Python: python inside_blender.py JOB.json ANSWER.json.
+
+A step is a dictionary whose `do` names a function here; the others are its arguments.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import sys
+from pathlib import Path
+
+import bpy
+from mathutils import Matrix, Vector
+
+
+def main() -> None:
+    job = json.loads(Path(sys.argv[1]).read_text())
+    sys.path.insert(0, job["addons"])
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    importlib.import_module("fabricusd_looks").register()
+    answers = [globals()[one.pop("do")](**one) for one in job["steps"]]
+    Path(sys.argv[2]).write_text(json.dumps(answers))
+    sys.stdout.flush()
+    # Blender 4.5 as a module may wait for ever when Python ends.
+    os._exit(0)
+
+
+def clear():
+    """An empty scene."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+def bring(path, **options):
+    """Import a look; the error if it is refused."""
+    try:
+        return {"done": list(bpy.ops.import_scene.fabricusd(filepath=path, **options))}
+    except RuntimeError as error:
+        return {"error": str(error).strip()}
+
+
+def said():
+    """What imports have reported: all that Blender printed."""
+    sys.stdout.flush()
+    return Path(os.environ["SAID"]).read_text()
+
+
+def install(package):
+    """Install the add-on as a user does; the names of its modules that are then enabled."""
+    importlib.import_module("fabricusd_looks").unregister()
+    bpy.ops.preferences.addon_enable(module="bl_pkg")
+    bpy.ops.extensions.package_install_files(
+        filepath=package, repo="user_default", enable_on_install=True
+    )
+    return [one.module for one in bpy.context.preferences.addons if "fabricusd" in one.module]
+
+
+def counts():
+    kinds = ("materials", "node_groups", "images", "objects", "worlds")
+    return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
+
+
+def undo(times=1):
+    for _ in range(times):
+        bpy.ops.ed.undo()
+    return counts()
+
+
+def redo():
+    bpy.ops.ed.redo()
+    return counts()
+
+
+def push(message):
+    bpy.ops.ed.undo_push(message=message)
+
+
+def groups():
+    """Every group and every material as text: nodes, constants, links, textures."""
+    found = {}
+    for one in bpy.data.node_groups:
+        found[f"group {one.name}"] = tree(one)
+    for one in bpy.data.materials:
+        found[f"material {one.name}"] = tree(one.node_tree)
+    return found
+
+
+def tree(one):
+    nodes = [
+        [
+            n.bl_idname,
+            n.name,
+            getattr(n, "operation", ""),
+            picture(n),
+            [constant(i) for i in n.inputs],
+        ]
+        for n in one.nodes
+    ]
+    links = [
+        [k.from_node.name, k.from_socket.name, k.to_node.name, k.to_socket.name] for k in one.links
+    ]
+    return [nodes, sorted(links)]
+
+
+def picture(node):
+    image = getattr(node, "image", None)
+    if image is None:
+        return None
+    name = Path(bpy.path.abspath(image.filepath)).name
+    pixels = list(image.pixels[:64])
+    tiles = [tile.number for tile in image.tiles] if image.source == "TILED" else []
+    return [name, image.colorspace_settings.name, tiles, pixels, list(image.size)]
+
+
+def constant(socket):
+    value = getattr(socket, "default_value", None)
+    return list(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
+
+
+def change(material, **inputs):
+    """Set inputs of a material's group by their names."""
+    nodes = bpy.data.materials[material].node_tree.nodes
+    group = next(n for n in nodes if n.bl_idname == "ShaderNodeGroup")
+    for name, value in inputs.items():
+        group.inputs[name].default_value = value
+
+
+def from_above(picture, cells, towards_light, irradiance, size):
+    """Render a sheet of `cells` x `cells` unit squares from above, in a sun without bounces."""
+    scene = bpy.context.scene
+    for one in bpy.data.objects:
+        one.visible_shadow = False
+    sun = bpy.data.lights.new("Sun", "SUN")
+    sun.energy, sun.angle = irradiance, 0.0
+    lamp = bpy.data.objects.new("Sun", sun)
+    lamp.rotation_euler = Vector(towards_light).to_track_quat("Z", "Y").to_euler()
+    scene.collection.objects.link(lamp)
+    camera = bpy.data.cameras.new("Above")
+    camera.type, camera.ortho_scale = "ORTHO", cells
+    eye = bpy.data.objects.new("Above", camera)
+    eye.matrix_world = Matrix.Translation((0.5 * cells, 0.5 * cells, 10.0))
+    scene.collection.objects.link(eye)
+    scene.camera = eye
+    scene.cycles.max_bounces = 0
+    render(picture, size, 1)
+
+
+def look(picture, size, spp):
+    """Render through the camera that was imported."""
+    scene = bpy.context.scene
+    scene.camera = scene.camera or next(o for o in bpy.data.objects if o.type == "CAMERA")
+    render(picture, size, spp)
+
+
+def render(picture, size, spp):
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.cycles.device, scene.cycles.samples = "CPU", spp
+    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    scene.cycles.sample_clamp_indirect = 0.0
+    scene.cycles.pixel_filter_type = "BOX"
+    scene.render.threads_mode, scene.render.threads = "FIXED", 2
+    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    scene.render.filepath = picture
+    bpy.ops.render.render(write_still=True)
+
+
+main()
