@@ -378,6 +378,22 @@ def test_tangents_meet_at_a_seam_of_tiles_and_turn_with_the_shell_beyond(tmp_pat
 TURN = np.radians(np.array([[10.0, 30.0, 80.0, 100.0], [120.0, 150.0, -20.0, 45.0]]))
 
 
+@pytest.mark.parametrize("kind", GRAPHS)
+@pytest.mark.parametrize("name", SHELLS)
+def test_networks_turn_an_oblique_axis_with_the_shell(made, kind, name):
+    """Fails if the quarter turn goes the other way, or a mirrored shell does not mirror the axis."""
+    frame, graph_of = made.frame(name), GRAPHS[kind]
+    for angle in TURN.ravel():
+        axis = np.array((np.cos(angle), np.sin(angle)))
+        graph = graph_of({**NEUTRAL, "tangent": Value("vector3", (*axis, 0.0))}, True)
+        inputs = graph.node(graph.terminal).inputs
+        source = inputs.get("geometry_tangent", inputs.get("tangent"))
+        rough = value_of(graph, source, frame, Look())
+        smooth = np.array(SHELLS[name][1]) @ axis
+        assert rough[:2] @ smooth == pytest.approx(0.0, abs=1e-6)
+        assert np.linalg.norm(rough) == pytest.approx(1.0)
+
+
 @pytest.fixture(scope="module")
 def oblique():
     """A tile whose axes lie at all angles, so that a wrong sense of rotation shows."""

@@ -43,6 +43,7 @@ CONSTANTS = {
 }
 ALPHA_SMOOTH, ALPHA_ROUGH = (0.4 * 0.8) ** 2, (0.9 * 0.9) ** 2
 
+
 def surface_inputs(kind):
     graph = GRAPHS[kind](CONSTANTS, False)
     world = {
