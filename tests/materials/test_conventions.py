@@ -381,7 +381,7 @@ TURN = np.radians(np.array([[10.0, 30.0, 80.0, 100.0], [120.0, 150.0, -20.0, 45.
 @pytest.mark.parametrize("kind", GRAPHS)
 @pytest.mark.parametrize("name", SHELLS)
 def test_networks_turn_an_oblique_axis_with_the_shell(made, kind, name):
-    """Fails if the quarter turn goes the other way, or a mirrored shell does not mirror the axis."""
+    """Fails if the quarter turn goes the other way, or if a mirrored shell keeps the axis."""
     frame, graph_of = made.frame(name), GRAPHS[kind]
     for angle in TURN.ravel():
         axis = np.array((np.cos(angle), np.sin(angle)))
