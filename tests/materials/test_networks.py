@@ -12,7 +12,7 @@ from fabricusd.materials.bake_folder import BakedLay
 from fabricusd.materials.lobes.known import mixture_of
 from fabricusd.materials.lobes.mixture import MATERIALX
 from fabricusd.materials.lobes.network import lobes
-from fabricusd.materials.networks.graph import Link, Parameter, Texture, Value, unrolled
+from fabricusd.materials.networks.graph import Parameter, Texture, Value, unrolled
 from fabricusd.materials.networks.hair import absorption, hair
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import (
@@ -25,6 +25,7 @@ from fabricusd.materials.networks.surfaces import (
 from fabricusd.materials.targets.mtlx import write_mtlx
 from fabricusd.materials.targets.write_usd import write_material
 from fabricusd.schema import load
+from tests.materials.graphs import alphas, value_of
 
 LOOK = Look(
     smooth_scale=0.8, rough_scale=0.9, base_color_scale=(1.5, 1.0, 0.5), fuzz_weight=0.25,
@@ -42,57 +43,15 @@ CONSTANTS = {
 }
 ALPHA_SMOOTH, ALPHA_ROUGH = (0.4 * 0.8) ** 2, (0.9 * 0.9) ** 2
 
-MATH = {
-    "multiply": np.multiply, "add": np.add, "subtract": np.subtract, "divide": np.divide,
-    "min": np.minimum, "max": np.maximum, "power": np.power,
-}  # fmt: skip
-
-
-def value_of(graph, source, world):
-    """What a network gives with constants for textures; `world` holds the mesh's own vectors."""
-    if isinstance(source, Value):
-        return source.value
-    if isinstance(source, Parameter):
-        return getattr(LOOK, source.name)
-    assert isinstance(source, Link)
-    node = graph.node(source.node)
-    given = {k: value_of(graph, s, world) for k, s in node.inputs.items()}
-    if node.category in MATH:
-        return MATH[node.category](np.asarray(given["in1"]), np.asarray(given["in2"]))
-    if node.category == "clamp":
-        return np.clip(given["in"], given["low"], given["high"])
-    if node.category == "extract":
-        return given["in"][given["index"]]
-    if node.category == "normalize":
-        return given["in"] / np.linalg.norm(given["in"])
-    if node.category == "convert":
-        return (given["in"],) * 3
-    return world[node.category]
-
 
 def surface_inputs(kind):
     graph = GRAPHS[kind](CONSTANTS, False)
     world = {
         "tangent": np.array([1.0, 0, 0]), "bitangent": np.array([0, 1.0, 0]),
-        "normalmap": np.array([0, 0, 1.0]),
+        "normal": np.array([0, 0, 1.0]),
     }  # fmt: skip
     found = graph.node(graph.terminal).inputs
-    return {name: value_of(graph, source, world) for name, source in found.items()}
-
-
-def alphas(kind, given):
-    """(along the tangent, across it) as the model's specification computes them."""
-    if kind == "openpbr":
-        r, a = given["specular_roughness"], given["specular_roughness_anisotropy"]
-        along = r * r * np.sqrt(2.0 / (1.0 + (1.0 - a) ** 2))
-        return along, (1.0 - a) * along
-    if kind == "standard_surface":
-        aspect = np.sqrt(1.0 - given["specular_anisotropy"])
-        square = given["specular_roughness"] ** 2
-        return square / aspect, square * aspect
-    across = given["roughness"] ** 2
-    s = given["anisotropy_strength"] ** 2
-    return across * (1.0 - s) + s, across
+    return {name: value_of(graph, source, world, LOOK) for name, source in found.items()}
 
 
 @pytest.mark.parametrize("kind", GRAPHS)

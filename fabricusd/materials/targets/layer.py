@@ -249,6 +249,19 @@ def _fill(
         material = UsdShade.Material(stage.GetPrimAtPath(scope.AppendChild(recipe.name)))
         for purpose in _purposes(one):
             _bind(stage, prim, material, one, purpose)
+        _show_both_sides(stage, prim)
+
+
+def _show_both_sides(stage: Usd.Stage, prim: Usd.Prim) -> None:
+    """State that cloth has two sides, unless the garment says how many it has.
+
+    By USD's fallback a renderer may leave out the faces that are turned away.
+    """
+    mesh = prim.GetParent() if prim.IsA(UsdGeom.Subset) else prim
+    if not mesh.IsA(UsdGeom.Gprim) or mesh.IsInstanceProxy():
+        return
+    if not UsdGeom.Gprim(mesh).GetDoubleSidedAttr().HasAuthoredValue():
+        UsdGeom.Gprim(stage.OverridePrim(mesh.GetPath())).CreateDoubleSidedAttr(True)
 
 
 def _take_off(stage: Usd.Stage, owner: str, root: Sdf.Path) -> None:

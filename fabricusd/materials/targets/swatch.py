@@ -120,8 +120,9 @@ def pictures(tile: Tile, look: Look) -> dict[str, Picture]:
     rough = np.maximum(np.minimum((read["roughness_across"] * look.rough_scale) ** 2, 1.0), smooth)
     level = 1.0 - smooth / np.maximum(rough, 1e-6)
     turn = np.arctan2(read["tangent"][..., 1:2], read["tangent"][..., :1]) / (2.0 * math.pi)
-    # An axis is the same half a turn on. From 135 degrees on, neither weft nor warp lies at an end.
-    angle = (turn - 0.375) % 0.5 + 0.375
+    # Painter turns an axis clockwise, T cos(angle) - B sin(angle). An axis is the same half a turn
+    # on. From 135 degrees on, neither weft nor warp lies at an end.
+    angle = (-turn - 0.375) % 0.5 + 0.375
     color = np.clip(read["base_color"][..., :3] * np.array(look.base_color_scale), 0.0, 1.0)
     normal = 0.5 * read["normal"][..., :3] + 0.5
     height, _ = relief(tile)
@@ -137,7 +138,7 @@ def pictures(tile: Tile, look: Look) -> dict[str, Picture]:
         "Roughness": Picture(roughness, "its square is the GGX alpha of the smoother direction"),
         "Anisotropy": Picture(level, "1 - smoother alpha / rougher alpha"),
         "AnisotropyAngle": Picture(
-            angle, "direction of the smoother axis over 360 degrees, counter-clockwise from the "
+            angle, "direction of the smoother axis over 360 degrees, clockwise from the "
             "picture's right, from 135 to 315 degrees", 16,
         ),
         "Opacity": Picture(np.clip(read["opacity"], 0.0, 1.0), "share covered by threads"),
@@ -185,12 +186,15 @@ def _told(
         },
         "look": asdict(look),
         "conventions": {
-            "substance": "as the pictures are: alpha = Roughness^2 along the angle, "
+            "substance": "as the pictures are, in Painter's shader "
+            "pbr-metal-rough-anisotropy-angle: alpha = Roughness^2 along the angle, "
             "Roughness^2 / (1 - Anisotropy) across it",
+            "substance_asm": "Painter's asm-metal-rough is rougher along its angle: angle plus 90 "
+            "degrees, level = (Roughness^2 / (1 - Anisotropy) - Roughness^2)^(1/4)",
             "unreal_and_unity": "anisotropy = Anisotropy / (2 - Anisotropy) along a tangent turned "
-            "by the angle plus 90 degrees; roughness = Roughness / sqrt(1 - anisotropy)",
+            "clockwise by the angle plus 90 degrees; roughness = Roughness / sqrt(1 - anisotropy)",
             "gltf": "anisotropyStrength^2 = (Roughness^2 / (1 - Anisotropy) - Roughness^2) / "
-            "(1 - Roughness^2) along the angle plus 90 degrees",
+            "(1 - Roughness^2); anisotropyRotation = 90 degrees minus the angle",
             "normals": "OpenGL: Substance, Unity, Blender, glTF; DirectX: Unreal",
         },
     }  # fmt: skip

@@ -76,7 +76,8 @@ def test_the_numbers_turn_back_into_the_alphas_and_the_axis_of_the_bake(satin):
     assert np.allclose(alpha * (1.0 + a), rough)
     angle = 2 * np.pi * found["AnisotropyAngle"].pixels[..., 0]
     x, y = satin.maps["tangent"][..., 0], satin.maps["tangent"][..., 1]
-    assert np.allclose(np.cos(angle) * y - np.sin(angle) * x, 0.0, atol=1e-6)
+    # Painter turns clockwise.
+    assert np.allclose(np.cos(angle) * y + np.sin(angle) * x, 0.0, atol=1e-6)
     color = satin.maps["base_color"] * look.base_color_scale
     assert np.allclose(found["BaseColor"].pixels, srgb_encode(np.clip(color, 0.0, 1.0)))
 
