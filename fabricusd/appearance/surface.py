@@ -39,9 +39,11 @@ from fabricusd.appearance.law import (
     surface_law,
 )
 from fabricusd.appearance.laws import law_of
+from fabricusd.appearance.layer import layer_of
 from fabricusd.appearance.levels import FAR, LEVELS, THREAD
 from fabricusd.appearance.published.far import far_values
 from fabricusd.appearance.published.levels import POINT_ROWS, point_block, point_values
+from fabricusd.appearance.scattering.models import any_published
 from fabricusd.appearance.shadow.methods import (
     METHODS,
     Shadow,
@@ -215,6 +217,10 @@ def fuzz_of(fabric: Fabric, precision: type[Any]) -> Fuzz | None:
 
 def _diffuse(fabric: Fabric) -> Floats:
     """(2, 3) shares of diffuse light that cloth reflects, and that it transmits as threads do."""
+    if not any_published(fabric):
+        layer = layer_of(fabric)
+        shares = layer.of(np.array([t.albedo for t in fabric.thread_list]))[1]
+        return np.asarray(shares - np.array([[0.0], [layer.gap[1]]]))
     x, w = np.polynomial.legendre.leggauss(6)
     mu, weight = 0.5 * (x + 1.0), 0.5 * w
     phi = (np.arange(12) + 0.5) * (math.pi / 6)

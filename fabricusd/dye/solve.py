@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from fabricusd.dye.fuzz import fuzzed
-from fabricusd.dye.layer import Layer, alone
+from fabricusd.appearance.layer import Layer, alone, layer_of
 from fabricusd.dye.stack import BASIS
-from fabricusd.dye.woven import woven_layer
 from fabricusd.errors import FabricError
-from fabricusd.fabric import BASES, CONSERVING_MODEL, PILE_ANGLE, Fabric, Thread
+from fabricusd.fabric import BASES, CONSERVING_MODEL, Fabric, Thread
 
 Floats = NDArray[np.float64]
 
@@ -77,18 +75,6 @@ def cloth_color(fabric: Fabric, basis: str = BASES[1]) -> Floats:
     """(3,) colour of the cloth of all its threads, linear Rec. 709."""
     albedo = np.array([t.albedo for t in fabric.thread_list])
     return BASIS[basis](layer_of(fabric).of(albedo))
-
-
-def layer_of(fabric: Fabric) -> Layer:
-    """One layer of `fabric`, of which threads of other models count as black, as in its law."""
-    if any(t.curve.steepest > PILE_ANGLE for t in fabric.thread_list):
-        # Tracing pile compiles kernels.
-        from fabricusd.dye.pile import pile_layer
-
-        layer = pile_layer(fabric)
-    else:
-        layer = woven_layer(fabric)
-    return replace(layer, fuzz=fuzzed(fabric))
 
 
 def _layer_of_one(fabric: Fabric, name: str, thread: Thread, known: dict[Thread, Layer]) -> Layer:

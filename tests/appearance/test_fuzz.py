@@ -19,10 +19,10 @@ from fabricusd.appearance.fuzz import (
     optical_depth,
     to_and_fro,
 )
+from fabricusd.appearance.layer import layer_of
 from fabricusd.appearance.plain import white
 from fabricusd.appearance.surface import evaluate, fuzz_of, mean_shadow, sample
 from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.dye.solve import layer_of
 from fabricusd.fabric import Fabric, even
 from fabricusd.schema import load
 

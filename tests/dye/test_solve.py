@@ -11,13 +11,13 @@ import pytest
 from scipy.stats import qmc
 
 from fabricusd.appearance import surface
+from fabricusd.appearance.layer import layer_of
+from fabricusd.appearance.layer.layer import alone
 from fabricusd.bake.bake import bake
 from fabricusd.bake.job import Settings
 from fabricusd.dye import cloth_color, dyed, reached
 from fabricusd.dye.difference import difference
-from fabricusd.dye.layer import alone
 from fabricusd.dye.make import made_of_colors, thread_of
-from fabricusd.dye.solve import layer_of
 from fabricusd.dye.stack import opaque
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric

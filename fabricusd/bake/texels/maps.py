@@ -282,8 +282,9 @@ def tangent(t: Texels) -> NDArray[Any]:
     angle = _principal(t)[2]
     flat = t.along @ np.stack((np.cos(angle), np.sin(angle)))
     flat /= np.maximum(np.linalg.norm(flat, axis=0), 1e-12)
-    # Choose the sign with positive x, so that neighbouring texels can be interpolated.
-    flat *= np.where(flat[0] < -1e-6, -1.0, 1.0)
+    # Neighbouring texels can be interpolated if their signs are alike. Threads waver about the
+    # directions of the sets, so the sign changes at the diagonal between these.
+    flat *= np.where(t.along.sum(axis=1) @ flat < -1e-6, -1.0, 1.0)
     return np.stack((flat[0], flat[1], np.zeros_like(flat[0])), axis=1)
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.layer.fuzz import Fuzzed
 from fabricusd.appearance.scattering.models.conserving import plain_albedo
-from fabricusd.dye.fuzz import Fuzzed
 from fabricusd.fabric import Fabric, Thread
 
 Floats = NDArray[np.float64]

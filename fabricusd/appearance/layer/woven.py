@@ -24,11 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.conserving.by_side import by_side
+from fabricusd.appearance.layer.fuzz import VIEW
+from fabricusd.appearance.layer.layer import Layer, mean_surface, surface_albedo
 from fabricusd.appearance.plain import Share, curve_points, shares, to_thread
 from fabricusd.appearance.scattering.models.conserving import plain_surface
 from fabricusd.appearance.scattering.plain_lobes import angles, longitudinal
-from fabricusd.dye.fuzz import VIEW
-from fabricusd.dye.layer import Layer, mean_surface, surface_albedo
 from fabricusd.fabric import CONSERVING_MODEL, Fabric, Thread
 
 Floats = NDArray[np.float64]

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.conserving.facets import SURFACE, VOLUME, white_facets
 from fabricusd.appearance.conserving.grid import entry_angles, mean_share
+from fabricusd.appearance.layer.fuzz import VIEW
+from fabricusd.appearance.layer.layer import Layer, mean_surface
 from fabricusd.appearance.weave.coverage import coverage
-from fabricusd.dye.fuzz import VIEW
-from fabricusd.dye.layer import Layer, mean_surface
 from fabricusd.fabric import CONSERVING_MODEL, Fabric
 
 Floats = NDArray[np.float64]
