@@ -20,11 +20,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="file or folder to write (default: fabricusd_looks.zip)",
     )  # fmt: skip
     parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
+    parser.add_argument(
+        "-n", "--dry-run", action="store_true", help="check the arguments, but write nothing"
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Write the add-on, and print its path."""
-    from fabricusd.materials.targets.blender.pack import write_addon
+    from fabricusd.materials.targets.blender.pack import check_target, write_addon
 
-    print(write_addon(Path(options.output).expanduser(), clobber=not options.no_clobber))
+    path, clobber = Path(options.output).expanduser(), not options.no_clobber
+    if options.dry_run:
+        check_target(path, clobber=clobber)
+    else:
+        print(write_addon(path, clobber=clobber))
     return 0

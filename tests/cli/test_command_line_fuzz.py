@@ -44,6 +44,7 @@ SAFE = {
     "bake": ["--dry-run"],
     "material": ["--dry-run"],
     "new": ["--dry-run"],
+    "blender-addon": ["--dry-run"],
     "chart": ["--list-panels"],
     "demo": ["--output", "x.obj/never"],
 }

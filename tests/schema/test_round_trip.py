@@ -72,7 +72,7 @@ OTHER_VALUES = {
     # Lengths come first: without them, what varies along the thread is refused.
     "thread:unevenness:length": 5.0, "thread:unevenness:cv": 0.2, "thread:unevenness:count": 0.1,
     "thread:unevenness:shade": 0.05, "thread:slub:spacing": 60.0, "thread:slub:length": 12.0,
-    "thread:slub:amount": 0.5, "thread:plies": 2, "thread:twist": -450.0,
+    "thread:slub:amount": 0.5, "thread:plies": 2, "thread:hairiness": 2.5, "thread:twist": -450.0,
     "fabric:unevenness:seed": 3,
 }  # fmt: skip
 

@@ -30,18 +30,30 @@ def write_addon(path: str | os.PathLike[str], *, clobber: bool = True) -> Path:
     Raises FabricError if the path holds anything else, and if it cannot be written.
     """
     path = Path(path)
-    if not path.parent.is_dir():
-        raise FabricError(str(path), f"is in '{path.parent}', which is not a folder")
-    if path.suffix.lower() == ".zip":
+    check_target(path, clobber=clobber)
+    if path.suffix:
         with whole_file(path, clobber=clobber) as temporary:
             _write_zip(temporary)
-    elif path.suffix:
+    else:
+        _write_folder(path)
+    return path
+
+
+def check_target(path: Path, *, clobber: bool = True) -> None:
+    """Raise FabricError where `write_addon` would refuse to write."""
+    if not path.parent.is_dir():
+        raise FabricError(str(path), f"is in '{path.parent}', which is not a folder")
+    is_zip = path.suffix.lower() == ".zip"
+    if path.suffix and not is_zip:
         raise FabricError(
             str(path), f"has the suffix '{path.suffix}'; it must be .zip, or a folder without one"
         )
-    else:
-        _write_folder(path, clobber)
-    return path
+    if is_zip or not (path.exists() or path.is_symlink()):
+        return
+    if not path.is_dir() or (any(path.iterdir()) and not (path / MANIFEST).is_file()):
+        raise FabricError(str(path), "holds something else; it must be new or an add-on")
+    if not clobber and any(path.iterdir()):
+        raise FabricError(str(path), "exists; with --no-clobber, give the name of a new folder")
 
 
 def _files() -> list[Path]:
@@ -57,13 +69,8 @@ def _write_zip(path: Path) -> None:
             package.writestr(entry, file.read_bytes(), zipfile.ZIP_DEFLATED)
 
 
-def _write_folder(path: Path, clobber: bool) -> None:
+def _write_folder(path: Path) -> None:
     """Write a folder beside `path` and put it in its place."""
-    if path.exists() or path.is_symlink():
-        if not path.is_dir() or (any(path.iterdir()) and not (path / MANIFEST).is_file()):
-            raise FabricError(str(path), "holds something else; it must be new or an add-on")
-        if not clobber and any(path.iterdir()):
-            raise FabricError(str(path), "exists; with --no-clobber, give the name of a new folder")
     try:
         with tempfile.TemporaryDirectory(dir=path.parent) as beside:
             made = Path(beside) / NAME
