@@ -342,3 +342,18 @@ def test_a_bake_of_uneven_threads_keeps_the_colour_of_even_ones():
         )
         for key in ("albedo", "opacity"):
             assert uneven[key][-1][0, 0] == pytest.approx(regular[key][-1][0, 0], rel=0.015), key
+
+
+@pytest.mark.parametrize("rotation", [0.0, 30.0])
+@pytest.mark.parametrize("name", ["polyester_satin_charmeuse", "silk_shot"])
+def test_neighbouring_tangents_do_not_differ_in_sign_alone(name, rotation):
+    """Or filtering them would cancel them."""
+    maps, _ = baked(load(name), threads=16.0, level="thread", rotation=np.radians(rotation))
+    tangent = maps["tangent"][0][..., :2].astype(np.float64)
+    for axis in (0, 1):
+        beside = (tangent * np.roll(tangent, 1, axis=axis)).sum(axis=-1)
+        assert (beside < -0.9).mean() < 0.01
+    # The twin: signs by the first coordinate alone.
+    if name == "polyester_satin_charmeuse" and rotation == 0:
+        other = tangent * np.where(tangent[..., :1] < -1e-6, -1.0, 1.0)
+        assert ((other * np.roll(other, 1, axis=1)).sum(axis=-1) < -0.9).mean() > 0.02
