@@ -40,8 +40,9 @@ TEXELS, MEANS = 256, 128
 INSIDE = 12
 """Samples along a texel's side from which its reference mean is computed."""
 
-MARGIN = 1.5
-"""Ratio of the stated bound to the largest measured mean: other pairs see other lobes."""
+MARGIN = 2.0
+"""Ratio of the stated bound to the largest measured mean: other pairs see other lobes. Of pairs held
+back the worst was 1.77 of it: shot silk at 1.5 texels a thread."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -51,7 +51,14 @@ def test_what_is_too_dark_is_as_bright_as_before(linen):
     assert bound.terms @ off == pytest.approx(np.log(2.0), abs=1e-6)
 
 
-@pytest.mark.parametrize("name", ["linen_plain", "polyester_satin_charmeuse", "velvet"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "linen_plain",
+        pytest.param("polyester_satin_charmeuse", marks=pytest.mark.exhaustive),
+        pytest.param("velvet", marks=pytest.mark.exhaustive),
+    ],
+)
 def test_the_table_is_nowhere_brighter_than_the_cloth(name):
     judge = Judge(load(name))
     for form in (CYCLES, MATERIALX):
