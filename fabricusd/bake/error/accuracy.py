@@ -41,8 +41,8 @@ INSIDE = 12
 """Samples along a texel's side from which its reference mean is computed."""
 
 MARGIN = 2.0
-"""Ratio of the stated bound to the largest measured mean: other pairs see other lobes. Of pairs held
-back the worst was 1.77 of it: shot silk at 1.5 texels a thread."""
+"""Ratio of the stated bound to the largest measured mean: other pairs see other lobes. Of pairs
+held back the worst was 1.77 of it, for shot silk at 1.5 texels a thread."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,9 +145,9 @@ def swatch_error(
     return swatch_errors(sheet, (NEEDED,), level=level, pairs=pairs, seed=seed)[0]
 
 
-def bound_of(worst: float) -> float:
+def bound_of(worst: float, margin: float = MARGIN) -> float:
     """Return the stated bound, given the largest mean delta E 2000 of any measured pair."""
-    return MARGIN * worst
+    return margin * worst
 
 
 def swatch_errors(
