@@ -24,7 +24,6 @@ from fabricusd.fabric import Fabric
 from fabricusd.geometry.cloth import Cloth, tubes
 from fabricusd.geometry.mesh import SIDES
 from fabricusd.geometry.paths import (
-    BLOCK,
     USUAL,
     Paths,
     Reflectance,
@@ -117,15 +116,7 @@ def reflectance(
     viewers, lights = np.broadcast_arrays(directions("wo", wo), directions("wi", wi))
     cloth = hairy.cloth
     tracer = _Tracer(hairy, bounces_of(cloth, bounces), np.random.default_rng(seed))
-    each = max(1, BLOCK // count)
-    found = np.concatenate(
-        [
-            tracer.lit(viewers[k : k + each], lights[k : k + each], count)
-            for k in range(0, len(viewers), each)
-        ]
-    )
-    value, error = mean_of(found)
-    return Reflectance(value=value, error=error, rays=tracer.rays)
+    return tracer.reflectance(viewers, lights, count)
 
 
 def white_sky(hairy: Hairy, wo: ArrayLike, *, count: int = 1 << 14, seed: int = 0) -> Floats:
@@ -133,11 +124,7 @@ def white_sky(hairy: Hairy, wo: ArrayLike, *, count: int = 1 << 14, seed: int = 
     with what meets no thread."""
     viewers = directions("wo", wo)
     tracer = _Tracer(hairy, bounces_of(hairy.cloth, None), np.random.default_rng(seed))
-    each = max(1, BLOCK // count)
-    found = np.concatenate(
-        [tracer.escaped(viewers[k : k + each], None, count) for k in range(0, len(viewers), each)]
-    )
-    ways = mean_of(found)[0]
+    ways = mean_of(tracer.by_way(viewers, None, count))[0]
     return np.stack((ways[:, 0], ways[:, 1] + ways[:, 6]), axis=1)
 
 

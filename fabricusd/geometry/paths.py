@@ -134,15 +134,7 @@ def reflectance(
     viewers, lights = np.broadcast_arrays(directions("wo", wo), directions("wi", wi))
     _check_side(cloth, viewers)
     tracer = Tracer(cloth, assumptions, bounces_of(cloth, bounces), np.random.default_rng(seed))
-    each = max(1, BLOCK // count)
-    found = np.concatenate(
-        [
-            tracer.lit(viewers[k : k + each], lights[k : k + each], count)
-            for k in range(0, len(viewers), each)
-        ]
-    )
-    value, error = mean_of(found)
-    return Reflectance(value=value, error=error, rays=tracer.rays)
+    return tracer.reflectance(viewers, lights, count)
 
 
 def albedo(
@@ -163,10 +155,7 @@ def albedo(
     viewers = directions("wo", wo)
     _check_side(cloth, viewers)
     tracer = Tracer(cloth, assumptions, bounces_of(cloth, bounces), np.random.default_rng(seed))
-    each = max(1, BLOCK // count)
-    found = np.concatenate(
-        [tracer.escaped(viewers[k : k + each], sky, count) for k in range(0, len(viewers), each)]
-    )
+    found = tracer.by_way(viewers, sky, count)
     mean, _ = mean_of(found)
     _, error = mean_of(found[:, :, 0] + found[:, :, 1])
     return Shares(
@@ -271,6 +260,24 @@ class Tracer:
         by_width = assumptions.by_width
         self.by_width = cloth.conserving if by_width is None else by_width
         self.rays = 0
+
+    def reflectance(self, viewers: Floats, lights: Floats, count: int) -> Reflectance:
+        """Of pairs of directions, (n, 3) each, a block of paths after another."""
+        each = max(1, BLOCK // count)
+        found = np.concatenate(
+            [
+                self.lit(viewers[k : k + each], lights[k : k + each], count)
+                for k in range(0, len(viewers), each)
+            ]
+        )
+        value, error = mean_of(found)
+        return Reflectance(value=value, error=error, rays=self.rays)
+
+    def by_way(self, viewers: Floats, sky: Sky | None, count: int) -> Floats:
+        """`escaped`, a block of paths after another."""
+        each = max(1, BLOCK // count)
+        blocks = range(0, len(viewers), each)
+        return np.concatenate([self.escaped(viewers[k : k + each], sky, count) for k in blocks])
 
     def lit(self, viewers: Floats, lights: Floats, count: int) -> Floats:
         """(n, BATCHES, 3) radiance towards each viewer from each light."""

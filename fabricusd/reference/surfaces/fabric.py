@@ -150,6 +150,7 @@ class _Side:
         self.yarn = compile_yarn(fabric, back_of=front) if fabric.is_uneven else None
         self.types, self.hairy = len(fabric.threads), optical_depth(fabric) > 0.0
         self._law: SurfaceLaw | None = None
+        self._fuzz: Fuzz | None = None
         self._near: tuple[CompiledFabric, Shadow] | None = None
 
     @property
@@ -164,10 +165,10 @@ class _Side:
     @property
     def fuzz(self) -> Fuzz | None:
         """The fuzz over this side, made like the law; None where no thread is hairy."""
-        if not self.hairy:
-            return None
-        with _ONE_AT_A_TIME:
-            return fuzz_of(self.fabric, np.float32)
+        if self.hairy and self._fuzz is None:
+            with _ONE_AT_A_TIME:
+                self._fuzz = fuzz_of(self.fabric, np.float32)
+        return self._fuzz
 
     @property
     def near(self) -> tuple[CompiledFabric, Shadow]:
