@@ -14,6 +14,7 @@ import numpy as np
 from fabricusd.appearance import surface
 from fabricusd.appearance.albedo import FINE, albedo_by_view, safe_albedo
 from fabricusd.fabric import Fabric
+from fabricusd.geometry.nearest import published
 from fabricusd.schema import load, published_names
 
 HERE = Path(__file__).resolve().parent
@@ -21,15 +22,27 @@ THETA = (0.0, 30.0, 60.0, 75.0, 85.0, 89.0, 89.9)
 AZIMUTHS = 8
 SAMPLES = 4096
 
+TABLES = {
+    "The presets": "",
+    "microcylinder": "microcylinder",
+    "thesis": "thesis",
+    "conserving": "conserving",
+}
+"""Title of each table -> the model of every thread in it; "" keeps the preset's own."""
+PRINTED = ("microcylinder", "thesis")
+"""Tables of the published numbers."""
+
 HEAD = """# Directional albedo and safe albedos
 
 `python docs/make_albedo.py` makes this page; `make docs` runs it.
 
 The tables give the share of a white sky's light that reaches the viewer, by the angle between view
-and normal. They show the brightest channel, at the worst of 16 azimuths (8 for `conserving`). The
-published models do not conserve energy. *Safe A* is the largest albedo of white threads at which
-the cloth reflects no more light than arrives, in any view. `fabricusd check` warns where a fabric's
-own colours reflect more than that (`AlbedoIsSafe`).
+and normal. They show the brightest channel, at the worst of 16 azimuths (8 for `conserving`).
+The first table is of the presets as they are, each with its own surface law and shadow. The next
+two are of the published numbers under the published law, `masked`, which do not conserve energy.
+*Safe A* is the largest albedo of white threads at which the cloth reflects no more light than
+arrives, in any view. `fabricusd check` warns where a fabric's own colours reflect more than that
+(`AlbedoIsSafe`).
 
 For `conserving`, the value is reflection plus transmission, including multiple scattering, from
 {samples} samples per view. An `A` of this model is an albedo, and any value from 0 to 1 is safe.
@@ -68,11 +81,13 @@ def main() -> None:
     """Write the page."""
     lines = [HEAD.format(samples=SAMPLES)]
     columns = " | ".join(f"{t:g}°" for t in THETA)
-    for model in ("microcylinder", "thesis", "conserving"):
-        lines += [f"## {model}", "", f"| preset | {columns} | safe A |"]
+    for title, model in TABLES.items():
+        lines += [f"## {title}", "", f"| preset | {columns} | safe A |"]
         lines += ["|---" * (len(THETA) + 2) + "|"]
         for name in published_names():
-            fabric = uniform_model(load(name), model)
+            fabric = published(name) if title in PRINTED else load(name)
+            if model:
+                fabric = uniform_model(fabric, model)
             if model == "conserving":
                 lines.append(row(name, conserving(fabric), "1"))
                 continue

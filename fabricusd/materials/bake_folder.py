@@ -43,6 +43,7 @@ class MapSet:
     prims : paths in the scene that was baked
     own_uv : False if the textures do not use the scene's own UVs
     udim : whether the textures are UDIM tiles
+    spanned : texels of the bake per side of a texel of the maps that shape reflections
     """
 
     folder: Path
@@ -56,6 +57,7 @@ class MapSet:
     udim: bool
     error: dict[str, float]
     fingerprint: str
+    spanned: int = 1
 
     def pattern(self, texture: str) -> Path | None:
         """Return a map's file, with `<UDIM>` for the tile's number; None if the map is missing."""

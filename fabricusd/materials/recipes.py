@@ -14,6 +14,7 @@ from fabricusd.images.files import read_mip_level, write_png
 from fabricusd.materials.bake_folder import BakedLay, BakeFolder, MapSet
 from fabricusd.materials.fit.fit import Fitted, bounds_met, thread_factors, with_threads
 from fabricusd.materials.fit.keep import kept_fit, kept_fit_threads
+from fabricusd.materials.fit.spanning import level_of, write_spanning_maps
 from fabricusd.materials.fit.texels import draw_texels, mean_texel
 from fabricusd.materials.fit.thread_maps import COLUMNS, Factors, write_thread_maps
 from fabricusd.materials.lobes.fit import COUNT
@@ -111,10 +112,11 @@ def recipes(
     found: dict[tuple[str, int, str], MaterialRecipe] = {}
     documents = []
     for maps in folder.garments:
-        found_looks, fitted = _garment_looks(maps, path, settings, made, progress)
-        textures = texture_inputs(maps, path, made)
-        of_threads = textures if fitted is maps else texture_inputs(fitted, path, made)
+        found_looks, seen, fitted = _garment_looks(maps, path, settings, made, progress)
         for number, lay in enumerate(maps.lays):
+            textures = texture_inputs(seen[number], path, made)
+            takes_threads = fitted is not maps and seen[number] is maps
+            of_threads = texture_inputs(fitted, path, made) if takes_threads else textures
             one = maps.name if len(maps.lays) == 1 else f"{maps.name}_{number}"
             name = prim_name(one, ascii_only=True)
             looks = found_looks[number]
@@ -244,8 +246,9 @@ def maps_folder(path: Path) -> Path:
 def _coded_normals(maps: MapSet, path: Path, made: Written) -> Path:
     """Write normals as 16-bit PNG files, mapped to [0, 1] as readers of normal maps expect."""
     folder = maps_folder(path)
+    name = "normal" if maps.spanned == 1 else f"normal.mean{maps.spanned}"
     for number, source in maps.textures["normal"].items():
-        target = folder / f"{maps.name}.normal.{number}.png"
+        target = folder / f"{maps.name}.{name}.{number}.png"
         if target in made.files:
             continue
         codes = np.clip(0.5 * read_mip_level(source) + 0.5, 0.0, 1.0)
@@ -253,7 +256,7 @@ def _coded_normals(maps: MapSet, path: Path, made: Written) -> Path:
         codes[np.all(codes == 0.5, axis=-1)] = (0.5, 0.5, 1.0)
         write_png(target, np.rint(codes * 65535).astype(np.uint16), color_space="raw")
         made.files.append(target)
-    return folder / f"{maps.name}.normal.{'<UDIM>' if maps.udim else number}.png"
+    return folder / f"{maps.name}.{name}.{'<UDIM>' if maps.udim else number}.png"
 
 
 def mean_inputs(maps: MapSet, number: int) -> dict[str, Value]:
@@ -271,22 +274,29 @@ def mean_inputs(maps: MapSet, number: int) -> dict[str, Value]:
 
 def _garment_looks(
     maps: MapSet, path: Path, settings: Settings, made: Written, progress: Progress | None
-) -> tuple[list[dict[str, Look]], MapSet]:
-    """Return the looks of each lay, and the maps for all surfaces except UsdPreviewSurface.
+) -> tuple[list[dict[str, Look]], list[MapSet], MapSet]:
+    """Return the looks and the maps of each lay, and the maps that include each thread's own fit.
 
-    The maps are those of the bake; if texels resolve threads, they include each thread's own fit.
+    Where texels resolve threads, all surfaces except UsdPreviewSurface take the latter. Where they
+    do not, the maps that shape reflections are those of `spanning`.
     """
-    looks, factors = [], {}
-    for number in range(len(maps.lays)):
-        of_lay, of_threads = _looks(maps, number, settings, made, progress)
+    looks, seen, factors = [], [], {}
+    means: dict[int, MapSet] = {0: maps}
+    for number, lay in enumerate(maps.lays):
+        level = level_of(maps, lay)
+        if level not in means:
+            means[level], files = write_spanning_maps(maps, level, maps_folder(path))
+            made.files += files
+        seen.append(means[level])
+        of_lay, of_threads = _looks(means[level], number, settings, made, progress)
         looks.append(of_lay)
         if of_threads:
             factors[number] = of_threads
     if not factors:
-        return looks, maps
+        return looks, seen, maps
     fitted = write_thread_maps(maps, factors, maps_folder(path))
     made.files += [fitted.textures[name][t] for name in COLUMNS for t in fitted.textures[name]]
-    return looks, fitted
+    return looks, seen, fitted
 
 
 def _looks(

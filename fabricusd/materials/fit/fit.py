@@ -22,6 +22,7 @@ from fabricusd.appearance.weave.lookup import NO_THREAD
 from fabricusd.fabric import Fabric
 from fabricusd.materials.fit.forward import forward, frames_of
 from fabricusd.materials.fit.judge import Judge, albedo, direction_pairs
+from fabricusd.materials.fit.models import ROUGH_DIFFUSE
 from fabricusd.materials.fit.target import Target, TexelSample, target_of
 from fabricusd.materials.fit.through import fit_through
 from fabricusd.materials.networks.look import Look
@@ -248,13 +249,19 @@ def _free(kind: str) -> tuple[_Free, ...]:
     )
     if kind == "preview":
         return common
-    return (
+    found: tuple[_Free, ...] = (
         *common,
         _Free("rough_scale", (0.05, 3.0)),
         _Free("specular_tint", (0.0, 1.0), 3),
         _Free("fuzz_weight", (0.0, 1.0)),
         _Free("fuzz_roughness", (0.05, 1.0)),
     )
+    if kind != "u3m":
+        # The sheen of U3M has the hue of the base.
+        found = (*found, _Free("fuzz_color", (0.0, 1.0), 3))
+    if kind in ROUGH_DIFFUSE:
+        found = (*found, _Free("diffuse_roughness", (0.0, 1.0)))
+    return found
 
 
 def bounds_met(kind: str, look: Look) -> list[str]:

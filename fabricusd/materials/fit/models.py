@@ -22,9 +22,23 @@ Floats = NDArray[np.float64]
 SMALLEST = 1e-6
 """Lower bound of cosines and alphas, MaterialX's M_FLOAT_EPS."""
 
-KINDS = ("openpbr", "standard_surface", "gltf_pbr", "preview", "principled")
+KINDS = ("openpbr", "standard_surface", "gltf_pbr", "preview", "principled", "u3m")
 """Surfaces that can be evaluated. `preview` is UsdPreviewSurface in the metallic workflow with
-metallic 0. `principled` is Blender's Principled BSDF, which differs from OpenPBR in its tint."""
+metallic 0. `principled` is Blender's Principled BSDF, which differs from OpenPBR in its tint. `u3m`
+is the Principled BSDF with what U3M can state of it."""
+
+ROUGH_DIFFUSE = ("openpbr", "standard_surface", "principled")
+"""The surfaces whose diffuse layer has a roughness."""
+
+COMPENSATED = ("openpbr", "principled")
+"""Those whose rough diffuse layer loses no energy."""
+
+
+DISNEY = ("principled", "u3m")
+"""Those whose tint colours normal incidence only, below a dielectric's reflectance."""
+
+ZELTNER = ("openpbr", *DISNEY)
+"""Those whose fuzz is that of [Zeltner2022]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +48,7 @@ class Surface:
     base : (..., 3); ior : (...)
     alpha_rough, alpha_smooth : (...) GGX widths along x and y
     tint : (..., 3) factor on the specular reflection
+    diffuse_roughness : (...) of the layer below, from 0 (Lambert) to 1; see ROUGH_DIFFUSE
     fuzz_weight, fuzz_roughness : (...); fuzz_color : (..., 3)
     """
 
@@ -42,6 +57,7 @@ class Surface:
     alpha_rough: Floats
     alpha_smooth: Floats
     tint: Floats
+    diffuse_roughness: Floats
     fuzz_weight: Floats
     fuzz_color: Floats
     fuzz_roughness: Floats
@@ -52,7 +68,7 @@ def evaluate(kind: str, s: Surface, wi: Floats, wo: Floats) -> Floats:
     above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
     cos_i = np.clip(wi[..., 2], SMALLEST, 1.0)
     cos_o = np.clip(wo[..., 2], SMALLEST, 1.0)
-    diffuse = s.base * (cos_i / np.pi)[..., None]
+    diffuse = diffuse_value(kind, s, wi, wo, cos_i, cos_o)
     spec, under_spec = specular(kind, s, wi, wo, cos_i, cos_o)
     if kind == "preview":
         out = spec + under_spec * diffuse
@@ -60,12 +76,50 @@ def evaluate(kind: str, s: Surface, wi: Floats, wo: Floats) -> Floats:
         fuzz, under_fuzz = conty_kulla(s, s.fuzz_roughness, wi, wo, cos_i, cos_o)
         out = spec + under_spec * (fuzz + under_fuzz[..., None] * diffuse)
     else:
-        if kind in ("openpbr", "principled"):
+        if kind in ZELTNER:
             fuzz, under_fuzz = zeltner(s, wi, wo, cos_o)
         else:
             fuzz, under_fuzz = conty_kulla(s, s.fuzz_roughness**2, wi, wo, cos_i, cos_o)
         out = fuzz + under_fuzz[..., None] * (spec + under_spec * diffuse)
     return np.where(above[..., None], out, 0.0)
+
+
+def diffuse_value(
+    kind: str, s: Surface, wi: Floats, wo: Floats, cos_i: Floats, cos_o: Floats
+) -> Floats:
+    """(..., 3) diffuse reflection: Lambert's, or that of Oren and Nayar where the layer is rough.
+
+    OpenPBR and Cycles have the form of Fujii with what it loses given back [Portsmouth2025];
+    Standard Surface has the qualitative form of [Oren1994], which darkens.
+    """
+    lambert = s.base * (cos_i / np.pi)[..., None]
+    if kind not in ROUGH_DIFFUSE:
+        return lambert
+    sigma = s.diffuse_roughness
+    off = np.sum(wi * wo, axis=-1) - cos_i * cos_o
+    if kind not in COMPENSATED:
+        square = sigma * sigma
+        rise = 0.45 * square / (square + 0.09) * np.maximum(off, 0.0) / np.maximum(cos_i, cos_o)
+        return np.asarray(lambert * (1.0 - 0.5 * square / (square + 0.33) + rise)[..., None])
+    off = np.where(off > 0.0, off / np.maximum(cos_i, cos_o), off)
+    level = 1.0 / (1.0 + (0.5 - 2.0 / (3.0 * np.pi)) * sigma)
+    once = level * (1.0 + sigma * off)
+    mean = level * (1.0 + (2.0 / 3.0 - 28.0 / (15.0 * np.pi)) * sigma)
+    lost = np.maximum(1.0 - mean, SMALLEST)
+    often = (
+        np.maximum(1.0 - _fujii_albedo(level, sigma, cos_i), SMALLEST)
+        * np.maximum(1.0 - _fujii_albedo(level, sigma, cos_o), SMALLEST)
+        / lost
+    )
+    again = s.base * (mean[..., None] / (1.0 - s.base * lost[..., None]))
+    return np.asarray(lambert * (once[..., None] + again * often[..., None]))
+
+
+def _fujii_albedo(level: Floats, sigma: Floats, c: Floats) -> Floats:
+    """(...) directional albedo at cosine c of Fujii's form, scattering once."""
+    sine = np.sqrt(np.maximum(1.0 - c * c, 0.0))
+    g = sine * (np.arccos(c) - sine * c) + 2.0 * ((sine / c) * (1.0 - sine**3) - sine) / 3.0
+    return np.asarray(level * (1.0 + sigma * g / np.pi))
 
 
 def transmitted(kind: str, s: Surface, through: Floats, wi: Floats, wo: Floats) -> Floats:
@@ -79,7 +133,7 @@ def transmitted(kind: str, s: Surface, through: Floats, wi: Floats, wo: Floats) 
     # What the layers leave depends on the view alone.
     above = wi * np.array((1.0, 1.0, -1.0))
     _, left = specular(kind, s, above, wo, cos_i, cos_o)
-    if kind in ("openpbr", "principled"):
+    if kind in ZELTNER:
         left = left * zeltner(s, above, wo, cos_o)[1][..., None]
     elif kind != "preview":
         rough = s.fuzz_roughness if kind == "standard_surface" else s.fuzz_roughness**2
@@ -108,7 +162,7 @@ def specular(
     whole = ggx_albedo(cos_o, mean, 1.0, 1.0)[..., None]
     gain = 1.0 + fresnel * (1.0 - whole) / whole
     albedo = ggx_albedo(cos_o[..., None], mean[..., None], f0, 1.0) * gain
-    reduce = np.max if kind == "principled" else np.mean
+    reduce = np.max if kind in DISNEY else np.mean
     albedo = reduce(albedo, axis=-1, keepdims=True)
     value = fresnel * gain * (d * g / (4.0 * cos_o))[..., None]
     return value * tint, 1.0 - albedo
@@ -120,7 +174,7 @@ def _fresnel(kind: str, s: Surface, cos_h: Floats) -> tuple[Floats, Floats, Floa
     f0 = ((ior - 1.0) / (ior + 1.0)) ** 2
     if kind in ("openpbr", "standard_surface"):
         return f0, dielectric_fresnel(c, ior), s.tint
-    if kind == "principled":
+    if kind in DISNEY:
         # The tint colours normal incidence only; beyond, reflectance rises as a dielectric's does.
         rise = (dielectric_fresnel(c, ior) - f0) / np.maximum(1.0 - f0, SMALLEST)
         tinted = f0 * s.tint

@@ -32,6 +32,9 @@ def draw_texels(maps: MapSet, number: int, lay: BakedLay) -> TexelSample | None:
     tile = next(iter(maps.textures["base_color"]))
     optional = tuple(name for name in OPTIONAL if name in maps.textures)
     read = {name: read_mip_level(maps.textures[name][tile]) for name in (*NEEDED, *optional)}
+    shape = read["base_color"].shape[:2]
+    # Maps that shape reflections may be coarser, see `spanning`.
+    read = {name: spread(pixels, shape) for name, pixels in read.items()}
     if "lay" in maps.textures:
         mine = read_mip_level(maps.textures["lay"][tile])[..., 0] == number
     else:
@@ -131,9 +134,18 @@ def mean_texel(maps: MapSet, number: int) -> dict[str, tuple[float, ...]]:
             continue
         pixels = read_mip_level(maps.textures[name][tile])
         if mine is not None and mine.any():
-            pixels = pixels[mine][None]
+            pixels = spread(pixels, mine.shape)[mine][None]
         mean = pixels.mean(axis=(0, 1), dtype=np.float64)
         if kind == "vector3":
             mean /= max(float(np.linalg.norm(mean)), 1e-9)
         found[name] = tuple(map(float, mean))
     return found
+
+
+def spread(pixels: NDArray[np.float32], shape: tuple[int, int]) -> NDArray[np.float32]:
+    """(h, w, c) pixels at the size of a finer map, each repeated."""
+    if pixels.shape[:2] == shape:
+        return pixels
+    rows = np.arange(shape[0]) * pixels.shape[0] // shape[0]
+    columns = np.arange(shape[1]) * pixels.shape[1] // shape[1]
+    return np.asarray(pixels[rows[:, None], columns])

@@ -80,7 +80,7 @@ def write_u3m(
     if progress:
         progress(f"baking the swatch of {fabric.name}")
     tile = baked_tile(fabric, resolution=resolution)
-    look = tile_look(tile, "principled", fitted=fitted, progress=progress)
+    look = tile_look(tile, "u3m", fitted=fitted, progress=progress)
     images, depth = pictures(tile, look)
     size = (1e3 * tile.size[0], 1e3 * tile.size[1])
     written = []

@@ -17,7 +17,10 @@ from pxr import Usd, UsdGeom, UsdShade
 from fabricusd.errors import FabricError
 from fabricusd.files import require_writable, whole_file
 from fabricusd.images.files import read_mip_level, shape_of
-from fabricusd.materials.bake_folder import MapSet
+from fabricusd.materials.bake_folder import BakedLay, MapSet
+from fabricusd.materials.fit.spanning import lobe_level
+from fabricusd.materials.networks.graph import Texture
+from fabricusd.materials.networks.surfaces import Inputs
 from fabricusd.materials.targets import Job
 from fabricusd.materials.targets.gltf.corners import (
     Corners,
@@ -28,7 +31,7 @@ from fabricusd.materials.targets.gltf.corners import (
     vertices,
 )
 from fabricusd.materials.targets.gltf.document import Document, require_pygltflib
-from fabricusd.materials.targets.gltf.layers import alpha_mode, layers_of, lobe_level
+from fabricusd.materials.targets.gltf.layers import alpha_mode, layers_of, of_tile
 from fabricusd.materials.targets.gltf.material import cloth, plain
 from fabricusd.materials.targets.layer import VARIANT_SET
 from fabricusd.scene.scene import PreviewSurface, Scene
@@ -141,7 +144,7 @@ class _Maker:
             name = recipe.name if not maps.udim else f"{recipe.name}_{tile}"
             look = recipe.looks["gltf_pbr"]
             normals = maps.textures.get("normal", {}).get(tile)
-            level = _lobe_level(maps, lay, tile)
+            level = _lobe_level(recipe.inputs, maps.lays[lay], tile)
             layers = layers_of(recipe.inputs, look, tile, normals=normals, level=level)
             worn = _worn_texels(maps, lay, tile, layers.cover)
             mode = alpha_mode(layers.cover[worn], opaque=recipe.opaque)
@@ -174,9 +177,12 @@ class _Maker:
         return self._off[key]
 
 
-def _lobe_level(maps: MapSet, lay: int, tile: int) -> int:
-    file = maps.textures.get("roughness_along", {}).get(tile)
-    return 0 if file is None else lobe_level(maps.lays[lay].matrix, shape_of(file)[1])
+def _lobe_level(inputs: Inputs, lay: BakedLay, tile: int) -> int:
+    """The level of a look's own maps; 0 where the look has taken it already."""
+    source = inputs["roughness_along"]
+    if not isinstance(source, Texture):
+        return 0
+    return lobe_level(lay.matrix, shape_of(of_tile(source, tile))[1])
 
 
 def _worn_texels(maps: MapSet, lay: int, tile: int, cover: NDArray[Any]) -> NDArray[np.bool_]:

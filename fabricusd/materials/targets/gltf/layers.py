@@ -6,7 +6,6 @@ it `roughness^2`. The bake's `tangent` is the smoother one, so the direction is 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,12 +23,6 @@ Floats = NDArray[np.floating[Any]]
 
 MASK_ERROR = 0.02
 """Largest error of the mean cover for which gaps are cut out by MASK, which needs no sorting."""
-
-RESOLVED = 4.0
-"""Texels per thread from which lobes are those of single threads."""
-
-SPANNED = 4.0
-"""Threads that a texel of the lobes spans at least, where threads are not resolved."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,7 +53,7 @@ def layers_of(
     """Read the maps of one UDIM tile, and apply the factors of the look.
 
     normals : the baked normals (not coded), which have the levels that the coded ones lack
-    level : mip level of the roughness, the direction and the normals, see `lobe_level`
+    level : mip level of the roughness, the direction and the normals, see `fit.spanning`
     """
 
     def read(name: str, level: int = 0) -> Floats:
@@ -68,7 +61,7 @@ def layers_of(
         if isinstance(source, Value):
             return np.atleast_1d(np.asarray(source.value, np.float32))[None, None]
         assert isinstance(source, Texture)
-        return _pixels(source.path.with_name(source.path.name.replace("<UDIM>", str(tile))), level)
+        return _pixels(of_tile(source, tile), level)
 
     smooth, rough = alphas(
         read("roughness_along", level)[..., :1], read("roughness_across", level)[..., :1], look
@@ -90,19 +83,9 @@ def layers_of(
     )
 
 
-def lobe_level(matrix: Floats, width: int) -> int:
-    """The mip level of the maps that shape reflections.
-
-    Readers make the mip levels themselves, and the mean of a warp's direction and a weft's lies at
-    45 degrees. The bake's own levels are means of the threads' moments. So where texels do not
-    resolve threads, these maps come from the level whose texels span SPANNED threads or more.
-
-    matrix : (2, 2) threads per UV; width : texels per side
-    """
-    threads = float(np.linalg.norm(matrix, axis=1).min()) / width
-    if threads * RESOLVED <= 1.0 or threads <= 0.0:
-        return 0
-    return max(0, math.ceil(math.log2(SPANNED / threads)))
+def of_tile(source: Texture, tile: int) -> Path:
+    """The file of a texture's UDIM tile."""
+    return source.path.with_name(source.path.name.replace("<UDIM>", str(tile)))
 
 
 def _scaled(color: Floats, factors: tuple[float, float, float]) -> Floats:

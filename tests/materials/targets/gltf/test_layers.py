@@ -9,6 +9,7 @@ from fabricusd.bake.bake import bake
 from fabricusd.bake.job import Settings as BakeSettings
 from fabricusd.fabric import Binding
 from fabricusd.materials.bake_folder import read_bake_folder
+from fabricusd.materials.fit.spanning import lobe_level
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.recipes import Written, texture_inputs
 from fabricusd.materials.targets.gltf.layers import (
@@ -16,7 +17,6 @@ from fabricusd.materials.targets.gltf.layers import (
     alphas,
     beside_through,
     layers_of,
-    lobe_level,
     rougher,
     strength,
 )
@@ -68,16 +68,6 @@ def test_the_sheet_that_lets_light_through_reflects_what_it_did():
     assert np.allclose((1.0 - weight) * made, base)
     assert np.allclose(weight * color, through)
     assert np.allclose(color.max(axis=-1), 1.0)
-
-
-@pytest.mark.parametrize(
-    ("threads", "width", "level"),
-    [(64, 512, 0), (128, 512, 0), (129, 512, 4), (480, 512, 3), (1100, 512, 1), (4096, 512, 0)],
-)
-def test_lobes_are_of_single_threads_or_of_four_and_more(threads, width, level):
-    found = lobe_level(np.diag((threads, 2.0 * threads)), width)
-    assert found == level
-    assert found == 0 or threads / width * 2**found >= 4.0
 
 
 def test_near_a_texel_a_thread_the_lobes_are_means_and_colours_stay_fine(tmp_path):

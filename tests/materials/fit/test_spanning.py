@@ -1,0 +1,82 @@
+"""Maps of reflections where texels do not resolve threads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fabricusd.bake.bake import bake
+from fabricusd.bake.job import Settings as BakeSettings
+from fabricusd.fabric import Binding
+from fabricusd.images.files import read_mip_level
+from fabricusd.materials.bake_folder import read_bake_folder
+from fabricusd.materials.fit.spanning import CHANNELS, level_of, lobe_level, write_spanning_maps
+from fabricusd.materials.fit.texels import draw_texels, mean_texel
+from fabricusd.materials.materials import write_materials
+from fabricusd.materials.recipes import Settings
+from fabricusd.schema import load, write_binding, write_fabric
+from tests.reference.stages import new_stage, square
+
+
+@pytest.mark.parametrize(
+    ("threads", "width", "level"),
+    [(64, 512, 0), (128, 512, 0), (129, 512, 4), (480, 512, 3), (1100, 512, 1), (4096, 512, 0)],
+)
+def test_lobes_are_of_single_threads_or_of_four_and_more(threads, width, level):
+    found = lobe_level(np.diag((threads, 2.0 * threads)), width)
+    assert found == level
+    assert found == 0 or threads / width * 2**found >= 4.0
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["one tile", "tiles"])
+def baked(request, tmp_path_factory):
+    """Linen at 1.07 texels per thread, in one picture or in UDIM tiles."""
+    folder = tmp_path_factory.mktemp("spanning")
+    stage = new_stage(folder)
+    mesh = square(stage)
+    write_fabric(stage, "/Looks/Cloth", load("linen_plain"))
+    binding = Binding(fabric=load("linen_plain"), threads_per_uv=(60.0, 60.0))
+    write_binding(mesh.GetPrim(), "/Looks/Cloth", binding)
+    stage.GetRootLayer().Save()
+    settings = BakeSettings(resolution=64, udim=request.param)
+    bake(folder / "scene.usda", folder / "b", settings, workers=1)
+    return read_bake_folder(folder / "b").garments[0]
+
+
+def test_the_maps_are_the_mip_levels_of_the_bake_from_that_one_on(baked, tmp_path):
+    level = level_of(baked, baked.lays[0])
+    assert level == 3
+    made, files = write_spanning_maps(baked, level, tmp_path)
+    assert sorted(files) == sorted(made.textures[name][1001] for name in CHANNELS)
+    for name in baked.textures:
+        if name not in CHANNELS:
+            assert made.textures[name] == baked.textures[name]
+    for name in CHANNELS:
+        for k in range(4):
+            found = read_mip_level(made.textures[name][1001], k)
+            assert np.array_equal(found, read_mip_level(baked.textures[name][1001], level + k))
+            assert found.shape[0] == 8 >> k
+
+
+def test_fits_see_the_maps_that_the_look_has(baked, tmp_path):
+    made, _ = write_spanning_maps(baked, 3, tmp_path)
+    fine, mean = (draw_texels(one, 0, one.lays[0]) for one in (baked, made))
+    assert fine is not None
+    assert mean is not None
+    # Across one texel there are warp and weft, so that no texel of the means is as smooth.
+    assert mean.smooth.min() > fine.smooth.min() + 0.05
+    assert np.average(mean.base, axis=0, weights=mean.weight) == pytest.approx(
+        np.average(fine.base, axis=0, weights=fine.weight), rel=0.02
+    )
+    assert mean_texel(made, 0)["base_color"] == mean_texel(baked, 0)["base_color"]
+
+
+def test_a_look_names_the_maps_that_span_threads(baked, tmp_path):
+    write_materials(baked.folder, tmp_path / "look.usda", Settings(fitted=False))
+    said = (tmp_path / "look.usda").read_text()
+    number = ".<UDIM>" if baked.udim else ""
+    for name in ("roughness_along", "roughness_across", "tangent"):
+        assert f"look_maps/{baked.name}.{name}.mean8{number}.exr@" in said
+    assert f"look_maps/{baked.name}.normal.mean8." in said
+    assert f"{baked.name}.base_color" in said
+    assert "base_color.mean8" not in said
