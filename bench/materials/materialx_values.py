@@ -28,11 +28,6 @@ SURFACES = [
         "base": [0.1, 0.3, 0.6], "ior": 3.0, "tint": [0.3, 0.4, 0.5], "rough": 0.8, "smooth": 0.6,
         "fuzz_weight": 0.6, "fuzz_color": [1.0, 0.9, 0.5], "fuzz_roughness": 0.3,
     },
-    {
-        "base": [0.8, 0.5, 0.2], "ior": 1.4, "tint": [0.7, 0.8, 0.9], "rough": 0.6, "smooth": 0.5,
-        "fuzz_weight": 0.2, "fuzz_color": [0.5, 0.9, 0.7], "fuzz_roughness": 0.5,
-        "diffuse_roughness": 0.8,
-    },
 ]  # fmt: skip
 
 
@@ -42,16 +37,14 @@ def inputs_of(kind, s):
     if kind == "openpbr":
         mean = (0.5 * (s["rough"] ** 2 + s["smooth"] ** 2)) ** 0.25
         return "open_pbr_surface", {
-            "base_color": s["base"], "base_diffuse_roughness": s.get("diffuse_roughness", 0.0),
-            "specular_ior": s["ior"], "specular_color": s["tint"],
+            "base_color": s["base"], "specular_ior": s["ior"], "specular_color": s["tint"],
             "specular_roughness": mean, "specular_roughness_anisotropy": 1.0 - ratio,
             "fuzz_weight": s["fuzz_weight"], "fuzz_color": s["fuzz_color"],
             "fuzz_roughness": s["fuzz_roughness"],
         }  # fmt: skip
     if kind == "standard_surface":
         return "standard_surface", {
-            "base": 1.0, "base_color": s["base"],
-            "diffuse_roughness": s.get("diffuse_roughness", 0.0), "specular_IOR": s["ior"],
+            "base": 1.0, "base_color": s["base"], "specular_IOR": s["ior"],
             "specular_color": s["tint"], "sheen": s["fuzz_weight"],
             "specular_roughness": (s["rough"] * s["smooth"]) ** 0.25,
             "specular_anisotropy": 1.0 - ratio, "sheen_color": s["fuzz_color"],

@@ -176,7 +176,7 @@ def glow(kind, frame, inputs, look, alpha):
     worn = Surface(
         base=np.zeros((1, 3)), ior=1.5 * one, alpha_rough=rough * one, alpha_smooth=smooth * one,
         tint=np.ones((1, 3)), fuzz_weight=0 * one, fuzz_color=np.ones((1, 3)),
-        fuzz_roughness=0.5 * one, diffuse_roughness=0 * one,
+        fuzz_roughness=0.5 * one,
     )  # fmt: skip
     x = x - (x @ n) * n
     axes = np.stack((x / np.linalg.norm(x), np.cross(n, x / np.linalg.norm(x)), n))

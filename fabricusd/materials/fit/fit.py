@@ -22,7 +22,6 @@ from fabricusd.appearance.weave.lookup import NO_THREAD
 from fabricusd.fabric import Fabric
 from fabricusd.materials.fit.forward import forward, frames_of
 from fabricusd.materials.fit.judge import Judge, albedo, direction_pairs
-from fabricusd.materials.fit.models import ROUGH_DIFFUSE
 from fabricusd.materials.fit.target import Target, TexelSample, target_of
 from fabricusd.materials.fit.through import fit_through
 from fabricusd.materials.networks.look import Look
@@ -32,6 +31,10 @@ Floats = NDArray[np.float64]
 REGULAR = 0.2
 """Regularisation, so that parameters that the data do not determine keep their starting values: a
 parameter that moves by its whole range costs as much as this delta E."""
+
+MOST_IOR = 20.0
+"""Largest index. Published threads reflect more than they get, and so flat towards grazing light,
+that a fit wants a mirror's reflectance: at 20 it is .82 at normal incidence."""
 
 FIRST, MORE, ROUNDS = 8, 8, 3
 """Solver steps from each start, then steps per round from the best look so far, and rounds."""
@@ -244,7 +247,7 @@ class _Free:
 def _free(kind: str) -> tuple[_Free, ...]:
     common = (
         _Free("base_color_scale", (0.0, 4.0), 3),
-        _Free("specular_ior", (1.0, 4.0)),
+        _Free("specular_ior", (1.0, MOST_IOR)),
         _Free("smooth_scale", (0.05, 3.0)),
     )
     if kind == "preview":
@@ -259,8 +262,6 @@ def _free(kind: str) -> tuple[_Free, ...]:
     if kind != "u3m":
         # The sheen of U3M has the hue of the base.
         found = (*found, _Free("fuzz_color", (0.0, 1.0), 3))
-    if kind in ROUGH_DIFFUSE:
-        found = (*found, _Free("diffuse_roughness", (0.0, 1.0)))
     return found
 
 

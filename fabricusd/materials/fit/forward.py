@@ -38,7 +38,6 @@ def surface_of(kind: str, look: Look, texels: TexelSample) -> Surface:
         alpha_rough=np.maximum(rough, smooth),
         alpha_smooth=smooth,
         tint=(np.ones((len(one), 3)) * texels.tint * np.array(look.specular_tint))[:, None],
-        diffuse_roughness=look.diffuse_roughness * one,
         fuzz_weight=look.fuzz_weight * one,
         fuzz_color=np.array(look.fuzz_color)[None, None],
         fuzz_roughness=look.fuzz_roughness * one,

@@ -27,13 +27,6 @@ KINDS = ("openpbr", "standard_surface", "gltf_pbr", "preview", "principled", "u3
 metallic 0. `principled` is Blender's Principled BSDF, which differs from OpenPBR in its tint. `u3m`
 is the Principled BSDF with what U3M can state of it."""
 
-ROUGH_DIFFUSE = ("openpbr", "standard_surface", "principled")
-"""The surfaces whose diffuse layer has a roughness."""
-
-COMPENSATED = ("openpbr", "principled")
-"""Those whose rough diffuse layer loses no energy."""
-
-
 DISNEY = ("principled", "u3m")
 """Those whose tint colours normal incidence only, below a dielectric's reflectance."""
 
@@ -48,7 +41,6 @@ class Surface:
     base : (..., 3); ior : (...)
     alpha_rough, alpha_smooth : (...) GGX widths along x and y
     tint : (..., 3) factor on the specular reflection
-    diffuse_roughness : (...) of the layer below, from 0 (Lambert) to 1; see ROUGH_DIFFUSE
     fuzz_weight, fuzz_roughness : (...); fuzz_color : (..., 3)
     """
 
@@ -57,7 +49,6 @@ class Surface:
     alpha_rough: Floats
     alpha_smooth: Floats
     tint: Floats
-    diffuse_roughness: Floats
     fuzz_weight: Floats
     fuzz_color: Floats
     fuzz_roughness: Floats
@@ -68,7 +59,7 @@ def evaluate(kind: str, s: Surface, wi: Floats, wo: Floats) -> Floats:
     above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
     cos_i = np.clip(wi[..., 2], SMALLEST, 1.0)
     cos_o = np.clip(wo[..., 2], SMALLEST, 1.0)
-    diffuse = diffuse_value(kind, s, wi, wo, cos_i, cos_o)
+    diffuse = s.base * (cos_i / np.pi)[..., None]
     spec, under_spec = specular(kind, s, wi, wo, cos_i, cos_o)
     if kind == "preview":
         out = spec + under_spec * diffuse
@@ -82,44 +73,6 @@ def evaluate(kind: str, s: Surface, wi: Floats, wo: Floats) -> Floats:
             fuzz, under_fuzz = conty_kulla(s, s.fuzz_roughness**2, wi, wo, cos_i, cos_o)
         out = fuzz + under_fuzz[..., None] * (spec + under_spec * diffuse)
     return np.where(above[..., None], out, 0.0)
-
-
-def diffuse_value(
-    kind: str, s: Surface, wi: Floats, wo: Floats, cos_i: Floats, cos_o: Floats
-) -> Floats:
-    """(..., 3) diffuse reflection: Lambert's, or that of Oren and Nayar where the layer is rough.
-
-    OpenPBR and Cycles have the form of Fujii with what it loses given back [Portsmouth2025];
-    Standard Surface has the qualitative form of [Oren1994], which darkens.
-    """
-    lambert = s.base * (cos_i / np.pi)[..., None]
-    if kind not in ROUGH_DIFFUSE:
-        return lambert
-    sigma = s.diffuse_roughness
-    off = np.sum(wi * wo, axis=-1) - cos_i * cos_o
-    if kind not in COMPENSATED:
-        square = sigma * sigma
-        rise = 0.45 * square / (square + 0.09) * np.maximum(off, 0.0) / np.maximum(cos_i, cos_o)
-        return np.asarray(lambert * (1.0 - 0.5 * square / (square + 0.33) + rise)[..., None])
-    off = np.where(off > 0.0, off / np.maximum(cos_i, cos_o), off)
-    level = 1.0 / (1.0 + (0.5 - 2.0 / (3.0 * np.pi)) * sigma)
-    once = level * (1.0 + sigma * off)
-    mean = level * (1.0 + (2.0 / 3.0 - 28.0 / (15.0 * np.pi)) * sigma)
-    lost = np.maximum(1.0 - mean, SMALLEST)
-    often = (
-        np.maximum(1.0 - _fujii_albedo(level, sigma, cos_i), SMALLEST)
-        * np.maximum(1.0 - _fujii_albedo(level, sigma, cos_o), SMALLEST)
-        / lost
-    )
-    again = s.base * (mean[..., None] / (1.0 - s.base * lost[..., None]))
-    return np.asarray(lambert * (once[..., None] + again * often[..., None]))
-
-
-def _fujii_albedo(level: Floats, sigma: Floats, c: Floats) -> Floats:
-    """(...) directional albedo at cosine c of Fujii's form, scattering once."""
-    sine = np.sqrt(np.maximum(1.0 - c * c, 0.0))
-    g = sine * (np.arccos(c) - sine * c) + 2.0 * ((sine / c) * (1.0 - sine**3) - sine) / 3.0
-    return np.asarray(level * (1.0 + sigma * g / np.pi))
 
 
 def transmitted(kind: str, s: Surface, through: Floats, wi: Floats, wo: Floats) -> Floats:

@@ -15,7 +15,6 @@ class Look:
     specular_tint : (3,) factor on the reflection
     smooth_scale, rough_scale : factors on the maps `roughness_along` and `roughness_across`, whose
         squares are microfacet alphas
-    diffuse_roughness : of the layer below the reflection, from 0 (Lambert) to 1
     fuzz_weight, fuzz_roughness, fuzz_color (3,) : the top layer
     transmission_scale : (3,) factor on the map `transmission_color`; None for cloth that lets no
         scattered light through
@@ -26,7 +25,6 @@ class Look:
     specular_tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
     smooth_scale: float = 1.0
     rough_scale: float = 1.0
-    diffuse_roughness: float = 0.0
     fuzz_weight: float = 0.0
     fuzz_color: tuple[float, float, float] = (1.0, 1.0, 1.0)
     fuzz_roughness: float = 0.5

@@ -51,7 +51,6 @@ PARAMETERS = {
     "specular_tint": "color3",
     "smooth_scale": "float",
     "rough_scale": "float",
-    "diffuse_roughness": "float",
     "fuzz_weight": "float",
     "fuzz_color": "color3",
     "fuzz_roughness": "float",
@@ -214,7 +213,6 @@ def openpbr(maps: Inputs, opaque: bool) -> Graph:
     frame = _frame(b, read)
     inputs: dict[str, Source] = {
         "base_color": _base(b, read),
-        "base_diffuse_roughness": Parameter("diffuse_roughness"),
         "specular_color": _tint(b, read),
         "specular_ior": Parameter("specular_ior"),
         "specular_roughness": _fourth_root(b, mean),
@@ -255,7 +253,6 @@ def standard_surface(maps: Inputs, opaque: bool) -> Graph:
     inputs: dict[str, Source] = {
         "base": one(1.0),
         "base_color": _base(b, read),
-        "diffuse_roughness": Parameter("diffuse_roughness"),
         "specular": one(1.0),
         "specular_color": _tint(b, read),
         "specular_IOR": Parameter("specular_ior"),

@@ -19,9 +19,6 @@ FITTED = (
 )  # fmt: skip
 """Parameters that every OpenPBR network of ours has."""
 
-LATER = {"diffuse_roughness": 0.0}
-"""Those that looks of earlier versions lack, and what such a look means."""
-
 
 class LookError(ValueError):
     """A look that lacks something; the message says where and what, in one line."""
@@ -185,7 +182,7 @@ class _Material:
                 found[name] = _plain((own or given).Get())
         for name in FITTED:
             self._require(found.get(name), name)
-        return LATER | found
+        return found
 
     def _require(self, value: Any, name: str) -> Any:
         if value is None:

@@ -55,7 +55,6 @@ def principled(look: Look, name: str) -> Any:
     scale = fitted("base_color_scale", "Base Color Scale")
     color = group.vector("MULTIPLY", given("base_color"), scale)
     give("Base Color", group.vector("MINIMUM", color, WHITE))
-    give("Diffuse Roughness", fitted("diffuse_roughness", "Diffuse Roughness", low=0.0, high=1.0))
     _reflection(group, given, fitted, give)
     give("Sheen Weight", fitted("fuzz_weight", "Fuzz Weight", low=0.0, high=1.0))
     give("Sheen Tint", fitted("fuzz_color", "Fuzz Color", color=True))
