@@ -13,6 +13,8 @@ import numpy as np
 
 from fabricusd.appearance import surface
 from fabricusd.appearance.albedo import FINE, albedo_by_view, safe_albedo
+from fabricusd.appearance.laws import law_of
+from fabricusd.appearance.published.excess import white_sky
 from fabricusd.fabric import Fabric
 from fabricusd.geometry.nearest import published
 from fabricusd.schema import load, published_names
@@ -38,7 +40,8 @@ HEAD = """# Directional albedo and safe albedos
 
 The tables give the share of a white sky's light that reaches the viewer, by the angle between view
 and normal. They show the brightest channel, at the worst of 16 azimuths (8 for `conserving`).
-The first table is of the presets as they are, each with its own surface law and shadow. The next
+The first table is of the presets as they are, each with its own surface law and its mean shadow.
+Laws with an absolute shadow divide by what would be too much, so that any `A` is safe. The next
 two are of the published numbers under the published law, `masked`, which do not conserve energy.
 *Safe A* is the largest albedo of white threads at which the cloth reflects no more light than
 arrives, in any view. `fabricusd check` warns where a fabric's own colours reflect more than that
@@ -53,6 +56,24 @@ def uniform_model(fabric: Fabric, model: str) -> Fabric:
     """`fabric` with the same model for every thread."""
     threads = {name: replace(t, model="") for name, t in fabric.threads.items()}
     return replace(fabric, model=model, threads=threads, back=None)
+
+
+def shadowed(fabric: Fabric) -> list[float]:
+    """Reflected share at each angle with the mean shadow, by the quadrature of `white_sky`."""
+    sky, weight = white_sky()
+    shadow = surface.mean_shadow(fabric)
+    worst = []
+    for theta in np.radians(THETA):
+        shares = []
+        for phi in np.arange(2 * AZIMUTHS) * math.pi / AZIMUTHS:
+            wo = np.array(
+                [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
+            )
+            wo = np.broadcast_to(wo, sky.shape)
+            values = surface.evaluate(fabric, sky, wo, level="far", shadow=shadow)
+            shares.append(float((weight @ values).max()))
+        worst.append(max(shares))
+    return worst
 
 
 def conserving(fabric: Fabric) -> list[float]:
@@ -90,6 +111,9 @@ def main() -> None:
                 fabric = uniform_model(fabric, model)
             if model == "conserving":
                 lines.append(row(name, conserving(fabric), "1"))
+                continue
+            if title not in PRINTED and law_of(fabric).absolute:
+                lines.append(row(name, shadowed(fabric), "any"))
                 continue
             values = albedo_by_view(fabric, np.radians(THETA), FINE).max(axis=(1, 2))
             lines.append(row(name, values.tolist(), f"{safe_albedo(fabric, FINE):.2f}"))
