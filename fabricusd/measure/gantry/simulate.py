@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, one_line
 from fabricusd.fabric import DEFAULT_MODEL, Thread
 from fabricusd.files import write_json
 from fabricusd.images.raw import write_codes
@@ -180,20 +180,31 @@ def _manifest(camera: Camera, shoot: Shoot, name: str, jobs: list[Job]) -> dict[
     }
 
 
-def _empty(folder: str | os.PathLike[str]) -> Path:
-    """`folder` as a path to a directory that exists and holds nothing."""
+def require_empty(folder: str | os.PathLike[str]) -> None:
+    """Raise FabricError for a folder that holds something, or that cannot be made."""
     target = Path(folder)
     try:
-        target.mkdir(exist_ok=True)
-        occupied = next(target.iterdir(), None)
-    except FileNotFoundError:
-        problem = f"is in '{target.parent}', which is not a directory; create it first"
-        raise FabricError(str(target), problem) from None
+        occupied = next(target.iterdir(), None) if target.exists() else None
+        parent = target.parent.is_dir()
     except (OSError, ValueError) as error:
-        problem = f"cannot be made: {getattr(error, 'strerror', None) or error}"
-        raise FabricError(str(target), problem) from error
+        problem = f"cannot be used: {getattr(error, 'strerror', None) or error}"
+        raise FabricError(one_line(repr(str(target)), 120), problem) from error
+    if not parent:
+        raise FabricError(
+            str(target), f"is in '{target.parent}', which is not a directory; create it first"
+        )
     if occupied is not None:
         raise FabricError(
             str(target), f"holds '{occupied.name}'; it must be a new or an empty folder"
         )
+
+
+def _empty(folder: str | os.PathLike[str]) -> Path:
+    """`folder`, made if it does not exist."""
+    require_empty(folder)
+    target = Path(folder)
+    try:
+        target.mkdir(exist_ok=True)
+    except OSError as error:
+        raise FabricError(str(target), f"cannot be made: {error.strerror}") from error
     return target
