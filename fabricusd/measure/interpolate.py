@@ -18,7 +18,7 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Thread
 from fabricusd.measure.angles import DEGREE, direction, folded, listed
 from fabricusd.measure.lobes import Lobes
-from fabricusd.measure.scatter import split
+from fabricusd.appearance.thread import split
 
 Floats = NDArray[np.float64]
 

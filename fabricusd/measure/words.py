@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fabricusd.fabric import Thread
 from fabricusd.measure.angles import DEGREE, direction
-from fabricusd.measure.scatter import split
+from fabricusd.appearance.thread import split
 
 Floats = NDArray[np.float64]
 

@@ -36,6 +36,8 @@ Floats = NDArray[np.float64]
 CHANNELS = ("red", "green", "blue")
 CALIBRATED = (0.8, 1.2)
 """chi^2 per value that agrees with the deviations of the lobes."""
+TELLING = 0.7
+"""A product is worth stating if its relative interval is smaller than that of A by this factor."""
 FEWEST = 12
 """Views below which a thread is not fitted."""
 
@@ -96,7 +98,7 @@ def _fitted(
     problem: Problem, best: Found, linear: Linear, known: Curvature, traced: dict[int, Profile]
 ) -> Fitted:  # fmt: skip
     estimates = _estimates(problem, best, linear, known, traced)
-    products, notes = _inseparable(problem, best, linear, known, traced)
+    products, notes = _inseparable(problem, best, linear, known, traced, estimates)
     per_value = best.chi2 / problem.freedom
     if per_value > CALIBRATED[1]:
         notes.insert(
@@ -151,9 +153,10 @@ def _estimates(
         met = [at, *(float(point.albedo[c]) for point in points)]
         low, high = min(at - width, *met), max(at + width, *met)
         wider = low < at - width or high > at + width
+        how = "profile" if wider else "curvature"
         found[f"A {channel}"] = Estimate(
             label=f"A {channel}", value=at, low=max(low, 0.0), high=min(high, problem.most),
-            how="profile" if wider else "curvature",
+            how=how if 0.0 < at < problem.most else "bound",
         )  # fmt: skip
     if problem.gain:
         width = half[known.labels.index("gain")]
@@ -173,7 +176,8 @@ def _estimates(
 
 
 def _inseparable(
-    problem: Problem, best: Found, linear: Linear, known: Curvature, traced: dict[int, Profile]
+    problem: Problem, best: Found, linear: Linear, known: Curvature, traced: dict[int, Profile],
+    estimates: dict[str, Estimate],
 ) -> tuple[list[Estimate], list[str]]:  # fmt: skip
     """The products that can be told where parameters cannot, and the words that say so."""
     labels = list(known.labels)
@@ -190,16 +194,23 @@ def _inseparable(
         traced[k].open_low or traced[k].open_high for k in volume if k in traced
     )  # fmt: skip
     if joined > CORRELATED or open_ended:
-        products += _levels(problem, best, linear, known, traced)
         k = labels.index("gamma_volume")
         fits = ""
         if k in traced:
             low, high = (np.degrees(v) for v in (traced[k].low, traced[k].high))
             fits = f": gv from {low:.3g} to {high:.3g} degrees all fit"
-        notes.append(
-            f"gv, kd and A cannot be told apart by these views{fits}; their product can, "
-            f"{level_formula(problem.model)}"
-        )
+        levels = _levels(problem, best, linear, known, traced)
+        if all(
+            level.spread < TELLING * estimates[f"A {channel}"].spread
+            for level, channel in zip(levels, CHANNELS, strict=True)
+        ):
+            products += levels
+            notes.append(
+                f"gv, kd and A cannot be told apart by these views{fits}; their product can, "
+                f"{level_formula(problem.model)}"
+            )
+        else:
+            notes.append(f"gv and kd cannot be told apart by these views{fits}")
     if problem.gain:
         pair = float(correlation[labels.index("ior"), labels.index("gain")])
         if pair > CORRELATED:

@@ -17,7 +17,7 @@ from fabricusd.appearance.scattering.models import named
 from fabricusd.measure.angles import tilted
 from fabricusd.measure.fit.parameters import Parameter, thread_of
 from fabricusd.measure.lobes import Lobes
-from fabricusd.measure.scatter import split
+from fabricusd.appearance.thread import split
 
 Floats = NDArray[np.float64]
 

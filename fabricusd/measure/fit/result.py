@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ class Estimate:
 
     label : of a report; value, low, high : in `unit`
     open_low, open_high : whether the interval ends where the search ends, not where the data say
-    how : "curvature", "profile", or "fixed" for what was not fitted
+    how : "curvature", "profile", or "bound" for what lies at the end of its range
     """
 
     label: str
@@ -26,10 +27,15 @@ class Estimate:
     open_low: bool = False
     open_high: bool = False
 
+    @property
+    def spread(self) -> float:
+        """Width of the interval over the value; infinite for 0."""
+        return (self.high - self.low) / abs(self.value) if self.value else math.inf
+
     def __str__(self) -> str:
         unit = f" {self.unit}" if self.unit else ""
-        if self.how == "fixed":
-            return f"{self.label} {self.value:.4g}{unit} (fixed)"
+        if self.how == "bound":
+            return f"{self.label} {self.value:.4g}{unit} (the end of its range)"
         low = f"{'at most ' if self.open_low else ''}{self.low:.4g}"
         high = f"{'at least ' if self.open_high else ''}{self.high:.4g}"
         how = "" if self.how == "curvature" else f" by {self.how}"

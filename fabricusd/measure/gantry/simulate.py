@@ -20,7 +20,7 @@ from fabricusd.measure.capture.manifest import MANIFEST, VERSION
 from fabricusd.measure.gantry.camera import Camera, mosaicked
 from fabricusd.measure.gantry.design import DESIGNS
 from fabricusd.measure.gantry.scenes import chart_radiance, thread_radiance, white_radiance
-from fabricusd.measure.scatter import split
+from fabricusd.appearance.thread import split
 from fabricusd.run.workers import Batches, worker_count
 
 BRF = (0.989, 0.989, 0.988)
