@@ -99,7 +99,8 @@ def views() -> None:
             whole = lobes.f.sum() / f.sum() - 1
             print(
                 f"  {bits:2} bit {name:19} bias {100 * off.mean():+6.2f} %  rms "
-                f"{100 * np.sqrt((off**2).mean()):5.2f} %  dark half {100 * off[dark].mean():+6.2f} %"
+                f"{100 * np.sqrt((off**2).mean()):5.2f} %  dark half "
+                f"{100 * off[dark].mean():+6.2f} %"
                 f"  sum {100 * whole:+6.2f} %  chi2/n {chi2:.2f}",
                 flush=True,
             )

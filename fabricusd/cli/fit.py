@@ -7,9 +7,9 @@ import argparse
 from fabricusd.cli.arguments.fitting import add_fitting, deliver, fitted, require_outputs, tell
 from fabricusd.errors import FabricError
 
-EPILOG = """LOBES is a table that 'measure' wrote, or any CSV with the columns theta_i, theta_o, phi_d
-(degrees, inclinations from the thread's normal plane) and f_r, f_g, f_b (1/sr, without the cosine);
-sigma_r, sigma_g and sigma_b are their standard deviations.
+EPILOG = """LOBES is a table that 'measure' wrote, or any CSV with the columns theta_i, theta_o and
+phi_d (degrees, inclinations from the thread's normal plane) and f_r, f_g and f_b (1/sr, without the
+cosine). The columns sigma_r, sigma_g and sigma_b are their standard deviations.
 
 Printed are chi2 per degree of freedom and 95 % intervals. Parameters that the views do not tell
 apart are said to be, with the product that the views do tell.

@@ -9,9 +9,9 @@ from fabricusd.cli.arguments.fitting import add_fitting, deliver, fitted, requir
 from fabricusd.cli.arguments.thread import named_thread
 from fabricusd.errors import FabricError
 
-EPILOG = """DIR holds raw frames (TIFF, PNG or PGM of 8 to 16 bits, one code per site; with the extra
-'raw' also DNG and CR2) and manifest.json, which states bits, colour filter, exposures and angles:
-see docs/measurement.md. A frame that cannot be used is named and left out.
+EPILOG = """DIR holds raw frames and manifest.json. Frames are TIFF, PNG or PGM of 8 to 16 bits, one
+code per site, or DNG and CR2 with the extra 'raw'. The manifest states bits, colour filter,
+exposures and angles: see docs/measurement.md. A frame that cannot be used is named and left out.
 
 example:
   fabricusd measure --simulate shoot --thread thread_rayon_spun --design coarse
@@ -31,7 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lobes",
         metavar="FILE",
-        help="write the lobes as a table, .csv or .npz; without -o nothing is fitted (default: none)",
+        help="write the lobes as a table, .csv or .npz; without -o nothing is fitted (default: "
+        "none)",
     )
     parser.add_argument(
         "--hdr",
@@ -93,7 +94,9 @@ def run(options: argparse.Namespace) -> int:
         print(f"{len(manifest.shots)} frames, {len(manifest.views())} views")
         return 0
     if options.output is None and options.lobes is None:
-        raise FabricError("-o", "is missing; give -o for the thread, --lobes for the lobes, or both")
+        raise FabricError(
+            "-o", "is missing; give -o for the thread, --lobes for the lobes, or both"
+        )
     if options.output is None and (options.plots or options.report):
         raise FabricError("--plots" if options.plots else "--report", "needs a fit: give -o too")
     require_outputs(options)

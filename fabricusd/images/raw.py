@@ -22,8 +22,8 @@ RAW_SUFFIXES = (".dng", ".cr2", ".nef", ".arw", ".raf", ".rw2")
 """Files of cameras, which `rawpy` reads."""
 
 _prints = threading.Lock()
-"""libpng prints what is wrong with a file. Silencing it redirects the process's standard error, which
-only one thread may do at a time; the other formats print nothing and are read side by side."""
+"""libpng prints what is wrong with a file. Silencing it redirects the process's standard error,
+which only one thread may do at a time; other formats print nothing and are read side by side."""
 
 
 @reads("a raw frame")
@@ -100,7 +100,9 @@ def _camera_codes(where: str) -> Codes:
     with rawpy.imread(where) as raw:
         codes = np.array(raw.raw_image_visible)
     if codes.ndim != 2:
-        raise FabricError(where, f"has shape {codes.shape}; a raw frame must have one code per site")
+        raise FabricError(
+            where, f"has shape {codes.shape}; a raw frame must have one code per site"
+        )
     return codes
 
 

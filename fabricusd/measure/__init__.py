@@ -1,8 +1,8 @@
 """Measurement: photographs of a thread in, its scattering out.
 
-    simulate     a gantry that photographs a thread whose scattering is known
-    measure      a folder of photographs -> lobes, one value of f_s per view
-    fit_thread   lobes -> the thread that scatters like them, with intervals
+simulate     a gantry that photographs a thread whose scattering is known
+measure      a folder of photographs -> lobes, one value of f_s per view
+fit_thread   lobes -> the thread that scatters like them, with intervals
 """
 
 from fabricusd.measure.capture.pipeline import Measurement, measure

@@ -27,13 +27,13 @@ def tilted(w: Floats, angle: float) -> Floats:
 
 
 def folded(phi: ArrayLike) -> Floats:
-    """Azimuths [rad] folded to [0, pi]: threads scatter alike to both sides of the light's plane."""
+    """Azimuths [rad] folded to [0, pi]: threads scatter alike to both sides of their plane."""
     turns = np.mod(np.asarray(phi, np.float64), 2 * np.pi)
     return np.minimum(turns, 2 * np.pi - turns)
 
 
 def degrees_key(*angles: float) -> tuple[float, ...]:
-    """Angles [rad] in degrees, rounded to the gantry's .01 degree, to group what belongs together."""
+    """Angles [rad] in degrees, rounded to the gantry's .01 degree, as a key of a view."""
     return tuple(round(float(a) / DEGREE, 2) + 0.0 for a in angles)
 
 

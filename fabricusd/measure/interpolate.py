@@ -1,7 +1,7 @@
 """Lobes between the views: by the ratio to a fitted thread, bilinearly, or by eq. 3.8.
 
 Eq. 3.8, a mean of the n nearest views weighted by 1/(1 + d), does not interpolate: at a view it
-returns a mixture, 28 % too low on narrow cones. The ratio of lobes to a fitted thread is smooth even
+returns a mixture, too low on narrow cones. The ratio of lobes to a fitted thread is smooth even
 where the lobes are not, so between views it is what to interpolate.
 """
 
@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from scipy.interpolate import NearestNDInterpolator, RegularGridInterpolator
 from scipy.spatial import cKDTree
 
+from fabricusd.appearance.thread import split
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Thread
 from fabricusd.measure.angles import DEGREE, direction, folded, listed
 from fabricusd.measure.lobes import Lobes
-from fabricusd.appearance.thread import split
 
 Floats = NDArray[np.float64]
 
@@ -69,13 +69,12 @@ def interpolated(
     return _gridded(here, ratio, theta_o, phi) * _fitted(thread, model, theta_i, theta_o, phi)
 
 
-def _fitted(
-    thread: Thread, model: str, theta_i: float, theta_o: Floats, phi: Floats
-) -> Floats:  # fmt: skip
+def _fitted(thread: Thread, model: str, theta_i: float, theta_o: Floats, phi: Floats) -> Floats:
     wo = direction(theta_o, phi)
     wi = np.broadcast_to(direction(theta_i, 0.0), wo.shape)
     terms = split(thread, wi, wo, model)
-    return terms.surface[:, None] + terms.volume[:, None] * np.asarray(thread.albedo)
+    albedo = np.asarray(thread.albedo, np.float64)
+    return np.asarray(terms.surface[:, None] + terms.volume[:, None] * albedo)
 
 
 def _gridded(lobes: Lobes, values: Floats, theta_o: Floats, phi: Floats) -> Floats:
@@ -111,4 +110,6 @@ def _nearest_mean(lobes: Lobes, theta_o: Floats, phi: Floats) -> Floats:
     distance, index = cKDTree(lobes.wo).query(direction(theta_o, phi), count)
     distance, index = distance.reshape(-1, count), index.reshape(-1, count)
     weight = 1.0 / (1.0 + distance / DEGREE)
-    return np.asarray((weight[..., None] * lobes.f[index]).sum(axis=1) / weight.sum(axis=1)[:, None])
+    return np.asarray(
+        (weight[..., None] * lobes.f[index]).sum(axis=1) / weight.sum(axis=1)[:, None]
+    )

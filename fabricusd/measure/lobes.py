@@ -7,6 +7,7 @@ import io
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -112,7 +113,7 @@ def gaps(lobes: Lobes) -> Iterator[str]:
     usual = float(np.median(np.concatenate(steps))) if steps else 0.0
     for (incidence, azimuth), seen in groups.items():
         views = np.unique(np.round(seen, 2))
-        for low, high in zip(views[:-1], views[1:], strict=True):
+        for low, high in pairwise(views):
             hidden = -incidence if azimuth > 90.0 else incidence
             allowed = 2 * HIDDEN + 2 * usual if low < hidden < high else WIDE_GAP * usual
             if high - low > max(allowed, WIDE_GAP * usual) and usual > 0:
@@ -186,8 +187,8 @@ def read_lobes(path: str | os.PathLike[str]) -> Lobes:
     if all(name in columns for name in SIGMAS):
         sigma = np.stack([columns[name] for name in SIGMAS], axis=1)
         if not (sigma > 0).all():
-            line = body[1 + int(np.flatnonzero(~(sigma > 0).all(axis=1))[0])][0]
-            raise FabricError(f"{where} line {line}", "has a sigma that is not above 0")
+            bad = body[1 + int(np.flatnonzero(~(sigma > 0).all(axis=1))[0])][0]
+            raise FabricError(f"{where} line {bad}", "has a sigma that is not above 0")
     else:
         floor = ASSUMED_FLOOR * 10 * float(np.median(np.abs(f)))
         sigma = np.hypot(ASSUMED_RELATIVE * np.maximum(f, 0), max(floor, 1e-12))

@@ -12,9 +12,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.thread import split
 from fabricusd.fabric import Thread
 from fabricusd.measure.angles import DEGREE, direction
-from fabricusd.appearance.thread import split
 
 Floats = NDArray[np.float64]
 
@@ -27,8 +27,8 @@ STEP = 2.0
 """Spacing of the directions over which light is summed [degrees]."""
 
 SHARE_BOUNDS = (0.19, 0.66)
-"""Shares of a hemisphere's light, from which a term is med and high. Of all pairs, none misses fewer
-of the table's words: 6 of 28 for the published threads."""
+"""Shares of a hemisphere's light, from which a term is med and high. Of all pairs, none misses
+fewer of the table's words: 6 of 28 for the published threads."""
 WIDTH_BOUNDS = (19.33, 26.2)
 """Standard deviations of the inclination of a term's light [degrees], from which it is glossy and
 blurry; chosen in the same way, with 6 of 28 missed."""
@@ -51,10 +51,10 @@ def quantities(thread: Thread, model: str) -> tuple[Floats, Floats]:
     In the order of COLUMNS. Shares are of the flux, the mean of the channels; back is light within
     90 degrees of azimuth of the light's.
     """
-    theta, phi = np.meshgrid(
+    grid = np.meshgrid(
         np.arange(-89.0, 90.0, STEP) * DEGREE, np.arange(1.0, 180.0, STEP) * DEGREE, indexing="ij"
     )
-    theta, phi = theta.ravel(), phi.ravel()
+    theta, phi = (angles.ravel() for angles in grid)
     wo = direction(theta, phi)
     # f_s cos(theta_o) per solid angle, whose element is cos(theta_o) dtheta dphi.
     weight = np.cos(theta) ** 2

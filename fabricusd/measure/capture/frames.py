@@ -61,21 +61,21 @@ def frame_of(manifest: Manifest, shape: tuple[int, int]) -> Frame:
     if made.height < 2 or made.right - made.left < 2 or w - (made.right - made.left) < 4:
         raise FabricError(
             where,
-            f"has frames of {w} x {h} and the window {left} to {right}; there must be two rows, two "
-            "columns of thread, and four of background",
+            f"has frames of {w} x {h} and the window {left} to {right}; there must be two rows, "
+            "two columns of thread, and four of background",
         )
     return made
 
 
 def read_frame(manifest: Manifest, shot: Shot, shape: tuple[int, int] | None = None) -> Codes:
-    """(h, w) codes of a shot; FabricError for another size than `shape`, and for codes too large."""
+    """(h, w) codes of a shot; FabricError for another size than `shape`, for codes too large."""
     path = manifest.folder / shot.file
     codes = read_codes(path)
     if shape is not None and codes.shape != shape:
         raise FabricError(
             str(path),
-            f"has {codes.shape[1]} x {codes.shape[0]} pixels; it must have {shape[1]} x {shape[0]}, "
-            "as the other frames",
+            f"has {codes.shape[1]} x {codes.shape[0]} pixels; it must have "
+            f"{shape[1]} x {shape[0]}, as the other frames",
         )
     if manifest.levels < np.iinfo(codes.dtype).max:
         largest = int(codes.max(initial=0))

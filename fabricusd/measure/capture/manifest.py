@@ -1,4 +1,4 @@
-"""What a folder of photographs holds: `manifest.json`, checked as a whole before a frame is read."""
+"""What a folder of photographs holds: `manifest.json`, checked before a frame is read."""
 
 from __future__ import annotations
 
@@ -31,7 +31,11 @@ KNOWN = (
 
 @dataclass(frozen=True, kw_only=True)
 class Shot:
-    """One frame. file : in the folder; kind : one of KINDS; exposure : [s]; angles [rad], of views."""
+    """One frame.
+
+    file : in the folder; kind : one of KINDS; exposure : [s]
+    theta_i, theta_o, phi_d : of views [rad]
+    """
 
     file: str
     kind: str
@@ -74,7 +78,7 @@ class Manifest:
     @property
     def levels(self) -> int:
         """The largest code."""
-        return 2**self.bits - 1
+        return (1 << self.bits) - 1
 
     def of_kind(self, kind: str) -> dict[float, list[Shot]]:
         """Exposure -> its shots of one kind, the shortest first."""
@@ -195,7 +199,9 @@ def _settings(where: str, given: Mapping[str, Any]) -> dict[str, Any]:
 def _number(where: str, key: str, value: Any, low: float, high: float) -> float:
     whole = isinstance(value, int | float) and not isinstance(value, bool)
     if not whole or not low <= float(value) <= high:
-        raise FabricError(where, f"has {key} {value!r}; it must be a number from {low:g} to {high:g}")
+        raise FabricError(
+            where, f"has {key} {value!r}; it must be a number from {low:g} to {high:g}"
+        )
     return float(value)
 
 
@@ -220,7 +226,9 @@ def _shot(one: Any, k: int) -> Shot | str:
         numbers[key] = number
     if not numbers["exposure"] > 0:
         return f"{file}: its exposure is 0 s; it must be above 0; left out"
-    angles = {key: numbers[key] * DEGREE for key in ("theta_i", "theta_o") if key in numbers}
+    angles: dict[str, float] = {
+        key: numbers[key] * DEGREE for key in ("theta_i", "theta_o") if key in numbers
+    }
     if "phi_d" in numbers:
         angles["phi_d"] = float(folded(numbers["phi_d"] * DEGREE))
     return Shot(file=one["file"], kind=str(kind), exposure=numbers["exposure"], **angles)
@@ -247,9 +255,7 @@ def _require_enough(where: str, made: Manifest) -> None:
     """Raise for a folder that no thread can be measured from."""
     left_out = f"; {made.notes[0]}" if made.notes else ""
     if not made.views():
-        raise FabricError(
-            where, f"has no shots of kind slice or half that can be used{left_out}"
-        )
+        raise FabricError(where, f"has no shots of kind slice or half that can be used{left_out}")
     if not made.of_kind("white"):
         raise FabricError(
             where, f"has no shots of kind white; without one there is no reference{left_out}"
@@ -260,11 +266,7 @@ def _require_enough(where: str, made: Manifest) -> None:
             f"or state \"linear\": true{left_out}",
         )  # fmt: skip
     if not made.of_kind("dark"):
-        raise FabricError(
-            where, f"has no shots of kind dark, which tell the black level{left_out}"
-        )
+        raise FabricError(where, f"has no shots of kind dark, which tell the black level{left_out}")
     for shot in made.shots:
         if os.path.isabs(shot.file) or ".." in Path(shot.file).parts:
-            raise FabricError(
-                f"{where}: {one_line(shot.file, 120)}", "lies outside of the folder"
-            )
+            raise FabricError(f"{where}: {one_line(shot.file, 120)}", "lies outside of the folder")

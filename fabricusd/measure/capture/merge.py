@@ -58,7 +58,7 @@ class Merged:
 
 
 def merge(frames: dict[float, list[NDArray[Any]]], sensor: Sensor) -> Merged:
-    """Merge frames, exposure [s] -> shots of (h, w) codes with an even number of rows and columns."""
+    """Merge frames, exposure [s] -> shots of (h, w) codes, h and w even."""
     if sensor.hdr == "thesis":
         return _merge_thesis(frames, sensor)
     times = sorted(frames)
@@ -87,7 +87,7 @@ def _merge_thesis(frames: dict[float, list[NDArray[Any]]], sensor: Sensor) -> Me
     """Eq. 3.3: sum w t I(y)/sum w t^2, and 0 where all exposures are rejected."""
     above: Any = 0.0
     below: Any = 0.0
-    lost = None
+    lost: Any = True
     for t, shots in sorted(frames.items()):
         code = np.mean(shots, axis=0)
         # The dark code: where the response has the dark exposure.
@@ -96,7 +96,7 @@ def _merge_thesis(frames: dict[float, list[NDArray[Any]]], sensor: Sensor) -> Me
         weight = np.exp(-4.0 * ((code - half) / half) ** 2)
         full = code >= BRIGHTEST * sensor.levels
         weight = weight * ~full * (code > black + DARKEST * sensor.levels)
-        lost = full if lost is None else lost & full
+        lost = lost & full
         above = above + weight * t * _linear(shots, sensor, t)
         below = below + weight * t * t
     seen = below > 0

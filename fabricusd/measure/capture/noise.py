@@ -33,10 +33,10 @@ def variance_model(value: Floats, halves: Floats) -> Floats:
         expected = np.maximum(columns @ found, 1e-3 * square.mean() + 1e-300)
         found, _ = nnls(columns / scale / expected[:, None], square / expected)
         found = found / scale
-    return found
+    return np.asarray(found, np.float64)
 
 
 def deviation(value: Floats, model: Floats) -> Floats:
     """(n,) standard deviations by a model of `variance_model`."""
     q = np.maximum(value, 0.0)
-    return np.sqrt(model[0] + model[1] * q + model[2] * q * q)
+    return np.asarray(np.sqrt(model[0] + model[1] * q + model[2] * q * q))

@@ -79,11 +79,13 @@ def imaged_diameter(profile: Floats, background: Floats) -> float:
     if not total > 0:
         return float("nan")
     middle = (light * x).sum() / total
-    for reach in (len(light), 0.0, 0.0, 0.0):
-        # Far from the thread there is only noise, whose leverage is large.
-        near = np.abs(x - middle) <= (reach or 0.75 * diameter + 1.0)
+    reach, diameter = float(len(light)), 0.0
+    for _ in range(4):
+        near = np.abs(x - middle) <= reach
         total = light[near].sum()
         middle = (light * x)[near].sum() / total
         variance = (light * (x - middle) ** 2)[near].sum() / total - 1.0 / 12.0
-        diameter = 4.0 * np.sqrt(max(variance, 0.0))
-    return float(diameter)
+        diameter = 4.0 * float(np.sqrt(max(variance, 0.0)))
+        # Far from the thread there is only noise, whose leverage is large.
+        reach = 0.75 * diameter + 1.0
+    return diameter

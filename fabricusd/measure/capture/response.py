@@ -28,7 +28,7 @@ FEWEST = 4 * COEFFICIENTS
 
 def linear_response(levels: int, black: float) -> Floats:
     """(levels + 1,) exposure of each code of a linear camera: 0 at black, 1 at half the range."""
-    return (np.arange(levels + 1) - black) / (0.5 * levels - black)
+    return np.asarray((np.arange(levels + 1) - black) / (0.5 * levels - black), np.float64)
 
 
 def spline_response(means: Floats, times: Floats, levels: int, black: float) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -245,7 +246,7 @@ def _levels(
             up[k], down[k] = up[k] + step, down[k] - step
             slope[k] = (level(up, albedo) - level(down, albedo)) / (2 * step)
         slope[labels.index(f"albedo {c}")] = value / albedo if albedo > 0 else 0.0
-        half = SIGMAS * float(np.sqrt(max(slope @ known.covariance @ slope, 0.0)))
+        half = SIGMAS * math.sqrt(max(float(slope @ known.covariance @ slope), 0.0))
         seen = [value, *(level(x, float(point.albedo[c])) for x, point in met)]
         made.append(
             Estimate(
@@ -271,7 +272,7 @@ def _surface_level(
     slope = np.zeros(len(known.labels))
     slope[k] = (level(ior + 1e-5, linear.gain) - level(ior - 1e-5, linear.gain)) / 2e-5
     slope[g] = value / linear.gain
-    half = SIGMAS * float(np.sqrt(max(slope @ known.covariance @ slope, 0.0)))
+    half = SIGMAS * math.sqrt(max(float(slope @ known.covariance @ slope), 0.0))
     points = traced[k].points if k in traced else ()
     seen = [value, *(level(float(x[k]), problem.solve(x)[1].gain) for x in points)]
     return Estimate(

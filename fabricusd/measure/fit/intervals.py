@@ -31,7 +31,7 @@ BETTER = 0.05
 class Curvature:
     """The covariance of all parameters, by (J^T J)^-1.
 
-    labels : of the parameters, the linear ones last: names of Thread, "gain", "albedo 0", "offset 0"
+    labels : of the parameters, the linear ones last: "gain", "albedo 0", "offset 0" and so on
     values, deviations : (p,); correlation : (p, p)
     covariance : (p, p), 0 for parameters at the end of their range
     """
@@ -52,7 +52,7 @@ class Curvature:
         scale = np.where(d > 0, d, np.inf)
         made = self.covariance / np.outer(scale, scale)
         np.fill_diagonal(made, 0.0)
-        return made
+        return np.asarray(made, np.float64)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,7 +156,7 @@ def profiles(
         lower = [each for each in (first, second) if each is not None]
         found[k] = Profile(
             low=low, high=high, open_low=open_low, open_high=open_high,
-            points=tuple([*below, *above]),
+            points=(*below, *above),
             better=min(lower, key=lambda each: each.chi2) if lower else None,
         )  # fmt: skip
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,8 @@ class Parameter:
     """A number that the scattering is not linear in.
 
     name : a field of Thread, or "lean"; label : in a report; scale : SI value of a report's unit
-    low, high : of the search; start : (low, high) that starts are drawn from; step : its usual change
+    low, high : of the search; start : (low, high) that starts are drawn from
+    step : its usual change
     """
 
     name: str
@@ -51,8 +53,8 @@ SURFACE_GAIN = Parameter(
     name="surface_gain", label="ks", low=0.02, high=40.0, start=(1.0, 12.0), step=1.0
 )
 LEAN = Parameter(
-    name="lean", label="lean", low=-6 * DEGREE, high=6 * DEGREE, start=(-0.1 * DEGREE, 0.1 * DEGREE),
-    step=0.02, scale=DEGREE, unit="degrees",
+    name="lean", label="lean", low=-6 * DEGREE, high=6 * DEGREE,
+    start=(-0.1 * DEGREE, 0.1 * DEGREE), step=0.02, scale=DEGREE, unit="degrees",
 )  # fmt: skip
 
 
@@ -71,7 +73,9 @@ def thread_of(
     names: Sequence[Parameter], x: Sequence[float] | Floats, albedo: Sequence[float] = (0, 0, 0)
 ) -> Thread:
     """The thread that a vector of parameters stands for."""
-    fields = {p.name: float(v) for p, v in zip(names, x, strict=True) if p.name != "lean"}
+    fields: dict[str, Any] = {
+        p.name: float(v) for p, v in zip(names, x, strict=True) if p.name != "lean"
+    }
     return Thread(albedo=(float(albedo[0]), float(albedo[1]), float(albedo[2])), **fields)
 
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.scattering.models import named
+from fabricusd.appearance.thread import split
 from fabricusd.measure.angles import tilted
 from fabricusd.measure.fit.parameters import Parameter, thread_of
 from fabricusd.measure.lobes import Lobes
-from fabricusd.appearance.thread import split
 
 Floats = NDArray[np.float64]
 

@@ -36,7 +36,7 @@ class Camera:
     @property
     def levels(self) -> int:
         """The largest code."""
-        return 2**self.bits - 1
+        return (1 << self.bits) - 1
 
     def response(self, exposure: Floats) -> Floats:
         """Code, as a share of the largest one, of an exposure as a share of the full well."""

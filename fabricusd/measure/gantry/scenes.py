@@ -43,7 +43,8 @@ def thread_radiance(
     rough = 1.0 + ROUGHNESS * rough * (2.0 * ROUGH_ROWS * np.sqrt(np.pi)) ** 0.5
     rough = np.maximum(rough, 0.2)
     rough *= height / rough.sum()
-    return rough[:, None, None] * profile[None, :, None] * np.asarray(value)[None, None, :]
+    colour = np.asarray(value, np.float64)
+    return np.asarray(rough[:, None, None] * profile[None, :, None] * colour)
 
 
 def white_radiance(value: Sequence[float] | Floats, shape: tuple[int, int]) -> Floats:
@@ -51,10 +52,8 @@ def white_radiance(value: Sequence[float] | Floats, shape: tuple[int, int]) -> F
     return np.broadcast_to(np.asarray(value, np.float64), (*shape, 3)).copy()
 
 
-def chart_radiance(
-    greys: Floats, rows: int, columns: int, shape: tuple[int, int]
-) -> Floats:
-    """(h, w, 3) radiance of grey patches, (rows * columns,) from the top left, that fill a frame."""
+def chart_radiance(greys: Floats, rows: int, columns: int, shape: tuple[int, int]) -> Floats:
+    """(h, w, 3) radiance of (rows * columns,) grey patches that fill a frame, from the top left."""
     h, w = shape
     row = np.minimum(np.arange(h) * rows // h, rows - 1)
     column = np.minimum(np.arange(w) * columns // w, columns - 1)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.thread import split
 from fabricusd.errors import FabricError, one_line
 from fabricusd.fabric import DEFAULT_MODEL, Thread
 from fabricusd.files import write_json
@@ -20,7 +21,6 @@ from fabricusd.measure.capture.manifest import MANIFEST, VERSION
 from fabricusd.measure.gantry.camera import Camera, mosaicked
 from fabricusd.measure.gantry.design import DESIGNS
 from fabricusd.measure.gantry.scenes import chart_radiance, thread_radiance, white_radiance
-from fabricusd.appearance.thread import split
 from fabricusd.run.workers import Batches, worker_count
 
 BRF = (0.989, 0.989, 0.988)
@@ -146,7 +146,7 @@ def _views(
             colour = thread_radiance(value, shoot.shape, shoot.diameter, shoot.defocus, 0.3, rng)
             return mosaicked(colour)
 
-        told = {"kind": kind}
+        told: dict[str, Any] = {"kind": kind}
         for name, angle in (("theta_i", theta_i), ("theta_o", theta_o), ("phi_d", phi_d)):
             told[name] = round(float(angle[k]) / DEGREE, 4)
         jobs.append(Job(seen, _frames(f"view_{k:05d}", shoot.times, shoot.shots), told))

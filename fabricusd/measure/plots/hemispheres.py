@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.measure.angles import DEGREE
 from fabricusd.measure.fit.result import Fitted
 from fabricusd.measure.interpolate import interpolated
 from fabricusd.measure.lobes import Lobes
-from fabricusd.measure.plots.plane import COLUMNS, DEGREE, predicted
+from fabricusd.measure.plots.plane import COLUMNS, predicted
 
 Floats = NDArray[np.float64]
 

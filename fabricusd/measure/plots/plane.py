@@ -31,7 +31,7 @@ def incidences(lobes: Lobes) -> Floats:
 
 
 def draw_polar(plt: Any, lobes: Lobes, fit: Fitted) -> Any:
-    """Figures 3.11 and 4.2: the mean of the channels, radius logarithmic, one plot per incidence."""
+    """Figures 3.11 and 4.2: the mean of the channels, its logarithm as radius, by incidence."""
     which = incidences(lobes)
     columns = min(COLUMNS, len(which))
     lines = -(-len(which) // columns)
@@ -65,7 +65,7 @@ def draw_polar(plt: Any, lobes: Lobes, fit: Fitted) -> Any:
 
 
 def draw_plane(plt: Any, lobes: Lobes, fit: Fitted) -> Any:
-    """Figure 3.10's channels against the camera's inclination, measured and fitted, by incidence."""
+    """Each channel against the camera's inclination, measured and fitted, by incidence."""
     which = incidences(lobes)
     columns = min(COLUMNS, len(which))
     lines = -(-len(which) // columns)

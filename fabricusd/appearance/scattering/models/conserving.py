@@ -197,9 +197,7 @@ def _filled(values: Floats) -> Floats:
     return np.asarray(spline(np.linspace(0.0, 1.0, TRANSMISSION_ENTRIES)))
 
 
-def thread_completion(
-    thread: Thread, entries: int = TRANSMISSION_ENTRIES
-) -> tuple[Floats, float]:
+def thread_completion(thread: Thread, entries: int = TRANSMISSION_ENTRIES) -> tuple[Floats, float]:
     """((TRANSMISSION_ENTRIES,) x at sqrt(cos theta) uniform from 0 to 1, X)."""
     gs, gv = max(thread.gamma_surface, NARROWEST), max(thread.gamma_volume, NARROWEST)
     return lost_energy(gs, thread.ior, thread.surface_gain, gv, thread.isotropic, entries)
