@@ -82,11 +82,12 @@ def _largest_of_pgm(where: str) -> int:
 
 
 def _unscaled(codes: Codes, largest: int) -> Codes:
-    """OpenImageIO stretches a PGM's codes to the full range of their type; take that back."""
+    """OpenImageIO stretches a PGM's codes to the full range of their type, rounded down."""
     full = np.iinfo(codes.dtype).max
     if largest in (0, full):
         return codes
-    table = np.rint(np.arange(full + 1) * (largest / full)).astype(codes.dtype)
+    table = -(-np.arange(full + 1, dtype=np.int64) * largest // full)
+    table = table.astype(codes.dtype)
     return np.asarray(table[codes])
 
 

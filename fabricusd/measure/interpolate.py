@@ -26,7 +26,8 @@ METHODS = ("ratio", "bilinear", "thesis")
 NEIGHBOURS = 4
 """Nearest views that eq. 3.8 averages; the thesis does not say how many."""
 FAINT = 1e-3
-"""Share of the largest fitted value, below which ratios mean nothing and are not taken."""
+"""Share of the largest fitted value, below which ratios mean nothing; dimmer values are taken for
+this one, on both sides of the ratio."""
 
 
 def interpolated(
@@ -66,7 +67,8 @@ def interpolated(
     at_views = _fitted(thread, model, theta_i, here.theta_o, here.phi_d)
     floor = FAINT * at_views.max(axis=0)
     ratio = here.f / np.maximum(at_views, floor)
-    return _gridded(here, ratio, theta_o, phi) * _fitted(thread, model, theta_i, theta_o, phi)
+    between = np.maximum(_fitted(thread, model, theta_i, theta_o, phi), floor)
+    return _gridded(here, ratio, theta_o, phi) * between
 
 
 def _fitted(thread: Thread, model: str, theta_i: float, theta_o: Floats, phi: Floats) -> Floats:
@@ -79,8 +81,8 @@ def _fitted(thread: Thread, model: str, theta_i: float, theta_o: Floats, phi: Fl
 
 def _gridded(lobes: Lobes, values: Floats, theta_o: Floats, phi: Floats) -> Floats:
     """(n, 3) values of views on a grid of inclination and azimuth, bilinear between them."""
-    grid_o, at_o = np.unique(np.round(lobes.theta_o, 6), return_inverse=True)
-    grid_p, at_p = np.unique(np.round(lobes.phi_d, 6), return_inverse=True)
+    grid_o, at_o = np.unique(np.round(lobes.theta_o, 9), return_inverse=True)
+    grid_p, at_p = np.unique(np.round(lobes.phi_d, 9), return_inverse=True)
     table = np.full((len(grid_o), len(grid_p), 3), np.nan)
     table[at_o, at_p] = values
     holes = np.isnan(table[..., 0])

@@ -143,7 +143,7 @@ def write_lobes(lobes: Lobes, path: str | os.PathLike[str], *, clobber: bool = T
         lines.append(",".join(COLUMNS))
         for angle, f, sigma in zip(angles, lobes.f, lobes.sigma, strict=True):
             numbers = [f"{x:.7g}" for x in angle]
-            numbers += [f"{x:.9g}" for x in f] + [f"{x:.6g}" for x in sigma]
+            numbers += [f"{x:.9g}" for x in (*f, *sigma)]
             lines.append(",".join(numbers))
         temporary.write_text("\n".join(lines) + "\n", "utf-8")
 

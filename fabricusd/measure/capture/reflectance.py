@@ -29,9 +29,9 @@ MAD = 1.4826
 
 def channel_means(area: Floats, pattern: str) -> Floats:
     """(3,) mean of each colour's sites, in an area of whole 2 x 2 blocks."""
-    sites = np.array([_site_mean(area[s // 2 :: 2, s % 2 :: 2], s // 2) for s in range(4)])
     if pattern == "grey":
-        return np.full(3, sites.mean())
+        return np.full(3, area.mean())
+    sites = np.array([_site_mean(area[s // 2 :: 2, s % 2 :: 2], s // 2) for s in range(4)])
     channel = np.array(SITES[pattern])
     return np.array([sites[channel == c].mean() for c in range(3)])
 
@@ -40,11 +40,11 @@ def _site_mean(plane: Floats, parity: int) -> float:
     """Mean over sites in every other row, from row `parity` on, of what lies in all rows.
 
     Their middle is half a row off that of all rows. On an uneven thread that would be an error of
-    a few tenths of a percent, opposite for red and blue; weights at the ends take it back.
+    a few tenths of a percent, opposite for red and blue; the slope from end to end takes it back.
     """
     rows = plane.mean(axis=1)
-    shift = 0.25 * (rows[-1] - rows[0])
-    return float(rows.mean() + (shift if parity == 0 else -shift) / len(rows))
+    shift = 0.25 * (rows[-1] - rows[0]) / max(len(rows) - 1, 1)
+    return float(rows.mean() + (shift if parity == 0 else -shift))
 
 
 def thread_sum(radiance: Floats, frame: Frame, pattern: str, background: str) -> Floats:
