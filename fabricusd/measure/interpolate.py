@@ -25,9 +25,6 @@ Floats = NDArray[np.float64]
 METHODS = ("ratio", "bilinear", "thesis")
 NEIGHBOURS = 4
 """Nearest views that eq. 3.8 averages; the thesis does not say how many."""
-FAINT = 1e-3
-"""Share of the largest fitted value, below which ratios mean nothing; dimmer values are taken for
-this one, on both sides of the ratio."""
 
 
 def interpolated(
@@ -65,10 +62,12 @@ def interpolated(
     if thread is None:
         raise FabricError("thread", "is missing; the ratio is that to a fitted thread")
     at_views = _fitted(thread, model, theta_i, here.theta_o, here.phi_d)
-    floor = FAINT * at_views.max(axis=0)
-    ratio = here.f / np.maximum(at_views, floor)
-    between = np.maximum(_fitted(thread, model, theta_i, theta_o, phi), floor)
-    return _gridded(here, ratio, theta_o, phi) * between
+    # Where noise is larger than the fitted value the ratio would be noise over nothing. There it
+    # tends to 1, and what is left is interpolated as a difference.
+    ratio = 1.0 + (here.f - at_views) * at_views / (at_views**2 + here.sigma**2)
+    rest = here.f - ratio * at_views
+    between = _fitted(thread, model, theta_i, theta_o, phi)
+    return _gridded(here, ratio, theta_o, phi) * between + _gridded(here, rest, theta_o, phi)
 
 
 def _fitted(thread: Thread, model: str, theta_i: float, theta_o: Floats, phi: Floats) -> Floats:

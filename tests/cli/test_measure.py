@@ -1,4 +1,4 @@
-"""`measure` and `fit`: from photographs to a thread, and nothing written where something is wrong."""
+"""`measure` and `fit`: photographs become a thread; nothing is written where something is wrong."""
 
 from __future__ import annotations
 

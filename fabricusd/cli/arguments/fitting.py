@@ -54,6 +54,13 @@ def add_fitting(parser: argparse.ArgumentParser) -> None:
         help="write plots of measured and fitted lobes into this folder (default: none)",
     )
     parser.add_argument(
+        "--interpolation",
+        choices=["ratio", "bilinear", "thesis"],
+        default="ratio",
+        help="what is drawn between views of a half sphere: by the ratio to the fitted thread, "
+        "bilinearly, or by eq. 3.8 of the thesis, which blurs (default: ratio)",
+    )
+    parser.add_argument(
         "--report",
         metavar="JSON",
         help="write the fits, their intervals and notes as JSON (default: print them only)",
@@ -121,7 +128,10 @@ def deliver(lobes: Lobes, fits: list[Fitted], source: str, options: argparse.Nam
     if options.plots is not None:
         from fabricusd.measure.plots.draw import draw_all
 
-        written += [str(path) for path in draw_all(lobes, fits[0], options.plots)]
+        written += [
+            str(path)
+            for path in draw_all(lobes, fits[0], options.plots, method=options.interpolation)
+        ]
     if options.verbose:
         for path in written:
             print(f"fabricusd: wrote {path}", file=sys.stderr)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +49,13 @@ def require_folder(folder: str | os.PathLike[str]) -> None:
         )
 
 
-def draw_all(lobes: Lobes, fit: Fitted, folder: str | os.PathLike[str]) -> list[Path]:
-    """Draw every plot that the lobes have views for; return the files, a PNG and an SVG each."""
+def draw_all(
+    lobes: Lobes, fit: Fitted, folder: str | os.PathLike[str], *, method: str = "ratio"
+) -> list[Path]:
+    """Draw every plot that the lobes have views for; return the files, a PNG and an SVG each.
+
+    method : by which hemispheres are interpolated, see `interpolate.interpolated`
+    """
     require_folder(folder)
     target = Path(folder)
     try:
@@ -60,7 +66,7 @@ def draw_all(lobes: Lobes, fit: Fitted, folder: str | os.PathLike[str]) -> list[
     if (lobes.phi_d < 0.01 * DEGREE).any():
         drawn += [("polar", draw_polar), ("incidence_plane", draw_plane)]
     if len(np.unique(np.round(lobes.phi_d, 4))) > 2:
-        drawn.append(("hemispheres", draw_hemispheres))
+        drawn.append(("hemispheres", partial(draw_hemispheres, method=method)))
     written = []
     for name, draw in drawn:
         figure = draw(pyplot(), lobes, fit)

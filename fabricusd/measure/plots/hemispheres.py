@@ -22,9 +22,9 @@ BRIGHTEST = 99.0
 """Percentile of the values that is drawn as white; a few highlights would darken all others."""
 
 
-def draw_hemispheres(plt: Any, lobes: Lobes, fit: Fitted) -> Any:
+def draw_hemispheres(plt: Any, lobes: Lobes, fit: Fitted, method: str = "ratio") -> Any:
     """Colours of the lobes over each hemisphere, projected onto the thread's tangent plane, with
-    the thread vertical. One column per incidence; the scale is common to all."""
+    the thread vertical. One column per incidence, each with a scale of its own."""
     counts = [np.unique(lobes.phi_d[np.abs(lobes.theta_i - i) < 0.01 * DEGREE]).size
               for i in lobes.incidences]  # fmt: skip
     which = lobes.incidences[np.array(counts) > 2]
@@ -34,15 +34,24 @@ def draw_hemispheres(plt: Any, lobes: Lobes, fit: Fitted) -> Any:
     figure, plots = plt.subplots(
         4, len(which), figsize=(0.5 + 2.2 * len(which), 8.6), layout="constrained", squeeze=False
     )
-    figure.suptitle(f"{lobes.name}: hemispheres, thread upright\n({fit.model}, "
-                    f"chi2/n {fit.chi2:.3g})", fontsize=10)  # fmt: skip
-    white = np.percentile(lobes.f, BRIGHTEST)
+    figure.suptitle(
+        f"{lobes.name}: hemispheres, thread upright, a scale per column\n"
+        f"({fit.model}, chi2/n {fit.chi2:.3g})", fontsize=10,
+    )  # fmt: skip
     for k, incidence in enumerate(which):
+        here = np.abs(lobes.theta_i - incidence) < 0.01 * DEGREE
+        white = max(float(np.percentile(lobes.f[here], BRIGHTEST)), 1e-12)
         for r, forward in enumerate((False, True)):
             theta, phi, inside = _hemisphere(forward)
             pictures = (
                 interpolated(
-                    lobes, float(incidence), theta, phi, thread=fit.thread, model=fit.model
+                    lobes,
+                    float(incidence),
+                    theta,
+                    phi,
+                    method=method,
+                    thread=fit.thread,
+                    model=fit.model,
                 ),
                 predicted(fit, np.full_like(theta, incidence), theta, phi),
             )

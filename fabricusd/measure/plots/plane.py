@@ -33,11 +33,12 @@ def incidences(lobes: Lobes) -> Floats:
 def draw_polar(plt: Any, lobes: Lobes, fit: Fitted) -> Any:
     """Figures 3.11 and 4.2: the mean of the channels, its logarithm as radius, by incidence."""
     which = incidences(lobes)
-    columns = min(COLUMNS, len(which))
-    lines = -(-len(which) // columns)
-    figure = plt.figure(figsize=(3.3 * columns, 0.7 + 2.2 * lines), layout="constrained")
+    lines, columns = _layout(len(which))
+    figure = plt.figure(figsize=(4.0 * columns, 0.8 + 2.5 * lines), layout="constrained")
     figure.suptitle(_title(lobes, fit, "polar, logarithmic, mean of red, green and blue"))
     top, low = _range(lobes)
+    # The centre lies below the least value, so that a dim floor has a shape.
+    low /= 3.0
     decades = np.log10(top / low)
     for k, incidence in enumerate(which):
         axes = figure.add_subplot(lines, columns, k + 1, projection="polar")
@@ -59,16 +60,15 @@ def draw_polar(plt: Any, lobes: Lobes, fit: Fitted) -> Any:
         ticks = np.arange(np.ceil(np.log10(low)), np.log10(top) + 1e-9)
         axes.set_rticks(ticks - np.log10(low), [f"{10**t:g}" for t in ticks], fontsize=6)
         axes.tick_params(labelsize=6)
-        axes.set_title(f"light at {incidence / DEGREE:.3g} deg", fontsize=8, pad=-4)
-    figure.text(0.5, 0.005, _legend(), ha="center", va="bottom", fontsize=7)
+        axes.set_title(f"light at {incidence / DEGREE:.3g} deg", fontsize=8, pad=-12)
+    figure.supxlabel(_legend(), fontsize=7)
     return figure
 
 
 def draw_plane(plt: Any, lobes: Lobes, fit: Fitted) -> Any:
     """Each channel against the camera's inclination, measured and fitted, by incidence."""
     which = incidences(lobes)
-    columns = min(COLUMNS, len(which))
-    lines = -(-len(which) // columns)
+    lines, columns = _layout(len(which))
     figure, plots = plt.subplots(
         lines, columns, figsize=(3.3 * columns, 0.8 + 2.5 * lines), layout="constrained",
         sharex=True, sharey=True, squeeze=False,
@@ -115,6 +115,12 @@ def predicted(fit: Fitted, theta_i: Floats, theta_o: Floats, phi_d: Floats) -> F
     gain = fit.estimates["gain"].value if "gain" in fit.estimates else 1.0
     wi, wo = direction(theta_i, 0.0), direction(theta_o, phi_d)
     return gain * evaluate(fit.thread, wi, wo, fit.model)
+
+
+def _layout(count: int) -> tuple[int, int]:
+    """(lines, columns) of so many plots, as few empty ones as can be."""
+    lines = -(-count // COLUMNS)
+    return lines, -(-count // lines)
 
 
 def _range(lobes: Lobes) -> tuple[float, float]:

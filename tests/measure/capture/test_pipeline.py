@@ -10,7 +10,9 @@ import pytest
 from fabricusd.appearance.thread import evaluate
 from fabricusd.errors import FabricError
 from fabricusd.images.raw import write_codes
-from fabricusd.measure import measure
+from fabricusd.measure import measure, simulate
+from fabricusd.measure.gantry.simulate import Shoot
+from fabricusd.schema import load
 from tests.measure.shoots import SPUN, replaced, shot, spoilt
 
 FIRST = "view_00000_00_0.pgm"
@@ -193,6 +195,20 @@ def test_rows_and_window_can_be_chosen(tmp_path):
     lobes = measure(spoilt(tmp_path, lambda m: m.update(told))).lobes
     # Half of the thread is as bright as all of it but for its unevenness.
     assert abs(errors(lobes).mean()) < 0.03
+
+
+def test_rayon_has_the_facts_that_are_stated_of_it_relative_to_its_peak(tmp_path):
+    """[Bisker2011] 3.3.1, lit at 15 degrees: a floor of a tenth of the peak, which lies near the
+    mirror direction, and a lobe about 30 degrees wide."""
+    rayon = load("thread_rayon_spun{appearance=published}").thread_list[0]
+    simulate(rayon, tmp_path / "shoot", shoot=Shoot(design="incidence"))
+    lobes = measure(tmp_path / "shoot").lobes
+    theta, f = np.degrees(lobes.theta_o), lobes.f.mean(axis=1)
+    peak = int(np.argmax(f))
+    assert theta[peak] == pytest.approx(-15, abs=6)
+    assert np.median(f[np.abs(theta - 45) < 20]) / f[peak] == pytest.approx(0.1, abs=0.03)
+    above = theta[f > 0.5 * f[peak]]
+    assert above.max() - above.min() == pytest.approx(30, abs=6)
 
 
 def test_lobes_are_the_values_of_their_rows():
