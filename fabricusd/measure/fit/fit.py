@@ -39,6 +39,8 @@ CALIBRATED = (0.8, 1.2)
 """chi^2 per value that agrees with the deviations of the lobes."""
 TELLING = 0.7
 """A product is worth stating if its relative interval is smaller than that of A by this factor."""
+OUTLYING = 0.2
+"""Share of chi^2 from which the view that it is of is named."""
 FEWEST = 12
 """Views below which a thread is not fitted."""
 
@@ -104,7 +106,7 @@ def _fitted(
     if per_value > CALIBRATED[1]:
         notes.insert(
             0, f"the thread explains the lobes worse than their deviations allow, by a factor of "
-            f"{per_value ** 0.5:.2g}; intervals are wider by it",
+            f"{per_value ** 0.5:.2g}; intervals are wider by it{_worst(problem, best)}",
         )  # fmt: skip
     elif per_value < CALIBRATED[0]:
         notes.insert(0, "the deviations of the lobes are too large: intervals are too wide")
@@ -125,6 +127,20 @@ def _fitted(
         estimates=estimates,
         products=tuple(products),
         notes=tuple(notes),
+    )
+
+
+def _worst(problem: Problem, best: Found) -> str:
+    """Words for the view that explains most of chi^2, if it explains much of it; or ""."""
+    by_view = (problem.residuals(best.x).reshape(-1, 3) ** 2).sum(axis=1)
+    k = int(np.argmax(by_view))
+    if by_view[k] < OUTLYING * by_view.sum():
+        return ""
+    lobes = problem.lobes
+    angles = np.degrees([lobes.theta_i[k], lobes.theta_o[k], lobes.phi_d[k]])
+    return (
+        f"; {by_view[k] / by_view.sum():.0%} of chi2 is of the view theta_i {angles[0]:.4g}, "
+        f"theta_o {angles[1]:.4g}, phi_d {angles[2]:.4g}: is it an outlier?"
     )
 
 

@@ -133,7 +133,7 @@ def to_profile(problem: Problem, x: Floats, known: Curvature) -> list[int]:
     end = at_end(problem, x)
     return [
         k for k in range(len(problem.names))
-        if end[k] or related[k] > CORRELATED
+        if end[k] or related[k] > CORRELATED or half[k] == 0
         or half[k] > WIDE * max(abs(x[k]), 0.05 * problem.steps[k])
     ]  # fmt: skip
 

@@ -59,6 +59,23 @@ def test_noise_that_is_larger_than_stated_widens_the_intervals_and_is_said():
         assert wide.high - wide.low == pytest.approx(narrow.high - narrow.low, rel=0.1)
 
 
+def test_a_single_view_that_spoils_the_fit_is_named():
+    lobes = lobes_of(SPUN)
+    f = lobes.f.copy()
+    f[20] *= 3
+    found = fit_thread(replace(lobes, f=f), "microcylinder")
+    view = f"theta_i {math.degrees(lobes.theta_i[20]):.4g}, theta_o "
+    assert f"of chi2 is of the view {view}" in found.notes[0]
+    assert "outlier" not in "".join(fit_thread(lobes, "microcylinder").notes)
+
+
+def test_a_parameter_that_no_view_depends_on_is_said_to_be_free():
+    found = fit_thread(lobes_of(replace(SPUN, albedo=(0, 0, 0)), noise=0.0), "microcylinder")
+    assert found.thread.albedo == pytest.approx((0, 0, 0), abs=1e-5)
+    gv = found.estimates["gv"]
+    assert gv.high - gv.low > 45
+
+
 def test_another_model_than_the_one_that_made_the_lobes_is_told_by_chi2():
     lobes = lobes_of(SPUN, model="thesis")
     right, wrong = (fit_thread(lobes, m).chi2 for m in ("thesis", "microcylinder"))
