@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import threading
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +21,9 @@ RAW_SUFFIXES = (".dng", ".cr2", ".nef", ".arw", ".raf", ".rw2")
 """Files of cameras, which `rawpy` reads."""
 
 _prints = threading.Lock()
-"""libpng prints what is wrong with a file. Silencing it redirects the process's standard error,
-which only one thread may do at a time; other formats print nothing and are read side by side."""
+"""libpng and LibRaw print what is wrong with a file. Silencing them redirects the process's
+standard error, which only one thread may do at a time. Other formats print nothing, and are read
+side by side."""
 
 
 @reads("a raw frame")
@@ -36,19 +36,21 @@ def read_codes(path: str | os.PathLike[str]) -> Codes:
     """
     where = str(readable_file(path))
     suffix = Path(where).suffix.lower()
-    if suffix in RAW_SUFFIXES:
-        return _camera_codes(where)
-    silence: Any = nullcontext()
-    if suffix == ".png":
-        silence = _prints
-    with silence, quietly() if suffix == ".png" else nullcontext():
-        reader: Any = oiio.ImageInput.open(where)
-        if reader is None:
-            raise FabricError(where, f"cannot be read as a raw frame: {reason_of(oiio)}")
-        try:
-            return _codes_of(where, reader)
-        finally:
-            reader.close()
+    read = _camera_codes if suffix in RAW_SUFFIXES else _picture_codes
+    if suffix in RAW_SUFFIXES or suffix == ".png":
+        with _prints, quietly():
+            return read(where)
+    return read(where)
+
+
+def _picture_codes(where: str) -> Codes:
+    reader: Any = oiio.ImageInput.open(where)
+    if reader is None:
+        raise FabricError(where, f"cannot be read as a raw frame: {reason_of(oiio)}")
+    try:
+        return _codes_of(where, reader)
+    finally:
+        reader.close()
 
 
 def _codes_of(where: str, reader: Any) -> Codes:
