@@ -8,7 +8,7 @@ where nothing is left the value is 0, so dim threads lose light (9 % at 12 bits,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,8 @@ BRIGHTEST = 0.92
 """Share of the largest code from which a site counts as saturated."""
 DARKEST = 0.02
 """Share of the largest code above dark below which eq. 3.3 rejects a site."""
+HOT = 10.0
+"""Deviations of a mean dark frame beyond which a site is hot."""
 BLOOM = 5
 """Sites around a saturated one that are rejected along with it: its charge spills over."""
 
@@ -33,12 +35,15 @@ class Sensor:
     response : (levels + 1,) float32 exposure of each code
     dark : exposure time [s] -> (4,) mean exposure without light, per site of the 2 x 2 filter
     levels : the largest code; hdr : one of HDR
+    hot : (k, 2) rows and columns of sites that are bright without light; their neighbours of the
+        same colour stand in for them
     """
 
     response: NDArray[np.float32]
     dark: dict[float, Floats]
     levels: int
     hdr: str = "counts"
+    hot: NDArray[np.intp] = field(default_factory=lambda: np.empty((0, 2), np.intp))
 
     def dark_of(self, seconds: float) -> Floats:
         """(4,) exposure without light, interpolated between the times that were photographed."""
@@ -51,7 +56,7 @@ class Sensor:
 
 @dataclass(frozen=True, kw_only=True)
 class Merged:
-    """radiance : (h, w) exposure per second; lost : sites saturated in every exposure."""
+    """radiance : (h, w) exposure per second; lost : sites saturated in every exposure, no hot ones"""
 
     radiance: Floats
     lost: int
@@ -74,13 +79,16 @@ def merge(frames: dict[float, list[NDArray[Any]]], sensor: Sensor) -> Merged:
             light += linear
             seconds = seconds + t
             continue
-        full = maximum_filter(brightest, BLOOM) >= BRIGHTEST * sensor.levels
+        full = brightest >= BRIGHTEST * sensor.levels
+        full[tuple(sensor.hot.T)] = False
         if t == times[0]:
             lost = int(np.count_nonzero(full))
-            full = np.zeros(shape, bool)
+            full[:] = False
+        elif full.any():
+            full = maximum_filter(full, BLOOM)
         light += np.where(full, 0.0, linear)
         seconds = seconds + np.where(full, 0.0, t)
-    return Merged(radiance=light / seconds, lost=lost)
+    return Merged(radiance=_repaired(light / seconds, sensor.hot), lost=lost)
 
 
 def _merge_thesis(frames: dict[float, list[NDArray[Any]]], sensor: Sensor) -> Merged:
@@ -101,7 +109,28 @@ def _merge_thesis(frames: dict[float, list[NDArray[Any]]], sensor: Sensor) -> Me
         below = below + weight * t * t
     seen = below > 0
     radiance = np.where(seen, above / np.where(seen, below, 1.0), 0.0)
-    return Merged(radiance=radiance, lost=int(np.count_nonzero(lost)))
+    lost = np.asarray(lost)
+    lost[tuple(sensor.hot.T)] = False
+    return Merged(radiance=_repaired(radiance, sensor.hot), lost=int(np.count_nonzero(lost)))
+
+
+def hot_sites(dark: NDArray[Any]) -> NDArray[np.intp]:
+    """(k, 2) rows and columns of sites that stand out of a mean (h, w) dark frame."""
+    middle = float(np.median(dark))
+    # Codes are whole numbers: their deviation is never known to be below half of one.
+    deviation = max(1.4826 * float(np.median(np.abs(dark - middle))), 0.5)
+    return np.argwhere(np.abs(dark - middle) > HOT * deviation)
+
+
+def _repaired(radiance: Floats, hot: NDArray[np.intp]) -> Floats:
+    """`radiance`, its hot sites replaced by the mean of their neighbours of the same colour."""
+    h, w = radiance.shape
+    spoilt = {(int(y), int(x)) for y, x in hot}
+    for y, x in spoilt:
+        near = [(y - 2, x), (y + 2, x), (y, x - 2), (y, x + 2)]
+        good = [p for p in near if 0 <= p[0] < h and 0 <= p[1] < w and p not in spoilt]
+        radiance[y, x] = np.mean([radiance[p] for p in good]) if good else 0.0
+    return radiance
 
 
 def _linear(shots: list[NDArray[Any]], sensor: Sensor, seconds: float) -> Floats:

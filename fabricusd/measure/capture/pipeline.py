@@ -10,25 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
-from fabricusd.measure.capture.frames import Frame, frame_of, read_frame
+from fabricusd.measure.capture.calibrate import MOST_LOST, Calibration, calibrate
+from fabricusd.measure.capture.frames import Frame, read_frame
 from fabricusd.measure.capture.manifest import Manifest, Shot, by_exposure, read_manifest
-from fabricusd.measure.capture.merge import HDR, Merged, Sensor, merge
+from fabricusd.measure.capture.merge import HDR, Merged, merge
 from fabricusd.measure.capture.noise import deviation, variance_model
-from fabricusd.measure.capture.reflectance import (
-    BACKGROUNDS,
-    channel_means,
-    imaged_diameter,
-    thread_sum,
-)
-from fabricusd.measure.capture.response import linear_response, patch_means, spline_response
+from fabricusd.measure.capture.reflectance import BACKGROUNDS, thread_sum
 from fabricusd.measure.lobes import Lobes, gaps
 from fabricusd.measure.progress import told
 from fabricusd.run.workers import Batches, worker_count
 
 Floats = NDArray[np.float64]
 
-MOST_LOST = 1e-3
-"""Share of a thread's window that may be saturated in every exposure: hot sites of the sensor."""
 LEAST_RELATIVE = 1e-3
 """Least standard deviation of a value over it: the response is not known better."""
 MOST_TOLD = 20
@@ -50,18 +43,6 @@ class Measurement:
     captures: int
     views: int
     skipped: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class Calibration:
-    """frame : Frame; sensor : Sensor; white : (3,) L_co; diameter : [pixels] or None"""
-
-    frame: Frame
-    sensor: Sensor
-    white: Floats
-    diameter: float | None
-    captures: int
-    notes: tuple[str, ...]
 
 
 def measure(
@@ -112,79 +93,6 @@ def measure(
         views=len(views),
         skipped=len(problems),
     )
-
-
-def calibrate(manifest: Manifest, hdr: str = "counts") -> Calibration:
-    """Size, black level, response and white reference; FabricError if one cannot be had."""
-    notes: list[str] = []
-    first = next(iter(manifest.of_kind("white").values()))[0]
-    shape = read_frame(manifest, first).shape
-    frame = frame_of(manifest, (shape[0], shape[1]))
-    dark = _stacks(manifest, "dark", frame, notes)
-    if not dark:
-        raise FabricError(str(manifest.folder), f"has no dark frame that can be read: {notes[0]}")
-    black = float(np.mean(next(iter(dark.values()))))
-    if not black < 0.4 * manifest.levels:
-        raise FabricError(
-            str(manifest.folder), f"has dark frames of code {black:.0f}; they must be below "
-            f"{0.4 * manifest.levels:.0f}",
-        )  # fmt: skip
-    if manifest.linear:
-        response = linear_response(manifest.levels, black)
-    else:
-        response = _response(manifest, black, frame, notes)
-    table = response.astype(np.float32)
-    exposures = {
-        seconds: np.mean([_site_means(table[codes]) for codes in shots], axis=0)
-        for seconds, shots in dark.items()
-    }
-    sensor = Sensor(response=table, dark=exposures, levels=manifest.levels, hdr=hdr)
-    white = merge(_required(manifest, "white", frame, notes), sensor)
-    if white.lost:
-        raise FabricError(
-            str(manifest.folder), "has a white tile that is saturated in every exposure; add a "
-            "shorter one",
-        )  # fmt: skip
-    level = channel_means(white.radiance, manifest.pattern)
-    if not (level > 0).all():
-        raise FabricError(
-            str(manifest.folder), "has a white tile that is no brighter than darkness"
-        )
-    diameter = manifest.diameter or _diameter(manifest, frame, sensor, notes)
-    if diameter is None:
-        notes.append(
-            "the thread's imaged diameter is unknown, so its lobes are relative: state "
-            "diameter_px, or add a focused shot"
-        )
-    count = sum(shot.kind not in ("slice", "half") for shot in manifest.shots)
-    return Calibration(
-        frame=frame, sensor=sensor, white=level, diameter=diameter, captures=count,
-        notes=tuple(notes),
-    )  # fmt: skip
-
-
-def _response(manifest: Manifest, black: float, frame: Frame, notes: list[str]) -> Floats:
-    times, means = [], []
-    for seconds, shots in manifest.of_kind("chart").items():
-        total = np.zeros(frame.shape)
-        count = 0
-        for shot in shots:
-            codes = _tried(manifest, shot, frame, notes)
-            if codes is not None:
-                total += codes
-                count += 1
-        if count:
-            times.append(seconds)
-            means.append(patch_means(total / count, *manifest.chart))
-    if len(times) < 2:
-        raise FabricError(
-            str(manifest.folder),
-            f"has {len(times)} exposure(s) of the chart; there must be two or more",
-        )
-    try:
-        return spline_response(np.array(means), np.array(times), manifest.levels, black)
-    except FabricError as error:
-        raise error.inside(str(manifest.folder)) from None
 
 
 def _view(
@@ -257,74 +165,6 @@ def _lobes(
     from dataclasses import replace
 
     return replace(lobes, notes=(*notes, *_shortened(found_gaps)))
-
-
-def _diameter(
-    manifest: Manifest, frame: Frame, sensor: Sensor, notes: list[str]
-) -> float | None:  # fmt: skip
-    """The imaged diameter [pixels] by the shots of the thread in focus, if there are any."""
-    shots = _stacks(manifest, "focused", frame, notes)
-    if not shots:
-        return None
-    radiance = merge(shots, sensor).radiance
-    # Green has sites in every column; other colours would alias on a thread of a few pixels.
-    columns = np.empty(frame.shape[1])
-    if manifest.pattern == "grey":
-        columns[:] = radiance.mean(axis=0)
-    else:
-        odd = int(manifest.pattern.index("G") % 2)
-        columns[odd::2], columns[1 - odd :: 2] = (
-            radiance[0::2, odd::2].mean(axis=0), radiance[1::2, 1 - odd :: 2].mean(axis=0),
-        )  # fmt: skip
-    beside = np.concatenate([columns[: frame.left], columns[frame.right :]])
-    found = imaged_diameter(columns[frame.left : frame.right], beside)
-    if not 0.5 < found < frame.right - frame.left:
-        notes.append("the focused shot shows no thread whose diameter could be measured")
-        return None
-    notes.append(
-        f"the thread's imaged diameter is {found:.3g} pixels by the focused shot, which blur makes "
-        "too large"
-    )
-    return found
-
-
-def _stacks(
-    manifest: Manifest, kind: str, frame: Frame, notes: list[str]
-) -> dict[float, list[NDArray[Any]]]:  # fmt: skip
-    """Exposure -> the rows that are used of every frame of a kind that can be read."""
-    found: dict[float, list[NDArray[Any]]] = {}
-    for seconds, shots in manifest.of_kind(kind).items():
-        read = (_tried(manifest, shot, frame, notes) for shot in shots)
-        frames = [codes[frame.top : frame.bottom] for codes in read if codes is not None]
-        if frames:
-            found[seconds] = frames
-    return found
-
-
-def _required(
-    manifest: Manifest, kind: str, frame: Frame, notes: list[str]
-) -> dict[float, list[NDArray[Any]]]:  # fmt: skip
-    found = _stacks(manifest, kind, frame, notes)
-    if not found:
-        raise FabricError(
-            str(manifest.folder), f"has no {kind} frame that can be read: {notes[-1]}"
-        )
-    return found
-
-
-def _tried(
-    manifest: Manifest, shot: Shot, frame: Frame, notes: list[str]
-) -> NDArray[Any] | None:  # fmt: skip
-    """The codes of a calibration frame, or None with a note."""
-    try:
-        return read_frame(manifest, shot, frame.shape)
-    except FabricError as error:
-        notes.append(f"{error}; left out")
-        return None
-
-
-def _site_means(exposure: NDArray[Any]) -> Floats:
-    return np.array([exposure[s // 2 :: 2, s % 2 :: 2].mean(dtype=np.float64) for s in range(4)])
 
 
 def _named(shot: Shot) -> str:

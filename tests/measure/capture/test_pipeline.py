@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from fabricusd.appearance.thread import evaluate
 from fabricusd.errors import FabricError
-from fabricusd.images.raw import write_codes
+from fabricusd.images.raw import read_codes, write_codes
 from fabricusd.measure import measure, simulate
 from fabricusd.measure.gantry.simulate import Shoot
 from fabricusd.schema import load
@@ -139,6 +140,15 @@ def test_a_folder_whose_calibration_cannot_be_read_is_refused(spoil, said, tmp_p
     assert "\n" not in str(error.value)
 
 
+def test_dark_frames_of_a_bright_room_are_refused(tmp_path):
+    folder = spoilt(tmp_path, lambda m: None)
+    for frame in folder.glob("dark*"):
+        frame.unlink()
+        os.symlink(folder / "chart_08_0.pgm", frame)
+    with pytest.raises(FabricError, match="they must be even: was the lens covered"):
+        measure(folder)
+
+
 def test_a_saturated_white_tile_is_refused(tmp_path):
     folder = spoilt(tmp_path, lambda m: None)
     for frame in folder.glob("white*"):
@@ -146,6 +156,20 @@ def test_a_saturated_white_tile_is_refused(tmp_path):
         write_codes(frame, np.full((48, 96), 4095, np.uint16))
     with pytest.raises(FabricError, match="white tile that is saturated in every exposure"):
         measure(folder)
+
+
+def test_a_hot_site_of_the_sensor_spoils_nothing(tmp_path):
+    folder = spoilt(tmp_path, lambda m: None)
+    # A site that is bright in the dark too, in the thread's window.
+    for frame in [*folder.glob("dark*"), *folder.glob("white*"), *folder.glob("view*")]:
+        codes = read_codes(frame).copy()
+        codes[20, 49] = 4095
+        frame.unlink()
+        write_codes(frame, codes)
+    made = measure(folder)
+    assert made.skipped == 0
+    assert made.lobes.notes == ("1 hot site(s) of the sensor are replaced by their neighbours",)
+    assert abs(errors(made.lobes).mean()) < 0.01
 
 
 @pytest.mark.parametrize(
