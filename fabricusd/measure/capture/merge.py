@@ -56,7 +56,7 @@ class Sensor:
 
 @dataclass(frozen=True, kw_only=True)
 class Merged:
-    """radiance : (h, w) exposure per second; lost : sites saturated in every exposure, no hot ones"""
+    """radiance : (h, w) exposure per second; lost : sites saturated in every exposure"""
 
     radiance: Floats
     lost: int
