@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
-from fabricusd.measure.capture.calibrate import MOST_LOST, Calibration, calibrate
-from fabricusd.measure.capture.frames import Frame, read_frame
-from fabricusd.measure.capture.manifest import Manifest, Shot, by_exposure, read_manifest
-from fabricusd.measure.capture.merge import HDR, Merged, merge
+from fabricusd.measure.capture.calibrate import Calibration, calibrate
+from fabricusd.measure.capture.manifest import Manifest, Shot, read_manifest
+from fabricusd.measure.capture.merge import HDR
 from fabricusd.measure.capture.noise import deviation, variance_model
-from fabricusd.measure.capture.reflectance import BACKGROUNDS, thread_sum
+from fabricusd.measure.capture.reflectance import BACKGROUNDS
+from fabricusd.measure.capture.views import view_sums
 from fabricusd.measure.lobes import Lobes, gaps
-from fabricusd.measure.progress import told
-from fabricusd.run.workers import Batches, worker_count
 
 Floats = NDArray[np.float64]
 
@@ -57,8 +54,9 @@ def measure(
     hdr : "counts", or "thesis" for eq. 3.3 as printed; see `merge`
     background : "sides", or "zero" for the thesis's threshold; see `reflectance.thread_sum`
 
-    Frames are read once, a view at a time, so memory does not grow with the folder. A view that
-    cannot be used is left out and noted. Raises FabricError if no view is left, and for a folder
+    Frames are read once, a view at a time, so memory does not grow with the folder. A run that was
+    broken off goes on where it was, see `views`. A view that cannot be used is left out and noted.
+    Raises FabricError if no view is left, and for a folder
     that cannot be measured at all.
     """
     for name, value, allowed in (("hdr", hdr, HDR), ("background", background, BACKGROUNDS)):
@@ -67,18 +65,7 @@ def measure(
     manifest = read_manifest(folder)
     calibration = calibrate(manifest, hdr)
     views = manifest.views()
-    values = np.full((len(views), 2, 3), np.nan)
-    problems: dict[int, str] = {}
-
-    def one(_worker: int, k: int) -> None:
-        try:
-            values[k] = _view(manifest, calibration, views[k], background)
-        except FabricError as error:
-            problems[k] = f"{_named(views[k][0])}: {error}; left out"
-
-    with told("photographs of views", len(views)) as tell:
-        if not Batches(worker_count(workers), one).run(len(views), tell):
-            raise KeyboardInterrupt
+    values, problems = view_sums(manifest, calibration, views, background, workers)
     used = [k for k in range(len(views)) if k not in problems]
     told_lines = [problems[k] for k in sorted(problems)]
     if not used:
@@ -93,34 +80,6 @@ def measure(
         views=len(views),
         skipped=len(problems),
     )
-
-
-def _view(
-    manifest: Manifest, calibration: Calibration, shots: list[Shot], background: str
-) -> Floats:
-    """(2, 3) H summed by two halves of the shots; the second is NaN without a second shot."""
-    frame = calibration.frame
-    frames: dict[float, list[NDArray[Any]]] = {}
-    for seconds, group in by_exposure(shots).items():
-        frames[seconds] = [
-            read_frame(manifest, shot, frame.shape)[frame.top : frame.bottom] for shot in group
-        ]
-    halves = [frames]
-    if all(len(group) > 1 for group in frames.values()):
-        halves = [{t: group[k::2] for t, group in frames.items()} for k in range(2)]
-    out = np.full((2, 3), np.nan)
-    for k, half in enumerate(halves):
-        merged = merge(half, calibration.sensor)
-        _require_unsaturated(merged, frame)
-        out[k] = thread_sum(merged.radiance, frame, manifest.pattern, background)
-    return out
-
-
-def _require_unsaturated(merged: Merged, frame: Frame) -> None:
-    if merged.lost > MOST_LOST * frame.sites:
-        raise FabricError(
-            "", f"{merged.lost} sites are saturated in every exposure; add a shorter one"
-        )
 
 
 def _lobes(
@@ -162,19 +121,7 @@ def _lobes(
     found_gaps = list(gaps(lobes))
     if not found_gaps:
         return lobes
-    from dataclasses import replace
-
     return replace(lobes, notes=(*notes, *_shortened(found_gaps)))
-
-
-def _named(shot: Shot) -> str:
-    angles = ", ".join(
-        f"{name} {np.degrees(angle):.4g}"
-        for name, angle in (
-            ("theta_i", shot.theta_i), ("theta_o", shot.theta_o), ("phi_d", shot.phi_d),
-        )
-    )  # fmt: skip
-    return f"view {angles}"
 
 
 def _shortened(lines: list[str]) -> list[str]:
