@@ -1,6 +1,6 @@
 """Draw the pictures of docs/measurement.md: a thread through the simulated gantry and back.
 
-    python docs/make_measurement.py
+python docs/make_measurement.py
 """
 
 from __future__ import annotations

@@ -21,6 +21,9 @@ MOST_LOST = 1e-3
 """Share of the sites that may be saturated in every exposure, by cosmic rays for example."""
 MOST_SPREAD = 0.02
 """Share of the largest code by which 80 % of a dark frame's codes may differ."""
+LEAST_NOISE = 0.4
+"""Deviation of dark codes below which rounding to whole codes does not average out: at .4 the mean
+of rounded numbers is up to .014 of a code off, at .26 up to .08."""
 MOST_HOT = 0.01
 """Share of the sites that may be hot; a sensor with more is none, or was not in the dark."""
 
@@ -90,7 +93,7 @@ def calibrate(manifest: Manifest, hdr: str = "counts") -> Calibration:
 def _hot(
     manifest: Manifest, frames: list[NDArray[Any]], notes: list[str]
 ) -> NDArray[np.intp]:  # fmt: skip
-    """The hot sites, noted; FabricError for dark frames that have seen light."""
+    """The hot sites, noted, as is too little noise; FabricError for frames that have seen light."""
     mean = np.mean(frames, axis=0)
     hot = hot_sites(mean)
     spread = float(np.percentile(mean, 90) - np.percentile(mean, 10))
@@ -99,6 +102,12 @@ def _hot(
             str(manifest.folder),
             f"has dark frames whose codes differ by {spread:.0f} from site to site, with "
             f"{len(hot)} brighter sites; they must be even: was the lens covered?",
+        )
+    noise = float(np.std(frames, axis=0, ddof=1).mean()) if len(frames) > 1 else 1.0
+    if noise < LEAST_NOISE:
+        notes.append(
+            f"the noise of dark frames is {noise:.2g} of a code, too little for rounding to average "
+            "out: values of dim views are off by more than their deviations"
         )
     if len(hot):
         notes.append(f"{len(hot)} hot site(s) of the sensor are replaced by their neighbours")

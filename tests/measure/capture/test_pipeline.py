@@ -158,6 +158,12 @@ def test_a_saturated_white_tile_is_refused(tmp_path):
         measure(folder)
 
 
+def test_codes_too_coarse_for_the_noise_are_noted():
+    (note,) = measure(shot(8)).lobes.notes
+    assert note.startswith("the noise of dark frames is 0.")
+    assert "values of dim views are off by more than their deviations" in note
+
+
 def test_a_hot_site_of_the_sensor_spoils_nothing(tmp_path):
     folder = spoilt(tmp_path, lambda m: None)
     # A site that is bright in the dark too, in the thread's window.
