@@ -106,8 +106,8 @@ def _hot(
     noise = float(np.std(frames, axis=0, ddof=1).mean()) if len(frames) > 1 else 1.0
     if noise < LEAST_NOISE:
         notes.append(
-            f"the noise of dark frames is {noise:.2g} of a code, too little for rounding to average "
-            "out: values of dim views are off by more than their deviations"
+            f"the noise of dark frames is {noise:.2g} of a code, too little for rounding to "
+            "average out: values of dim views are off by more than their deviations"
         )
     if len(hot):
         notes.append(f"{len(hot)} hot site(s) of the sensor are replaced by their neighbours")
