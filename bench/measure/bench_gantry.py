@@ -1,7 +1,7 @@
 """A known thread through the simulated gantry and back: errors, coverage of intervals, speed.
 
     python bench/measure/bench_gantry.py [--part views|fits|printed|half|coverage|speed|words ...]
-        [--repeats 200]
+        [--repeats 20]
 
 The seven threads of [Bisker2011] Table 3.1 as presets, with their published numbers. Frames are
 48 x 96, exposures .02 to .8 s, two shots of each, a thread 5 pixels wide and defocused by 3.
@@ -190,7 +190,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     every = ("views", "fits", "printed", "half", "coverage", "speed", "words")
     parser.add_argument("--part", nargs="*", choices=every, default=every)
-    parser.add_argument("--repeats", type=int, default=200)
+    parser.add_argument("--repeats", type=int, default=20)
     given = parser.parse_args()
     for part in given.part:
         start = time.perf_counter()
