@@ -6,6 +6,7 @@ to the radiance, with the cosine of the inclination, `sqrt(1 - x^2)`. A thread s
 whole sphere.
 
     evaluate, sample, pdf        (n, 3) float64 arrays of directions; exact to rounding
+    split                        the two terms apart, for fits: on the calling thread, fast tables
     evaluate_soa                 (3, n) arrays of either precision; the fast loop
     terms, density, ...          scalar kernels on a row of `pack_threads`
 """
@@ -30,6 +31,7 @@ from fabricusd.appearance.scattering.columns import (
     ISOTROPIC,
     MODEL,
     SURFACE_GAIN,
+    TRANSMISSION_ENTRIES,
 )
 from fabricusd.appearance.scattering.models import REGISTRY
 from fabricusd.appearance.scattering.sampling import density, sample_direction
@@ -68,6 +70,7 @@ __all__ = [
     "pdf",
     "sample",
     "sample_direction",
+    "split",
     "terms",
     "terms_at",
     "thread_row",
@@ -78,6 +81,22 @@ Floats = NDArray[np.float64]
 
 CHUNK = 4096
 """Number of directions that a worker takes at a time: 150 kB in float32, which fit in its cache."""
+
+
+SPLIT_ENTRIES = 91
+"""Entries that `split` computes of the tables of the conserving model, in a sixth of the time. The
+others are interpolated: up to 85 degrees of inclination `f_s` is then 1e-4 off (rms), at most 4e-4,
+with a volume lobe of 24 degrees, and 6e-4, at most 4e-3, with one of 2 degrees."""
+
+
+class Terms(NamedTuple):
+    """`f_s = surface + volume A` per channel [1/sr].
+
+    surface, volume : (n,) float
+    """
+
+    surface: Floats
+    volume: Floats
 
 
 class Sample(NamedTuple):
@@ -106,6 +125,26 @@ def evaluate(thread: Thread, wi: ArrayLike, wo: ArrayLike, model: str | None = N
     out = np.empty_like(i)
     _evaluate_soa(np.float64, thread_row(thread, _model_of(thread, model)), i, o, out)
     return np.ascontiguousarray(out.T)
+
+
+def split(
+    thread: Thread, wi: ArrayLike, wo: ArrayLike, model: str | None = None, *, exact: bool = False
+) -> Terms:
+    """The two terms of `evaluate`, which does not depend on the albedo otherwise.
+
+    exact : compute all entries of the model's tables, see SPLIT_ENTRIES; only the conserving model
+        has any
+
+    It runs on the calling thread and releases Python's lock, so that many fits can run beside one
+    another. It is smooth in the thread's parameters: steps of 1e-6 give derivatives. Arguments and
+    errors are those of `evaluate`.
+    """
+    i, o = _pairs(wi, wo)
+    surface, volume = np.empty(i.shape[1]), np.empty(i.shape[1])
+    name = _model_of(thread, model)
+    row = thread_row(thread, name, TRANSMISSION_ENTRIES if exact else SPLIT_ENTRIES)
+    _split(np.float64, row, i, o, surface, volume)
+    return Terms(surface, volume)
 
 
 def pdf(thread: Thread, wi: ArrayLike, wo: ArrayLike, model: str | None = None) -> Floats:
@@ -276,6 +315,14 @@ def _evaluate_soa(R, row, wi, wo, out):
             _table_block(R, model, constants, scale, added, i, o, channels)
         else:
             _direct_block(R, model, constants, i, o, channels)
+
+
+@njit(**KERNEL)
+def _split(R, row, wi, wo, surface, volume):
+    for k in range(surface.size):
+        surface[k], volume[k] = terms(
+            R, row, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
+        )
 
 
 @njit(**KERNEL, parallel=True)

@@ -38,6 +38,8 @@ COMMANDS = {
     "dress": "put a fabric on garments, in a lit studio with a camera",
     "check": "find faults in fabrics, threads and bindings",
     "sides": "measure where a fabric's light goes, for the conserving model",
+    "measure": "turn photographs of a thread into its lobes, and into the thread itself",
+    "fit": "fit a thread to measured lobes, with intervals",
     "bake": "bake a fabric on a garment into textures",
     "material": "turn a bake into materials for USD, MaterialX and other tools",
     "blender-addon": "write the Blender add-on that imports materials with their garment",

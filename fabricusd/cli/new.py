@@ -13,9 +13,10 @@ from fabricusd.cli.arguments.draft import (
     add_sources,
     given_draft,
 )
+from fabricusd.cli.arguments.thread import named_thread
 from fabricusd.cli.arguments.yarn import add_yarns, settle_densities, spun
 from fabricusd.cli.terminal.stdout import write_utf8
-from fabricusd.errors import FabricError, did_you_mean
+from fabricusd.errors import FabricError
 
 if TYPE_CHECKING:
     from fabricusd.fabric import Fabric, Thread
@@ -174,8 +175,6 @@ def _flag(option: str) -> str:
 def _base_thread(options: argparse.Namespace) -> Thread:
     from dataclasses import replace
 
-    from fabricusd.schema.anysource import load_any
-
     if not options.thread:
         from fabricusd.dye.make import thread_of
         from fabricusd.weaves.yarn import DEFAULT_FIBRE, fibre_density
@@ -183,15 +182,8 @@ def _base_thread(options: argparse.Namespace) -> Thread:
         fibre = options.fibre or DEFAULT_FIBRE
         fibre_density(fibre)
         return thread_of(fibre.lower())
-    file, _, wanted = options.thread.partition(":")
-    fabric, _notes = load_any(file)
-    if wanted and wanted not in fabric.threads:
-        raise FabricError(
-            f"--thread '{options.thread}'",
-            f"is not a thread of {file}{did_you_mean(wanted, fabric.threads)}; it must be one of "
-            f"{', '.join(fabric.threads)}",
-        )
-    thread = fabric.threads[wanted or next(iter(fabric.threads))]
+    fabric, name = named_thread(options.thread)
+    thread = fabric.threads[name]
     # How it scatters is a matter of the fibre; how thick it is, of this cloth.
     return replace(thread, thickness=0.0, linear_density=0.0)
 

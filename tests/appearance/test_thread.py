@@ -249,3 +249,44 @@ def test_the_float32_loops_are_vectorised_without_a_call():
                 assert re.search(r"fadd.*<(8|16) x float>", text), block
                 calls = re.findall(r"call [^@\n]*@([\w.]+)\(", text)
                 assert not [c for c in calls if re.match(r"(exp|sin|cos|a?tan|erf|log)", c)]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_terms_apart_add_up_to_the_whole(model):
+    wi, wo = SPECIAL, np.roll(SPECIAL, 1, axis=0)
+    t = Thread(albedo=(0.0, 0.3, 0.9), surface_gain=2.0)
+    terms = thread.split(t, wi, wo, model, exact=True)
+    whole = terms.surface[:, None] + terms.volume[:, None] * np.array(t.albedo)
+    np.testing.assert_allclose(whole, thread.evaluate(t, wi, wo, model), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("gamma_volume", "most"), [(24, 5e-4), (60, 5e-4), (2, 5e-3)])
+def test_the_fast_tables_of_the_terms_are_near_the_exact_ones(gamma_volume, most):
+    angle = np.radians(np.linspace(-85, 85, 40))
+    a, b = (x.ravel() for x in np.meshgrid(angle, angle))
+    wi = np.stack([np.sin(a), 0 * a, np.cos(a)], axis=1)
+    wo = np.stack([np.sin(b), 0.6 * np.cos(b), 0.8 * np.cos(b)], axis=1)
+    for gamma_surface in (2, 12, 30):
+        t = Thread(
+            gamma_surface=math.radians(gamma_surface), gamma_volume=math.radians(gamma_volume)
+        )
+        fast, exact = (thread.split(t, wi, wo, "conserving", exact=e) for e in (False, True))
+        ratio = (fast.surface + fast.volume) / (exact.surface + exact.volume)
+        assert np.abs(ratio - 1).max() < most
+
+
+def test_the_terms_are_smooth_enough_for_steps_of_an_optimiser():
+    wi = np.tile([0.3, 0.0, math.sqrt(0.91)], (20, 1))
+    x = np.linspace(-0.9, 0.9, 20)
+    wo = np.stack([x, 0 * x, np.sqrt(1 - x * x)], axis=1)
+    for model in MODELS:
+        for name, value in (("ior", 1.5), ("gamma_surface", 0.2), ("isotropic", 0.3)):
+            slopes = []
+            for step in (1e-6, 1e-4):
+                up, down = (
+                    thread.split(replace(Thread(), **{name: value + s}), wi, wo, model)
+                    for s in (step, -step)
+                )
+                slopes.append((up.surface - down.surface + up.volume - down.volume) / (2 * step))
+            scale = np.abs(slopes[1]).max()
+            np.testing.assert_allclose(slopes[0], slopes[1], atol=1e-3 * scale)

@@ -45,6 +45,8 @@ SAFE = {
     "material": ["--dry-run"],
     "new": ["--dry-run"],
     "blender-addon": ["--dry-run"],
+    "measure": ["--dry-run"],
+    "fit": ["--dry-run"],
     "chart": ["--list-panels"],
     "demo": ["--output", "x.obj/never"],
 }

@@ -55,8 +55,9 @@ class ThreadModel:
         known, in which case curves are integrated by points only
     looked_up : (R, row, cos_i, cos_o) -> (factor, addend) of the volume term, read from tables;
         None for (1, 0)
-    transmission : thread -> T for the columns from TRANSMISSION on; None without this table
-    completion : thread -> (x for the columns from COMPLETION on, X); None without this table
+    transmission : thread, entries -> T for the columns from TRANSMISSION on; None without this
+        table. `entries` is how many are computed, all by default; the others are interpolated
+    completion : thread, entries -> (x for the columns from COMPLETION on, X); None without it
     widths : gs, gv -> the standard deviations of theta_i [rad] that samplers use for the surface
         and the volume lobe around the mirror inclination
     most_albedo : `A` is clamped to this value, which is 1 if `A` is an albedo
@@ -71,7 +72,7 @@ class ThreadModel:
     plain: Callable[[Thread, Any, Any], tuple[Floats, Floats]]
     cell_lobes: Kernel = None
     looked_up: Kernel = None
-    transmission: Callable[[Thread], Floats] | None = None
-    completion: Callable[[Thread], tuple[Floats, float]] | None = None
+    transmission: Callable[..., Floats] | None = None
+    completion: Callable[..., tuple[Floats, float]] | None = None
     widths: Callable[[float, float], tuple[float, float]] = mirror_widths
     most_albedo: float = math.inf

@@ -22,8 +22,13 @@ def pack_threads(fabric: Fabric, precision: type[np.floating[Any]] = np.float64)
     return np.ascontiguousarray(rows, dtype=precision)
 
 
-def thread_row(thread: Thread, name: str) -> NDArray[np.float64]:
-    """(COLUMNS,) float64 row of one thread evaluated by the model called `name`; see `columns`."""
+def thread_row(
+    thread: Thread, name: str, entries: int = column.TRANSMISSION_ENTRIES
+) -> NDArray[np.float64]:
+    """(COLUMNS,) float64 row of one thread evaluated by the model called `name`; see `columns`.
+
+    entries : of the model's tables that are computed; the others are interpolated
+    """
     model = named(name)
     row = np.zeros(column.COLUMNS)
     albedo = np.minimum(np.array(thread.albedo), model.most_albedo)
@@ -40,13 +45,13 @@ def thread_row(thread: Thread, name: str) -> NDArray[np.float64]:
     for first, deviation in ((column.SURFACE_LOBE, gs), (column.VOLUME_LOBE, gv)):
         row[first : first + 2] = model.lobe_constants(deviation)
     if model.transmission is not None:
-        through = model.transmission(thread)
+        through = model.transmission(thread, entries)
         _fill(row, column.TRANSMISSION, through)
         # A surface that reflects everything transmits nothing; T/T_max is then 0 instead of 0/0.
         largest = float(through.max())
         row[column.INVERSE_T_MAX] = 1.0 / largest if largest > 0 else 0.0
     if model.completion is not None:
-        lost, norm = model.completion(thread)
+        lost, norm = model.completion(thread, entries)
         row[column.COMPLETION_SCALE] = scale = (2.0 * math.pi * norm) ** 0.5
         _fill(row, column.COMPLETION, lost / scale if scale > 0 else lost)
     return row

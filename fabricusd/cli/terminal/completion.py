@@ -9,7 +9,7 @@ from fabricusd.errors import FabricError
 
 SHELLS = ("bash", "zsh", "tcsh")
 
-FILES = ("FILE", "SCENE", "OUT", "MESH", "A", "B", "PNG", "LOOK", "MD", "JSON", "SKY")
+FILES = ("FILE", "SCENE", "OUT", "MESH", "A", "B", "PNG", "LOOK", "MD", "JSON", "SKY", "LOBES")
 FOLDERS = ("DIR", "FOLDER")
 """Placeholders of values that are names of files, or of folders."""
 

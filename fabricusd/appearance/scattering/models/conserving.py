@@ -123,17 +123,21 @@ def energies(R, row, cos_o, transmitted, around, narrow_s, narrow_v):
     return surface, (R(1) - kd) * whole, kd * whole + completed
 
 
-def thread_transmission(thread: Thread) -> Floats:
+def thread_transmission(thread: Thread, entries: int = TRANSMISSION_ENTRIES) -> Floats:
     """(TRANSMISSION_ENTRIES,) T at uniformly spaced sqrt(cos theta) from 0 to 1."""
     gs = max(thread.gamma_surface, NARROWEST)
-    return np.asarray(1.0 - surface_albedo(gs, thread.ior, thread.surface_gain))
+    return np.asarray(1.0 - surface_albedo(gs, thread.ior, thread.surface_gain, entries))
 
 
 @lru_cache(maxsize=256)
-def surface_albedo(gamma_surface: float, ior: float, surface_gain: float) -> Floats:
+def surface_albedo(
+    gamma_surface: float, ior: float, surface_gain: float, entries: int = TRANSMISSION_ENTRIES
+) -> Floats:
     """(TRANSMISSION_ENTRIES,) directional albedo `E(theta)` of the surface term, at most 1.
 
     E is `integral f_surface cos(theta_o) dwo`, at uniformly spaced sqrt(cos theta) from 0 to 1.
+
+    entries : number of them that are integrated; a cubic spline gives the others
     """
     row = np.zeros(COLUMNS)
     ior, gamma_surface = min(ior, LARGEST_IOR), max(gamma_surface, NARROWEST)
@@ -141,11 +145,11 @@ def surface_albedo(gamma_surface: float, ior: float, surface_gain: float) -> Flo
     row[SURFACE_GAIN] = surface_gain
     row[GAMMA_SURFACE] = gamma_surface
     row[SURFACE_LOBE : SURFACE_LOBE + 2] = lobe_constants(gamma_surface)
-    albedo = np.empty(TRANSMISSION_ENTRIES)
+    albedo = np.empty(entries)
     x, x_weight = np.polynomial.legendre.leggauss(_NODES)
     y, y_weight = np.polynomial.legendre.leggauss(_AZIMUTHS)
     _integrate_surface(row, x, x_weight, (y + 1) * math.pi / 2, y_weight * math.pi, albedo)
-    albedo = np.minimum(albedo, 1.0)
+    albedo = np.clip(_filled(albedo), 0.0, 1.0)
     albedo.flags.writeable = False
     return albedo
 
@@ -183,10 +187,20 @@ def _integrate_surface(row, x, x_weight, phi, phi_weight, out):
         out[k] = total
 
 
-def thread_completion(thread: Thread) -> tuple[Floats, float]:
+def _filled(values: Floats) -> Floats:
+    """(TRANSMISSION_ENTRIES,) entries, from any number of them at the same ends."""
+    if len(values) == TRANSMISSION_ENTRIES:
+        return values
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(np.linspace(0.0, 1.0, len(values)), values)
+    return np.asarray(spline(np.linspace(0.0, 1.0, TRANSMISSION_ENTRIES)))
+
+
+def thread_completion(thread: Thread, entries: int = TRANSMISSION_ENTRIES) -> tuple[Floats, float]:
     """((TRANSMISSION_ENTRIES,) x at sqrt(cos theta) uniform from 0 to 1, X)."""
     gs, gv = max(thread.gamma_surface, NARROWEST), max(thread.gamma_volume, NARROWEST)
-    return lost_energy(gs, thread.ior, thread.surface_gain, gv, thread.isotropic)
+    return lost_energy(gs, thread.ior, thread.surface_gain, gv, thread.isotropic, entries)
 
 
 LEAST_NORM = 1e-9
@@ -195,24 +209,33 @@ LEAST_NORM = 1e-9
 
 @lru_cache(maxsize=256)
 def lost_energy(
-    gamma_surface: float, ior: float, surface_gain: float, gamma_volume: float, isotropic: float
+    gamma_surface: float,
+    ior: float,
+    surface_gain: float,
+    gamma_volume: float,
+    isotropic: float,
+    entries: int = TRANSMISSION_ENTRIES,
 ) -> tuple[Floats, float]:
     """(x, X): what the surface and the volume term lose of the light at A = 1, by inclination.
 
     x : (TRANSMISSION_ENTRIES,) max(0, 1 - E - V) at sqrt(cos theta) uniform from 0 to 1
     X : integral of x cos^2 theta over +-90 degrees, of x interpolated linearly in sqrt(cos theta);
         0, and x with it, where that is below LEAST_NORM
+    entries : as in `surface_albedo`
     """
-    through = 1.0 - surface_albedo(gamma_surface, ior, surface_gain)
-    volume = np.zeros_like(through)
+    through = 1.0 - surface_albedo(gamma_surface, ior, surface_gain, entries)
+    volume = np.zeros(entries)
     largest = float(through.max())
     if largest > 0.0:
         x, x_weight = np.polynomial.legendre.leggauss(_NODES)
         constants = np.array(lobe_constants(gamma_volume))
         reach = 2.0 * _REACH * gamma_volume
         _integrate_volume(through, constants, reach, x, x_weight, volume)
+        volume = _filled(volume)
         even = 2.0 / math.pi * cosine_square_integral(through)
         volume = through / largest * ((1.0 - isotropic) * volume + isotropic * even)
+    else:
+        volume = np.zeros_like(through)
     lost = np.maximum(0.0, through - volume)
     norm = cosine_square_integral(lost)
     if norm < LEAST_NORM:

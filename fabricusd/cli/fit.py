@@ -1,0 +1,52 @@
+"""`fabricusd fit`."""
+
+from __future__ import annotations
+
+import argparse
+
+from fabricusd.cli.arguments.fitting import add_fitting, deliver, fitted, require_outputs, tell
+from fabricusd.errors import FabricError
+
+EPILOG = """LOBES is a table that 'measure' wrote, or any CSV with the columns theta_i, theta_o and
+phi_d (degrees, inclinations from the thread's normal plane) and f_r, f_g and f_b (1/sr, without the
+cosine). The columns sigma_r, sigma_g and sigma_b are their standard deviations.
+
+Printed are chi2 per degree of freedom and 95 % intervals. Parameters that the views do not tell
+apart are said to be, with the product that the views do tell.
+
+example:
+  fabricusd fit lobes.csv -o thread.usda
+  fabricusd fit lobes.csv --model all --plots plots --report fit.json"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The table, how it is fitted, and where to write."""
+    parser.add_argument("table", metavar="LOBES", help="table of lobes, .csv or .npz")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help=".usda, .usdc or .usd file for the fitted thread (default: print only)",
+    )
+    add_fitting(parser)
+    parser.add_argument(
+        "-n", "--dry-run", action="store_true", help="read the table, but fit and write nothing"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fit a thread, print what is known of it, and write it."""
+    from fabricusd.measure.lobes import described, gaps, read_lobes
+
+    if not options.table:
+        raise FabricError("LOBES", "is empty; it must be the name of a table")
+    lobes = read_lobes(options.table)
+    tell(lobes, options)
+    if options.dry_run:
+        print(described(lobes))
+        for gap in gaps(lobes):
+            print(gap)
+        return 0
+    require_outputs(options)
+    deliver(lobes, fitted(lobes, options), options.table, options)
+    return 0

@@ -1,0 +1,1 @@
+"""From photographs to lobes: response, exposures merged, white reference, one value per view."""

@@ -1,0 +1,1 @@
+"""From lobes to the thread that scatters like them."""

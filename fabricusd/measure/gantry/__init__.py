@@ -1,0 +1,1 @@
+"""A simulated gantry: photographs of a thread whose scattering is known."""

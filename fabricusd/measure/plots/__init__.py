@@ -1,0 +1,1 @@
+"""Plots of lobes, measured and fitted side by side."""
