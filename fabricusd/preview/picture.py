@@ -19,6 +19,7 @@ from fabricusd.errors import FabricError, did_you_mean
 from fabricusd.fabric import Fabric
 from fabricusd.images.view import View, encode
 from fabricusd.preview.kernels.raster import NOTHING, frames, rasterise, reached
+from fabricusd.preview.kernels.start import start
 from fabricusd.preview.lights import Lights
 from fabricusd.preview.occlusion import occlusion_of, shadow_map
 from fabricusd.preview.shapes import SHAPES, Shape
@@ -52,8 +53,14 @@ class Picture:
 
     def codes(self, exposure: float = 0.0, view: View | None = None) -> NDArray[np.uint8]:
         """(h, w, 3) 8-bit sRGB before a grey background; exposure in stops, see `images.view`."""
-        behind = (1.0 - self.cover[..., None]) * BACKGROUND * 2.0**-exposure
-        return encode(self.radiance + behind, exposure, view)
+        ground = np.full(3, BACKGROUND * 2.0**-exposure)
+        drawn = self.cover > 0
+        codes = np.empty((*self.cover.shape, 3), np.uint8)
+        # Most of a picture may be ground, and encoding takes as long as shading.
+        codes[...] = encode(ground, exposure, view)
+        behind = (1.0 - self.cover[drawn])[:, None] * ground
+        codes[drawn] = encode(self.radiance[drawn] + behind, exposure, view)
+        return codes
 
 
 def preview(
@@ -117,6 +124,7 @@ def shaded(
     st : (m, 3, 2) weave coordinates at the corners [threads]; size : (width, height)
     surfaces : what the triangles wear; material : (m,) index into it, None where it has one
     """
+    start()
     scene = _Scene(shape, st, camera, size, lights)
     draw = _far if level == "far" else _near
     worn = _Worn(surfaces, material)
