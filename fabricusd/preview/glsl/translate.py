@@ -27,12 +27,19 @@ class Promoted(Exception):  # noqa: N818 - asks for another attempt, and is no e
 class Translation:
     """All functions that were translated, in the order in which GLSL needs them.
 
-    fields : GLSL names of the members of groups of tables, see `tables.FIELDS`
+    fields : what the members of groups of tables are, see `tables.fields`
     special : id of a function -> (translation, arguments) -> Value, for what is not translated
+    choose : translates a call of what `kernels.choice` made
     """
 
-    def __init__(self, fields: dict[str, Any], special: dict[int, Callable[..., Value]]) -> None:
+    def __init__(
+        self,
+        fields: dict[Any, Value],
+        special: dict[int, Callable[..., Value]],
+        choose: Callable[[Translation, Any, list[Value]], Value],
+    ) -> None:
         self.fields, self.special = fields, special
+        self.choose = lambda function, arguments: choose(self, function, arguments)
         self.text: list[str] = []
         self.structs: dict[Any, tuple[str, list[tuple[str, Any]]]] = {}
         self.functions: dict[Any, tuple[str, Any]] = {}
@@ -44,6 +51,8 @@ class Translation:
         handler = self.special.get(id(function)) or self.special.get(id(python))
         if handler is not None:
             return handler(self, arguments)
+        if python.__module__ == "fabricusd.kernels.choice":
+            return self.choose(function, arguments)
         key = (python, tuple(self._key(a) for a in arguments))
         if key not in self.functions:
             self.functions[key] = self._function(python, arguments)
@@ -184,6 +193,10 @@ class _Function(Expressions):
             self.assign(node.target.id, self.expression(whole))  # type: ignore[union-attr]
         elif isinstance(node, ast.For):
             self.loop(node)
+        elif isinstance(node, ast.While):
+            self.add(f"while ({as_type(self.expression(node.test), BOOL)}) {{")
+            self.inner(node.body)
+            self.add("}")
         elif isinstance(node, ast.Continue | ast.Break):
             self.add("continue;" if isinstance(node, ast.Continue) else "break;")
         elif not isinstance(node, ast.Expr):
