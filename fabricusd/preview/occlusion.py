@@ -1,23 +1,35 @@
-"""Shadows that a shape casts on itself: of the key light, and of the sky as a share at corners."""
+"""Shadows that a shape casts on itself: of the key light, and of the sky at its vertices."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.cache import kept
 from fabricusd.preview.kernels.raster import NOTHING, rasterise, reached
-from fabricusd.preview.lights import Lights
 from fabricusd.preview.shapes import Shape
 from fabricusd.scene.studio import looking
 
 Floats = NDArray[np.float64]
 
-DIRECTIONS, MAP = 96, 256
-"""Directions of the sky for which the corners' share is found, and texels of their maps."""
+DIRECTIONS, MAP = 64, 256
+"""Directions of the sky, and texels of the maps that say where each of them arrives."""
+
+
+class Visibility(NamedTuple):
+    """Which directions of the sky reach the vertices of a shape.
+
+    first : (v,) int64 - a corner (three times the triangle, plus 0 to 2) at each vertex
+    vertex : (m, 3) int64 - the vertex of each corner
+    arrives : (v, DIRECTIONS) bool
+    """
+
+    first: NDArray[np.int64]
+    vertex: NDArray[np.int64]
+    arrives: NDArray[np.bool_]
 
 
 def orthographic(points: Floats, towards: Floats, size: int) -> Floats:
@@ -30,10 +42,9 @@ def orthographic(points: Floats, towards: Floats, size: int) -> Floats:
     low, high = local.min(axis=0), local.max(axis=0)
     scale = (size - 4) / max(float((high - low)[:2].max()), 1e-12)
     out = np.zeros((3, 4))
-    for row, (axis, sign) in enumerate(((0, 1.0), (1, 1.0), (2, -1.0))):
-        factor = scale if row < 2 else 1.0
-        out[row, :3] = sign * factor * frame[:3, axis]
-        out[row, 3] = 2.0 - factor * low[axis] if row < 2 else high[2]
+    for row, (factor, sign) in enumerate(((scale, 1.0), (scale, 1.0), (1.0, -1.0))):
+        out[row, :3] = sign * factor * frame[:3, row]
+        out[row, 3] = 2.0 - factor * low[row] if row < 2 else high[2]
     return out
 
 
@@ -51,28 +62,42 @@ def shadow_map(points: Floats, towards: Floats, size: int) -> tuple[Floats, Floa
     return matrix, depth
 
 
-def occlusion_of(shape: Shape, lights: Lights) -> NDArray[np.float32]:
-    """(m, 3) share of the sky's irradiance that reaches the corners, kept in the cache."""
-    key = (1, DIRECTIONS, MAP, shape.points, shape.normals, lights.zenith, lights.nadir)
-    return kept("occlusion", key, lambda: _occlusion(shape, lights))
-
-
-def _occlusion(shape: Shape, lights: Lights) -> NDArray[np.float32]:
-    up = shape.subject.axes[:, 1]
+def sky_directions() -> Floats:
+    """(DIRECTIONS, 3) unit vectors, evenly all around, each for the same solid angle."""
     k = np.arange(DIRECTIONS)
     height, turn = 1.0 - (2.0 * k + 1.0) / DIRECTIONS, k * (math.pi * (3.0 - math.sqrt(5.0)))
     flat = np.sqrt(1.0 - height * height)
-    sky = np.stack((flat * np.cos(turn), flat * np.sin(turn), height), axis=-1)
-    normals = shape.normals.reshape(-1, 3)
-    lifted = shape.points.reshape(-1, 3) + normals * (3.0 * shape.subject.radius / MAP * 2.0)
-    total, met = np.zeros(len(normals)), np.zeros(len(normals))
-    lit = np.empty(len(normals), np.float32)
-    for towards in sky:
-        cosine = np.maximum(normals @ towards, 0.0) * (lights.even + lights.slope * (towards @ up))
+    return np.stack((flat * np.cos(turn), height, flat * np.sin(turn)), axis=-1)
+
+
+def visibility_of(shape: Shape) -> Visibility:
+    """What of the sky reaches the vertices of `shape`, kept in the cache."""
+    key = (DIRECTIONS, MAP, shape.points, shape.normals)
+    vertex = kept("occlusion", ("vertices", *key), lambda: _vertices(shape))
+    count = int(vertex.max()) + 1
+    first = np.empty(count, np.int64)
+    first[vertex.ravel()[::-1]] = np.arange(vertex.size)[::-1]
+    bits = kept("occlusion", ("arrives", *key), lambda: _arrivals(shape, first))
+    return Visibility(first, vertex, np.unpackbits(bits, axis=1)[:, :DIRECTIONS].astype(bool))
+
+
+def _vertices(shape: Shape) -> NDArray[np.int64]:
+    """(m, 3) number of the vertex at each corner: corners of the same place and normal share it."""
+    rows = np.concatenate((shape.points, shape.normals), axis=-1).reshape(-1, 6)
+    single = np.ascontiguousarray(rows, np.float32)
+    _, number = np.unique(single.view(np.dtype((np.void, 24))).ravel(), return_inverse=True)
+    return np.asarray(number.reshape(-1, 3), np.int64)
+
+
+def _arrivals(shape: Shape, first: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """(v, DIRECTIONS/8) bits of `Visibility.arrives`."""
+    normals = shape.normals.reshape(-1, 3)[first]
+    lifted = shape.points.reshape(-1, 3)[first] + normals * (6.0 * shape.subject.radius / MAP)
+    lit = np.empty(len(first), np.float32)
+    found = np.zeros((len(first), DIRECTIONS), bool)
+    for k, towards in enumerate(sky_directions()):
         matrix, depth = shadow_map(shape.points, towards, MAP)
         at: Any = lifted @ matrix[:, :3].T + matrix[:, 3]
         reached(depth, *(np.ascontiguousarray(at[:, x], np.float32) for x in range(3)), lit)
-        total += cosine
-        met += cosine * lit
-    share = np.divide(met, total, out=np.ones_like(met), where=total > 0)
-    return np.ascontiguousarray(share.reshape(-1, 3), np.float32)
+        found[:, k] = lit > 0.5
+    return np.packbits(found, axis=1)

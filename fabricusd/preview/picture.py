@@ -21,7 +21,7 @@ from fabricusd.images.view import View, encode
 from fabricusd.preview.kernels.raster import NOTHING, frames, rasterise, reached
 from fabricusd.preview.kernels.start import start
 from fabricusd.preview.lights import Lights
-from fabricusd.preview.occlusion import occlusion_of, shadow_map
+from fabricusd.preview.occlusion import shadow_map, sky_directions, visibility_of
 from fabricusd.preview.shapes import SHAPES, Shape
 from fabricusd.preview.surfaces import R2, SKY_DIRECTIONS, Cloth, Seen, Surface
 from fabricusd.preview.tables import tables_of
@@ -128,6 +128,8 @@ def shaded(
     scene = _Scene(shape, st, camera, size, lights)
     draw = _far if level == "far" else _near
     worn = _Worn(surfaces, material)
+    if scene.map is not None:
+        scene.open_sky(worn)
     radiance, cover = draw(scene, worn, level, samples)
     width, height = size
     return Picture(
@@ -156,6 +158,16 @@ class _Worn:
             out[:, mine] = self.surfaces[index].radiance(seen.of(mine), lights, level, own)
         return out
 
+    def value_far(self, triangles: NDArray[np.int64], wi: Reals, wo: Reals) -> Reals:
+        """(n,) mean over the channels of the values at level `far`."""
+        which = np.zeros(len(triangles), int) if self.material is None else self.material[triangles]
+        found = np.zeros(len(triangles), REAL)
+        for index in np.unique(which):
+            mine = np.flatnonzero(which == index)
+            i, o = (np.ascontiguousarray(w[:, mine]) for w in (wi, wo))
+            found[mine] = self.surfaces[index].value_far(i, o).mean(axis=0)
+        return found
+
 
 class _Scene:
     """A shape before a camera, with the shadow map of the key light."""
@@ -171,10 +183,35 @@ class _Scene:
         self.arrays = shape.points, shape.normals, shape.tangents, shape.hand, st
         self.radius = shape.subject.radius
         self.map: Any = None
-        self.occlusion: Any = None
+        self.open: Any = None
         if not shape.convex:
             self.map = shadow_map(shape.points, self.key, SHADOW_SIZE)
-            self.occlusion = occlusion_of(shape, lights)
+
+    def open_sky(self, worn: _Worn) -> None:
+        """Find how much of what each vertex would send of the sky reaches the viewer.
+
+        The share is that of the light from `sky_directions` that arrives, weighted by the cloth's
+        value at level `far`: cloth that shines at a grazing view lacks what it would mirror.
+        """
+        found = visibility_of(self.shape)
+        triangle, corner = found.first // 3, found.first % 3
+        weights = np.stack((corner == 1, corner == 2), axis=-1).astype(REAL)
+        share = np.ones(len(triangle), REAL)
+        some = np.arange(len(triangle))
+        axes = [self.seen(some, triangle, weights, key).wi for key in np.eye(3)]
+        wo = self.seen(some, triangle, weights).wo
+        some = np.flatnonzero(wo[2] > 0.0)
+        wo = np.ascontiguousarray(wo[:, some])
+        total, met = np.zeros(len(some), REAL), np.zeros(len(some), REAL)
+        for k, towards in enumerate(sky_directions()):
+            wi = sum(axes[x][:, some] * REAL(towards[x]) for x in range(3))
+            above = np.flatnonzero(wi[2] > 0.0)  # type: ignore[index]
+            light = REAL(self.lights.even + self.lights.slope * float(towards @ self.up))
+            value = worn.value_far(triangle[some[above]], wi[:, above], wo[:, above]) * light  # type: ignore[index]
+            total[above] += value
+            met[above] += value * found.arrives[some[above], k]
+        share[some] = np.divide(met, total, out=np.ones_like(met), where=total > 0)
+        self.open = share[found.vertex]
 
     def drawn(self, offset: Any) -> tuple[NDArray[np.int32], Reals]:
         """The triangle in each pixel and the place in it, as `rasterise`; both are flat."""
@@ -185,22 +222,23 @@ class _Scene:
         rasterise(self.corners, float(offset[0]), float(offset[1]), depth, triangle, weights)
         return triangle.reshape(-1), weights.reshape(-1, 2)
 
-    def seen(self, pixels: Any, triangle: Any, weights: Any) -> Seen:
-        """What the covered pixels see."""
+    def seen(self, pixels: Any, triangle: Any, weights: Any, key: Any = None) -> Seen:
+        """What the covered pixels see; key : (3,) instead of the direction to the key light."""
         n = len(pixels)
         wo, wi, sky = (np.empty((3, n), REAL) for _ in range(3))
         uv, place = np.empty((n, 2)), np.empty((n, 3), REAL)
         lift = 4.0 * self.radius / SHADOW_SIZE
+        towards = self.key if key is None else key
         frames(
-            self.arrays, self.eye, self.key, self.up, lift, pixels, triangle, weights, wo, wi, sky,
+            self.arrays, self.eye, towards, self.up, lift, pixels, triangle, weights, wo, wi, sky,
             uv, place,
         )  # fmt: skip
         lit, reach = np.ones(n, REAL), np.ones(n, REAL)
-        if self.map is not None:
+        if self.open is not None:
             matrix, depth = self.map
             at = place @ matrix[:, :3].T.astype(REAL) + matrix[:, 3].astype(REAL)
             reached(depth, *(np.ascontiguousarray(at[:, k]) for k in range(3)), lit)
-            near, corner = weights[pixels], self.occlusion[triangle[pixels]]
+            near, corner = weights[pixels], self.open[triangle[pixels]]
             reach = (1.0 - near.sum(axis=1)) * corner[:, 0] + (near * corner[:, 1:]).sum(axis=1)
         return Seen(wo, wi, sky, uv, lit, reach)
 

@@ -56,6 +56,10 @@ class Surface(Protocol):
         """(3, n) radiance towards the viewer."""
         ...
 
+    def value_far(self, wi: Reals, wo: Reals) -> Reals:
+        """(3, n) value at level `far`."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class Cloth:
@@ -82,6 +86,10 @@ class Cloth:
             value += f * (weight / np.maximum(wi[2], REAL(1e-4)))
         return np.asarray(value, REAL)
 
+    def value_far(self, wi: Reals, wo: Reals) -> Reals:
+        """See `Surface`."""
+        return value_far(self.tables, wi, wo)
+
 
 @dataclass(frozen=True, eq=False)
 class Matte:
@@ -94,6 +102,11 @@ class Matte:
         key = np.maximum(seen.wi[2], 0.0) * (lights.key / math.pi) * seen.lit
         sky = (lights.even + lights.slope * (2.0 / 3.0) * seen.zenith[2]) * seen.open
         return np.asarray(np.array(self.diffuse)[:, None] * (key + sky), REAL)
+
+    def value_far(self, wi: Reals, wo: Reals) -> Reals:
+        """See `Surface`."""
+        diffuse = np.array(self.diffuse, REAL)[:, None] * REAL(1 / math.pi)
+        return np.asarray(diffuse * np.maximum(wi[2], REAL(0)), REAL)
 
 
 def _cosine_directions(u: Reals) -> Reals:

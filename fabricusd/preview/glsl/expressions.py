@@ -278,5 +278,3 @@ def _side(table: Table, k: int) -> str:
 def _with(node: ast.BinOp, a: Any, b: Any) -> ast.expr:
     tree = ast.BinOp(ast.Constant(a), node.op, ast.Constant(b))
     return ast.fix_missing_locations(tree)
-
-

@@ -57,12 +57,14 @@ def shader() -> str:
     made = Translation(fields(), special, chosen)
     made.struct(Place, (INT, INT, FLOAT, FLOAT, FLOAT))
     made.struct(Hit, (INT, INT, FLOAT, FLOAT, FLOAT))
-    kinds = {"f": Value("", FLOAT), "i": Value("", INT), "R": Value("", REAL),
-             "false": constant(False), "place": Value("", Place), "hit": Value("", Hit)}  # fmt: skip
+    kinds = {
+        "f": Value("", FLOAT), "i": Value("", INT), "R": Value("", REAL), "false": constant(False),
+        "place": Value("", Place), "hit": Value("", Hit),
+    }  # fmt: skip
     for kernel, types in ROOTS:
         made.call(kernel, [kinds.get(t) or Value("", Group(t)) for t in types.split()])
     head = [
-        "// Written by `python -m fabricusd.preview.glsl` from the kernels of fabricusd.appearance.",
+        "// Made by `python -m fabricusd.preview.glsl` of the kernels in fabricusd.appearance",
         *(f"#define {name.upper()} {number}" for number, name in enumerate(LAWS)),
         "ivec4 split_cell; vec2 split_place; ivec2 split_entry;",
     ]
@@ -157,4 +159,3 @@ def _cells(function: Any) -> dict[str, Any]:
     python = getattr(function, "py_func", function)
     names = python.__code__.co_freevars
     return dict(zip(names, (c.cell_contents for c in python.__closure__ or ()), strict=True))
-

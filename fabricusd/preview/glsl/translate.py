@@ -11,16 +11,17 @@ from typing import Any
 from fabricusd.preview.glsl.expressions import Expressions
 from fabricusd.preview.glsl.values import BOOL, FLOAT, INT, REAL, Row, Several, Value, as_type
 
-TAKEN = frozenset(
-    "half out in inout flat smooth sample filter input output far near precision length step mix "
-    "sign fract mod min max exp log sin cos tan asin acos atan sqrt abs floor ceil round dot cross "
-    "distance reflect refract any all not true false const uniform varying texture active common "
-    "partition resource cast namespace using row_major patch".split()
-)
+_WORDS = """
+half out in inout flat smooth sample filter input output far near precision length step mix sign
+fract mod min max exp log sin cos tan asin acos atan sqrt abs floor ceil round dot cross distance
+reflect refract any all not true false const uniform varying texture active common partition
+resource cast namespace using row_major patch
+"""
+TAKEN = frozenset(_WORDS.split())
 """Words that a variable of a kernel may have for a name, but not one of GLSL."""
 
 
-class Promoted(Exception):  # noqa: N818 - asks for another attempt, and is no error
+class Promoted(Exception):
     """A variable that began as an int is a float."""
 
 
@@ -110,7 +111,7 @@ def passes(argument: Value) -> bool:
         return False
     if isinstance(argument.type, str):
         return argument.type != REAL
-    return isinstance(argument.type, Row) or isinstance(argument.type, type)
+    return isinstance(argument.type, Row | type)
 
 
 class _Function(Expressions):
@@ -138,9 +139,7 @@ class _Function(Expressions):
             given = arguments[k] if k < len(arguments) else self.expression(defaults[k])
             if passes(given):
                 self.types[name] = given.type
-                self.parameters.append(
-                    f"{translation.glsl_type(given.type)} {self.variable(name)}"
-                )
+                self.parameters.append(f"{translation.glsl_type(given.type)} {self.variable(name)}")
             else:
                 self.known[name] = given
         self.block(tree.body)
@@ -168,10 +167,7 @@ class _Function(Expressions):
 
     def block(self, body: list[ast.stmt]) -> bool:
         """Translate statements; whether the last one ended the function for sure."""
-        for statement in body:
-            if self.statement(statement):
-                return True
-        return False
+        return any(self.statement(statement) for statement in body)
 
     def inner(self, body: list[ast.stmt]) -> None:
         """Translate statements one step further in."""
@@ -290,9 +286,7 @@ def _read(target: ast.expr) -> ast.expr:
 
 def _closure(python: Any) -> dict[str, Any]:
     cells = python.__closure__ or ()
-    return {
-        n: c.cell_contents for n, c in zip(python.__code__.co_freevars, cells, strict=True)
-    }
+    return {n: c.cell_contents for n, c in zip(python.__code__.co_freevars, cells, strict=True)}
 
 
 def _assignments(tree: ast.AST) -> dict[str, int]:
