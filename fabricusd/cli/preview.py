@@ -46,6 +46,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=".png file (default: the terminal, or SOURCE.png in this folder)",
     )  # fmt: skip
     parser.add_argument(
+        "--page", metavar="HTML",
+        help="write one .html file that shows the cloth with WebGL2: turn it, move the light, "
+        "change its threads (default: a picture)",
+    )  # fmt: skip
+    parser.add_argument(
         "--shape", choices=SHAPES,
         help="what wears the cloth (default: the scene if SOURCE has meshes, else a cylinder)",
     )  # fmt: skip
@@ -108,11 +113,42 @@ def run(options: argparse.Namespace) -> int:
     RANGES["elevation"].require("--light ELEVATION", elevation)
     lights = Lights(azimuth=math.radians(azimuth), elevation=math.radians(elevation))
     if options.sheet or options.presets or options.variants:
+        if options.page:
+            raise FabricError("--page", "shows one SOURCE; it must stand without a sheet")
         return _sheet(options, lights, begun)
     if len(options.sources) != 1:
         given = "is missing" if not options.sources else f"is {len(options.sources)} names"
         raise FabricError("SOURCE", f"{given}; give one, or several with --sheet")
+    if options.page:
+        return _page(options, options.sources[0], lights, begun)
     return _one(options, options.sources[0], lights, begun)
+
+
+def _page(options: argparse.Namespace, source: str, lights: Lights, begun: float) -> int:
+    """Write the page of a fabric, with the mesh of the scene if SOURCE is one."""
+    from fabricusd.preview.page import page
+
+    if Path(options.page).suffix.lower() != ".html":
+        raise FabricError(options.page, "is not a name for the page; it must end in .html")
+    if options.output:
+        raise FabricError("-o", f"names a picture, '{options.output}'; give it without --page")
+    _require_new(Path(options.page), options.no_clobber)
+    mesh = None
+    if (options.shape or _shape_of(source)) == "scene":
+        from fabricusd.preview.scenes import shape_of_scene
+
+        dressed = _fabric(options.fabric, options) if options.fabric else None
+        found = shape_of_scene(source, dressed, options.camera, 1.0, options.units)
+        for note in found.notes:
+            _say(options, note)
+        fabric, mesh = found.cloth(source)
+    else:
+        fabric = _fabric(source, options)
+    text = page(fabric, lights=lights, mesh=mesh).encode()
+    _write(options.page, text)
+    seconds = time.perf_counter() - begun
+    _say(options, f"{options.page}: {len(text) / 1e6:.2g} MB in {seconds:.2g} s")
+    return 0
 
 
 def _one(options: argparse.Namespace, source: str, lights: Lights, begun: float) -> int:

@@ -33,8 +33,29 @@ class SceneShape:
     st: NDArray[np.float64]
     material: NDArray[np.int32]
     surfaces: list[Surface]
+    fabrics: list[Fabric | None]
     camera: Camera
     notes: tuple[str, ...]
+
+    def cloth(self, source: str) -> tuple[Fabric, Shape]:
+        """The fabric that most triangles wear, and those triangles; FabricError without any."""
+        counts = np.bincount(self.material, minlength=len(self.fabrics))
+        worn = [k for k, fabric in enumerate(self.fabrics) if fabric is not None and counts[k]]
+        if not worn:
+            raise FabricError(source, "has no mesh that wears a fabric; name one with --fabric")
+        best = max(worn, key=lambda k: int(counts[k]))
+        fabric = self.fabrics[best]
+        assert fabric is not None
+        some = self.material == best
+        metres = self.st[some] / np.array([fabric.warp.density, fabric.weft.density])
+        parts = {
+            name: getattr(self.shape, name)[some]
+            for name in ("points", "normals", "tangents", "hand")
+        }
+        towards = self.camera.frame[:3, 2]
+        return fabric, Shape(
+            **parts, metres=metres, convex=False, towards=tuple(float(x) for x in towards)
+        )
 
 
 def shape_of_scene(
@@ -73,6 +94,7 @@ def shape_of_scene(
     return SceneShape(
         shape=shape, st=st, material=table.material,
         surfaces=[_surface(m) for m in scene.materials],
+        fabrics=[m.binding.fabric if isinstance(m, FabricSurface) else None for m in scene.materials],
         camera=_camera(scene.camera, shape.subject, turn, aspect), notes=tuple(scene.notes),
     )  # fmt: skip
 

@@ -70,12 +70,11 @@ def decoded(text: str) -> np.ndarray:
         elif one[10]:
             x, top = 0, top + 6
         else:
-            for _ in range(int(one[6] or 1)):
-                bits = ord(one[7] or one[8]) - 63
-                for k in range(6):
-                    if bits >> k & 1:
-                        out[top + k, x] = palette[color]
-                x += 1
+            bits, count = ord(one[7] or one[8]) - 63, int(one[6] or 1)
+            for k in range(6):
+                if bits >> k & 1:
+                    out[top + k, x : x + count] = palette[color]
+            x += count
     return out[:h]
 
 

@@ -1,4 +1,4 @@
-// Written by `python -m fabricusd.preview.glsl` from the kernels in fabricusd/appearance.
+// Made by `python -m fabricusd.preview.glsl` of the kernels in fabricusd.appearance
 #define MASKED 0
 #define UNMASKED 1
 #define PROJECTED 2
