@@ -94,9 +94,13 @@ def shape_of_scene(
     return SceneShape(
         shape=shape, st=st, material=table.material,
         surfaces=[_surface(m) for m in scene.materials],
-        fabrics=[m.binding.fabric if isinstance(m, FabricSurface) else None for m in scene.materials],
+        fabrics=[_fabric(m) for m in scene.materials],
         camera=_camera(scene.camera, shape.subject, turn, aspect), notes=tuple(scene.notes),
     )  # fmt: skip
+
+
+def _fabric(material: Material) -> Fabric | None:
+    return material.binding.fabric if isinstance(material, FabricSurface) else None
 
 
 def _surface(material: Material) -> Surface:
