@@ -202,7 +202,7 @@ def test_a_page_runs_its_own_script_only():
 
 def test_a_page_that_would_be_too_large_is_refused(monkeypatch):
     monkeypatch.setattr(page_module, "MOST_BYTES", 1000)
-    with pytest.raises(FabricError, match="would be a page of .* MB; it must be at most"):
+    with pytest.raises(FabricError, match=r"would be a page of .* MB; it must be at most"):
         page(Fabric())
 
 

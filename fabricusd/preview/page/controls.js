@@ -38,8 +38,8 @@ function restored(text) {
 }
 
 // On a slow machine the picture has fewer pixels, so that it follows the hand.
-const SLOW = 250, FAST = 16, COARSEST = 0.25;
-let finer = 0.5, slow = false;
+const SLOW = 250, FAST = 17, COARSEST = 0.25;  // milliseconds, milliseconds, share of the pixels' sides
+let finer = 0.5, slow = false, still = false;
 
 const controls = [];  // each { show() } brings an input up to the state
 
@@ -201,6 +201,7 @@ function levelNow() {
 
 function moved() {  // coarse again, if finer pictures were slow
   viewer.frames = 0;
+  still = false;
   if (slow) finer = COARSEST;
 }
 
@@ -254,9 +255,9 @@ canvas.onkeydown = e => {
 function adapt() {
   const before = finer;
   if (mean > SLOW) slow = true;
-  if (viewer.frames === 3 && slow) finer = Math.max(COARSEST, finer / 2);
-  if (viewer.frames === 3 && mean <= FAST + 1) finer = Math.min(1, finer * 2);
-  if (viewer.frames > 24 && finer < 1 && !fingers.size && !spin) finer = 1;  // nothing moves: refine
+  if (viewer.frames === 3 && slow && !still) finer = Math.max(COARSEST, finer / 2);
+  if (viewer.frames === 3 && mean <= FAST) finer = Math.min(1, finer * 2);
+  if (viewer.frames > 24 && !fingers.size && !spin) { finer = 1; still = true; }
   if (finer !== before) mean = last = 0;
 }
 
