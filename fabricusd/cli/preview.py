@@ -126,7 +126,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _page(options: argparse.Namespace, source: str, lights: Lights, begun: float) -> int:
     """Write the page of a fabric, with the mesh of the scene if SOURCE is one."""
-    from fabricusd.preview.page import page
+    from fabricusd.preview.page.make import page
 
     if Path(options.page).suffix.lower() != ".html":
         raise FabricError(options.page, "is not a name for the page; it must end in .html")

@@ -204,10 +204,10 @@ class _Scene:
         wo = np.ascontiguousarray(wo[:, some])
         total, met = np.zeros(len(some), REAL), np.zeros(len(some), REAL)
         for k, towards in enumerate(sky_directions()):
-            wi = sum(axes[x][:, some] * REAL(towards[x]) for x in range(3))
-            above = np.flatnonzero(wi[2] > 0.0)  # type: ignore[index]
+            wi: Any = sum(axes[x][:, some] * REAL(towards[x]) for x in range(3))
+            above = np.flatnonzero(wi[2] > 0.0)
             light = REAL(self.lights.even + self.lights.slope * float(towards @ self.up))
-            value = worn.value_far(triangle[some[above]], wi[:, above], wo[:, above]) * light  # type: ignore[index]
+            value = worn.value_far(triangle[some[above]], wi[:, above], wo[:, above]) * light
             total[above] += value
             met[above] += value * found.arrives[some[above], k]
         share[some] = np.divide(met, total, out=np.ones_like(met), where=total > 0)

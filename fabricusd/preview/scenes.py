@@ -52,10 +52,8 @@ class SceneShape:
             name: getattr(self.shape, name)[some]
             for name in ("points", "normals", "tangents", "hand")
         }
-        towards = self.camera.frame[:3, 2]
-        return fabric, Shape(
-            **parts, metres=metres, convex=False, towards=tuple(float(x) for x in towards)
-        )
+        x, y, z = (float(w) for w in self.camera.frame[:3, 2])
+        return fabric, Shape(**parts, metres=metres, convex=False, towards=(x, y, z))
 
 
 def shape_of_scene(

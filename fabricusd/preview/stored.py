@@ -33,7 +33,7 @@ def from_json(text: str) -> Fabric:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
-        bits = base64.b64encode(np.packbits(value)).decode()
+        bits = base64.b64encode(np.packbits(value).tobytes()).decode()
         return {"is": "cells", "shape": list(value.shape), "bits": bits}
     if is_dataclass(value) and not isinstance(value, type):
         said = {f.name: _plain(getattr(value, f.name)) for f in fields(value)}

@@ -11,11 +11,12 @@ import pytest
 from fabricusd.appearance import surface
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, even
-from fabricusd.preview import page as page_module
 from fabricusd.preview.fabrics import fabric_of
 from fabricusd.preview.glsl.kernels import SHADER, shader
-from fabricusd.preview.page import FOLDER, mesh_arrays, page
-from fabricusd.preview.page_tables import thread_controls
+from fabricusd.preview.page import make
+from fabricusd.preview.page.arrays import mesh_arrays
+from fabricusd.preview.page.make import FOLDER, page
+from fabricusd.preview.page.tables import thread_controls
 from fabricusd.preview.picture import Picture, preview
 from fabricusd.preview.shapes import SHAPES
 from fabricusd.quality.colors import delta_e_2000
@@ -201,7 +202,7 @@ def test_a_page_runs_its_own_script_only():
 
 
 def test_a_page_that_would_be_too_large_is_refused(monkeypatch):
-    monkeypatch.setattr(page_module, "MOST_BYTES", 1000)
+    monkeypatch.setattr(make, "MOST_BYTES", 1000)
     with pytest.raises(FabricError, match=r"would be a page of .* MB; it must be at most"):
         page(Fabric())
 
@@ -215,7 +216,7 @@ def test_threads_whose_tables_the_page_cannot_make_have_no_controls():
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_mesh_is_what_it_was_to_a_hundredth_of_a_percent(shape):
-    from tests.preview.arrays import decoded
+    from tests.preview.page_arrays import decoded
 
     made = SHAPES[shape](Fabric())
     said = mesh_arrays(made)

@@ -40,7 +40,7 @@ class Translation:
         choose: Callable[[Translation, Any, list[Value]], Value],
     ) -> None:
         self.fields, self.special = fields, special
-        self.choose = lambda function, arguments: choose(self, function, arguments)
+        self.choose = choose
         self.text: list[str] = []
         self.structs: dict[Any, tuple[str, list[tuple[str, Any]]]] = {}
         self.functions: dict[Any, tuple[str, Any]] = {}
@@ -53,7 +53,7 @@ class Translation:
         if handler is not None:
             return handler(self, arguments)
         if python.__module__ == "fabricusd.kernels.choice":
-            return self.choose(function, arguments)
+            return self.choose(self, function, arguments)
         key = (python, tuple(self._key(a) for a in arguments))
         if key not in self.functions:
             self.functions[key] = self._function(python, arguments)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.conserving.multiple import conserving_tables
 from fabricusd.appearance.fuzz import optical_depth
-from fabricusd.appearance.laws import law_of
+from fabricusd.appearance.laws import REGISTRY, law_of
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.scattering import columns as column
 from fabricusd.appearance.scattering.models import any_conserving, any_published
@@ -22,6 +22,7 @@ from fabricusd.appearance.weave.quadrature import default_rule
 from fabricusd.fabric import Fabric, Thread
 from fabricusd.preview.glsl.tables import NUMBERS, TABLES
 from fabricusd.preview.glsl.values import FLOAT, INT
+from fabricusd.preview.page.arrays import array
 
 REAL: Any = np.float32
 
@@ -31,8 +32,6 @@ CONTROLS = ("red", "green", "blue", "ior", "isotropic", "surface", "volume")
 
 def fabric_tables(fabric: Fabric) -> tuple[dict[str, Any], dict[str, Any]]:
     """(tables, where the page finds the threads' rows)."""
-    from fabricusd.preview.page import array
-
     groups = _groups(fabric)
     flat: dict[str, list[NDArray[Any]]] = {FLOAT: [], INT: [], "byte": []}
     used = dict.fromkeys(flat, 0)
@@ -92,8 +91,6 @@ def _field(groups: dict[str, Any], name: str) -> Any:
 
 def _defines(fabric: Fabric) -> dict[str, Any]:
     """The macros that choose what of the shaders a fabric needs."""
-    from fabricusd.appearance.laws import REGISTRY
-
     laws = {law: name for name, law in REGISTRY.items()}
     return {
         "LAW": laws[law_of(fabric)].upper(), "PUBLISHED": int(any_published(fabric)),

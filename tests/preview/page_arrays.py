@@ -9,6 +9,6 @@ import numpy as np
 
 
 def decoded(said: dict[str, str]) -> np.ndarray:
-    """The flat array of `page.array`."""
+    """The flat array of `arrays.array`."""
     kind: Any = np.dtype(said["type"]).newbyteorder("<")
     return np.frombuffer(base64.b64decode(said["data"]), kind)
