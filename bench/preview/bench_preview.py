@@ -32,7 +32,7 @@ from fabricusd.preview.shapes import SHAPES
 from fabricusd.quality.colors import delta_e_2000
 from fabricusd.srgb import srgb_decode
 
-SIZE, REFERENCE, FEW, REPEATS = 96, 512, 4, 3
+SIZE, REFERENCE, FEW, REPEATS = 64, 512, 4, 2
 COMMAND_SIZE = 512
 
 

@@ -87,6 +87,7 @@ def test_the_page_s_values_are_those_of_the_surface_laws(browser, tmp_path, name
         # Half of the pairs have a value, and the bound bites: a percent more would be seen.
         assert (wanted > 0).mean() > 0.3
         assert (0.01 * brightest / np.maximum(brightest, least)).mean() > bound
+    shown.tab.close()
 
 
 def test_the_page_draws_what_the_preview_draws(linen):
@@ -176,6 +177,7 @@ def test_a_narrow_window_has_all_controls_below_the_picture(browser, tmp_path):
     )
     assert panel[0] >= stage[1] - 1
     assert stage[2] == panel[2] == width == 390
+    shown.tab.close()
 
 
 def test_what_a_url_says_is_taken_where_it_fits(browser, tmp_path):
@@ -187,6 +189,7 @@ def test_what_a_url_says_is_taken_where_it_fits(browser, tmp_path):
         tab.goto(f"{path.as_uri()}#{said}")
         tab.wait_for_function("window.fabricusd", timeout=60_000)
         assert tab.evaluate("Math.round(fabricusd.state.azimuth)") == azimuth
+    tab.close()
 
 
 def test_a_page_runs_its_own_script_only():
