@@ -3,9 +3,9 @@
 python bench/preview/bench_preview.py [--presets NAME ...] [--shapes NAME ...] [--json FILE]
 
 The difference is the mean delta E 2000 over the pixels that the shape covers, to a path-traced
-picture of REFERENCE samples without bounces; `noise` is that of a second such picture. `render` is
-the sampling time of the path tracer at the samples at which it differs as much, from its difference
-at FEW samples: the mean error falls with the root of the samples. `wall` and `cpu` are those of the
+picture of REFERENCE samples without bounces; `noise` is what the noise of that picture contributes.
+`render` is the sampling time of the path tracer at the samples at which it differs as much. Both
+follow from its difference at FEW samples, since the mean error falls with the root of the samples. `wall` and `cpu` are those of the
 whole command, Python included, the fastest of REPEATS runs after a first.
 """
 
@@ -32,7 +32,7 @@ from fabricusd.preview.shapes import SHAPES
 from fabricusd.quality.colors import delta_e_2000
 from fabricusd.srgb import srgb_decode
 
-SIZE, REFERENCE, FEW, REPEATS = 64, 512, 4, 2
+SIZE, REFERENCE, FEW, REPEATS = 128, 256, 4, 2
 COMMAND_SIZE = 512
 
 
@@ -48,7 +48,7 @@ def difference(a: Picture, b: Picture) -> float:
 
 
 def traced(fabric: Any, shape: str, spp: int, seed: int) -> tuple[Picture, float]:
-    """A path-traced picture at level `far`, and the seconds of its sampling."""
+    """A path-traced picture at level `far`, and the processor time of its sampling [s]."""
     found, seconds = reference_picture(
         fabric, shape=shape, level="far", size=SIZE, lights=Lights(), spp=spp, seed=seed
     )
@@ -70,13 +70,13 @@ def row(name: str, shape: str, out: Path) -> dict[str, Any]:
     """All figures of a preset on a shape."""
     fabric, _ = fabric_of(name)
     wanted, _ = traced(fabric, shape, REFERENCE, 0)
-    again, _ = traced(fabric, shape, REFERENCE, 1)
-    few, seconds = traced(fabric, shape, FEW, 2)
+    few, seconds = traced(fabric, shape, FEW, 1)
+    rough = difference(few, wanted)
     mine = difference(preview(fabric, shape=shape, level="far", size=SIZE), wanted)
     times = [command(name, shape, out) for _ in range(1 + REPEATS)][1:]
     return {
-        "preset": name, "shape": shape, "difference": mine, "noise": difference(again, wanted),
-        "render": seconds * (difference(few, wanted) / mine) ** 2
+        "preset": name, "shape": shape, "difference": mine, "noise": rough * (FEW / REFERENCE) ** 0.5,
+        "render": seconds * (rough / mine) ** 2
         * (COMMAND_SIZE / SIZE) ** 2,
         "wall": min(w for w, _ in times), "cpu": min(c for _, c in times),
     }  # fmt: skip

@@ -42,9 +42,9 @@ def _mesh(path: str, shape: Shape, points: Any, material: int) -> Mesh:
 def reference_picture(
     fabric: Fabric, *, shape: str, level: str, size: int, lights: Lights, spp: int, seed: int = 0
 ) -> tuple[Any, float]:
-    """((h, w, 4) path-traced radiance and cover without bounces, seconds of sampling)."""
+    """((h, w, 4) path-traced radiance and cover without bounces, processor time of it [s])."""
     result = render_scene(
         scene_of(fabric, shape, lights), width=size, height=size, spp=spp, max_bounces=0,
         level=level, shadow="horizon", seed=seed,
     )  # fmt: skip
-    return result.layers["beauty"], result.seconds
+    return result.layers["beauty"], result.processor_seconds

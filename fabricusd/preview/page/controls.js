@@ -140,7 +140,7 @@ number('light', plain('azimuth', { label: 'Azimuth', low: -180, high: 180, step:
 number('light', plain('elevation', { label: 'Elevation', low: -90, high: 90, step: 1, unit: '°' }));
 number('light', plain('key', { label: 'Key', low: 0, high: 10, step: 0.05, unit: 'W/m²' }));
 number('light', plain('sky', { label: 'Sky', low: 0, high: 2, step: 0.01, unit: 'W/m²/sr' }));
-number('display', plain('exposure', { label: 'Exposure', low: -6, high: 6, step: 0.1, unit: 'stops' }));
+number('display', plain('exposure', { label: 'Exposure', low: -6, high: 6, step: 0.1, unit: 'EV' }));
 data.threads.forEach((thread, k) => {
   const box = document.createElement('fieldset'), legend = document.createElement('legend');
   box.id = `thread${k}`;
