@@ -5,8 +5,9 @@ python bench/preview/bench_preview.py [--presets NAME ...] [--shapes NAME ...] [
 The difference is the mean delta E 2000 over the pixels that the shape covers, to a path-traced
 picture of REFERENCE samples without bounces; `noise` is what the noise of that picture contributes.
 `render` is the sampling time of the path tracer at the samples at which it differs as much. Both
-follow from its difference at FEW samples, since the mean error falls with the root of the samples. `wall` and `cpu` are those of the
-whole command, Python included, the fastest of REPEATS runs after a first.
+follow from its difference at FEW samples, since the mean error falls with the root of the samples.
+`wall` and `cpu` are those of the whole command, Python included, the fastest of REPEATS runs after
+a first.
 """
 
 from __future__ import annotations
@@ -75,9 +76,9 @@ def row(name: str, shape: str, out: Path) -> dict[str, Any]:
     mine = difference(preview(fabric, shape=shape, level="far", size=SIZE), wanted)
     times = [command(name, shape, out) for _ in range(1 + REPEATS)][1:]
     return {
-        "preset": name, "shape": shape, "difference": mine, "noise": rough * (FEW / REFERENCE) ** 0.5,
-        "render": seconds * (rough / mine) ** 2
-        * (COMMAND_SIZE / SIZE) ** 2,
+        "preset": name, "shape": shape, "difference": mine,
+        "noise": rough * (FEW / REFERENCE) ** 0.5,
+        "render": seconds * (rough / mine) ** 2 * (COMMAND_SIZE / SIZE) ** 2,
         "wall": min(w for w, _ in times), "cpu": min(c for _, c in times),
     }  # fmt: skip
 

@@ -69,14 +69,16 @@ class Cloth:
 
     def radiance(self, seen: Seen, lights: Lights, level: str, numbers: Any) -> Reals:
         """See `Surface`."""
+        # The lining holds back what would come through the cloth.
+        key = lights.key * seen.lit * (seen.wi[2] > 0.0)
         if level == "far":
-            value = value_far(self.tables, seen.wi, seen.wo) * (lights.key * seen.lit)
+            value = value_far(self.tables, seen.wi, seen.wo) * key
             sky = np.zeros_like(value)
             even, slope = REAL(lights.even), REAL(lights.slope)
             sky_light(REAL, self.tables.sky, even, slope, seen.wo, seen.zenith, sky)
             return np.asarray(value + sky * seen.open, REAL)
         hit = look_up(self.tables, seen.uv)
-        value = value_near(self.tables, level, hit, seen.wi, seen.wo) * (lights.key * seen.lit)
+        value = value_near(self.tables, level, hit, seen.wi, seen.wo) * key
         for number in range(SKY_DIRECTIONS):
             u = (numbers + (number * R2).astype(REAL)[:, None]) % 1.0
             wi = _cosine_directions(u)

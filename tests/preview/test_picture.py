@@ -59,11 +59,14 @@ def test_the_mean_of_level_weave_is_level_far():
     assert a == pytest.approx(b, rel=0.03)
 
 
-def test_a_light_from_behind_leaves_the_sky_alone():
-    fabric, _ = fabric_of("linen_plain")
+@pytest.mark.parametrize("name", ["linen_plain", "denim"])
+@pytest.mark.parametrize("level", ["far", "weave"])
+def test_a_light_from_behind_leaves_the_sky_alone(name, level):
+    # Denim lets light through, but not its lining.
+    fabric, _ = fabric_of(name)
     behind = Lights(azimuth=math.pi, elevation=0.0)
-    lit = preview(fabric, shape="swatch", level="far", size=16, lights=behind)
-    dark = preview(fabric, shape="swatch", level="far", size=16, lights=replace(behind, key=0.0))
+    lit = preview(fabric, shape="swatch", level=level, size=16, lights=behind)
+    dark = preview(fabric, shape="swatch", level=level, size=16, lights=replace(behind, key=0.0))
     assert np.array_equal(lit.radiance, dark.radiance)
     assert lit.radiance[8, 8].min() > 0
 

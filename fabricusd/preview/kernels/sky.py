@@ -10,7 +10,7 @@ from numba import njit
 from fabricusd.appearance.frame import diamond
 from fabricusd.kernels.real import LEAN
 
-ROWS, COLUMNS = 24, 32
+ROWS, COLUMNS = 32, 48
 """Entries of the table: in sqrt(1 - N.wo), and in the diamond angle; one more column repeats the
 first."""
 
