@@ -137,9 +137,9 @@ def variant_sources(source: str | os.PathLike[str]) -> list[str]:
 
 def holds(source: str | os.PathLike[str], kind: str) -> bool:
     """Whether the stage of `source` has a prim of this type; FabricError as `open_stage`."""
-    every = Usd.PrimRange.Stage(
-        open_stage(source)[0], Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
-    )
+    # Prims expire with their stage.
+    stage, _ = open_stage(source)
+    every = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
     return any(prim.GetTypeName() == kind for prim in every)
 
 

@@ -56,6 +56,57 @@ def test_a_mesh_wears_the_fabric(capsys, tmp_path):
     assert np.ptp(codes[9, 16].astype(int)) > 20
 
 
+@pytest.fixture
+def garment(capsys, tmp_path):
+    """A USD scene: a square that wears linen, in a studio."""
+    mesh, scene = tmp_path / "square.obj", tmp_path / "garment.usda"
+    mesh.write_text(
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+        "f 1/1 2/2 3/3 4/4\n"
+    )  # fmt: skip
+    status, _, err = run(
+        capsys, "dress", str(mesh), "--fabric", "linen_plain", "-o", str(scene), "--units", "m"
+    )
+    assert status == 0, err
+    return scene
+
+
+def test_a_scene_is_seen_by_its_camera(capsys, garment, tmp_path):
+    out = tmp_path / "a.png"
+    status, _, err = run(capsys, "preview", str(garment), "--size", "48", "-o", str(out))
+    assert status == 0, err
+    assert "garment on a scene, 48 x 27 pixels" in err
+    codes = oiio.ImageBuf(str(out)).get_pixels(oiio.UINT8).astype(int)
+    # Teal cloth before a grey backdrop.
+    assert np.ptp(codes[13, 24]) > 20
+    assert np.ptp(codes[2, 2]) < 12
+
+
+def test_a_page_of_a_scene_has_its_mesh(capsys, garment, tmp_path):
+    out = tmp_path / "a.html"
+    status, _, err = run(capsys, "preview", str(garment), "--page", str(out))
+    assert status == 0, err
+    assert '"meshes":{"scene":' in out.read_text()
+
+
+def test_a_fabric_file_is_shown_on_a_shape(capsys, tmp_path):
+    layer, out = tmp_path / "mine.usda", tmp_path / "a.png"
+    run(capsys, "new", "--weave", "twill 2/2", "-o", str(layer))
+    status, _, err = run(capsys, "preview", str(layer), "--size", "16", "-o", str(out))
+    assert status == 0, err
+    assert "mine on a cylinder" in err
+
+
+def test_a_page_without_cloth_is_refused(capsys, tmp_path):
+    mesh = tmp_path / "bare.obj"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n")
+    out = tmp_path / "a.html"
+    status, _, err = run(capsys, "preview", str(mesh), "--units", "m", "--page", str(out))
+    assert status == 2
+    assert "has no mesh that wears a fabric; name one with --fabric" in err
+    assert not out.exists()
+
+
 def test_a_sheet_is_a_picture_and_a_page(capsys, tmp_path):
     out = tmp_path / "sheet.png"
     status, _, _ = run(
@@ -93,6 +144,9 @@ def test_variants_are_listed_on_a_sheet(capsys, tmp_path):
         (("velvt", "-o", "a.png"), "(did you mean 'velvet'?)"),
         (("denim", "--shape", "cylindr"), "(did you mean 'cylinder'?)"),
         (("denim", "--view", "filmic"), "--view is 'filmic'"),
+        (("denim", "--page", "a.htm"), "a.htm is not a name for the page; it must end in .html"),
+        (("denim", "--page", "a.html", "-o", "a.png"), "-o names a picture, 'a.png'"),
+        (("denim", "--page", "a.html", "--sheet"), "--page shows one SOURCE"),
     ],
 )
 def test_slips_are_refused_in_one_line(arguments, said, capsys, tmp_path, monkeypatch):
