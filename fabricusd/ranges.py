@@ -70,7 +70,7 @@ RANGES = {
     "azimuth": Range(low=-360, high=360, unit="degrees"),
     "elevation": Range(low=-90, high=90, unit="degrees"),
     "size": Range(low=16, high=4096, whole=True, unit="pixels"),
-    "preview_samples": Range(low=1, high=1024, whole=True, unit="samples a pixel"),
+    "samples": Range(low=1, high=1024, whole=True, unit="samples a pixel"),
     "orbit": Range(low=1, high=3600, whole=True, unit="pictures"),
     "dome_rotation": Range(low=-360, high=360, unit="degrees"),
     "packing": Range(low=0, high=1, above=True),

@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "horizon (default: -35 40)",
     )  # fmt: skip
     parser.add_argument(
-        "--samples", type=number("preview_samples"), metavar="N",
+        "--samples", type=number("samples"), metavar="N",
         help="samples per pixel (default: 8)",
     )  # fmt: skip
     parser.add_argument(
@@ -273,8 +273,12 @@ def _require_png(output: str, no_clobber: bool) -> None:
 
 
 def _require_new(path: Path, no_clobber: bool) -> None:
+    """Refuse now what could not be written when the picture is done."""
+    from fabricusd.files import require_writable
+
     if no_clobber and os.path.lexists(path):
         raise FabricError(str(path), "exists; it must be a new name with --no-clobber")
+    require_writable(path)
 
 
 def _write(output: str, data: bytes) -> None:

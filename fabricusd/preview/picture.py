@@ -105,7 +105,7 @@ def require(level: str, width: int, height: int, samples: int | None) -> None:
     for side in (width, height):
         RANGES["size"].require("size", side)
     if samples is not None:
-        RANGES["preview_samples"].require("samples", samples)
+        RANGES["samples"].require("samples", samples)
 
 
 def shaded(

@@ -47,6 +47,7 @@ SAFE = {
     "blender-addon": ["--dry-run"],
     "chart": ["--list-panels"],
     "demo": ["--output", "x.obj/never"],
+    "preview": ["--output", "x.obj/never.png"],
 }
 
 word = st.sampled_from(WORDS) | st.text(max_size=12) | st.floats().map(str) | st.integers().map(str)

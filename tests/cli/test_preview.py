@@ -138,6 +138,7 @@ def test_variants_are_listed_on_a_sheet(capsys, tmp_path):
         (("denim", "velvet"), "SOURCE is 2 names; give one"),
         (("denim", "-o", "a.jpg"), "a.jpg is not a name for the picture; it must end in .png"),
         (("denim", "--light", "0", "91"), "--light ELEVATION is 91; it must be from -90 to 90"),
+        (("denim", "--light", "nan", "0"), "--light AZIMUTH is nan; it must be from -360 to 360"),
         (("denim", "--presets"), "--presets takes no SOURCE, but 'denim' is given"),
         (("--sheet",), "SOURCE is missing; name the fabrics of the sheet"),
         (("--sheet", "denim", "--shape", "scene"), "--shape scene cannot be on a sheet"),
