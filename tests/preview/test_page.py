@@ -188,6 +188,7 @@ def test_what_a_url_says_is_taken_where_it_fits(browser, tmp_path):
         tab.goto("about:blank")
         tab.goto(f"{path.as_uri()}#{said}")
         tab.wait_for_function("window.fabricusd", timeout=60_000)
+        tab.evaluate("fabricusd.viewer.frames = 1e6")
         assert tab.evaluate("Math.round(fabricusd.state.azimuth)") == azimuth
     tab.close()
 

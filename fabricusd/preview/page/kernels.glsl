@@ -6,11 +6,24 @@ ivec4 split_cell; vec2 split_place; ivec2 split_entry;
 uniform sampler2D floats;
 uniform highp isampler2D ints;
 uniform highp usampler2D bytes;
+uniform sampler2D quads;
 layout(std140) uniform Shapes { ivec4 shapes[74]; };
 layout(std140) uniform Numbers { vec4 numbers[17]; };
 float F(int k) { return texelFetch(floats, ivec2(k & 2047, k >> 11), 0).r; }
 int I(int k) { return texelFetch(ints, ivec2(k & 2047, k >> 11), 0).r; }
 int B(int k) { return int(texelFetch(bytes, ivec2(k & 2047, k >> 11), 0).r); }
+// `laws.lit.mean_over`, by four groups at a time.
+float mean_of_groups(int at, int here, int beside, float c, float level) {
+  float total = 0.0;
+  for (int k = 0; k < 6; ++k) {
+    int i = at + (here >> 2) + k, j = at + (beside >> 2) + k;
+    vec4 a = texelFetch(quads, ivec2(i & 2047, i >> 11), 0);
+    vec4 b = texelFetch(quads, ivec2(j & 2047, j >> 11), 0);
+    vec4 t = clamp(level - (a + (b - a) * c), 0.0, 1.0);
+    total += dot(t * t * (3.0 - 2.0 * t), vec4(1.0));
+  }
+  return total * 0.041666666666666664;
+}
 #define published_threads_at shapes[0].x
 #define published_threads_n0 shapes[0].y
 #define published_threads_n1 shapes[0].z
@@ -562,20 +575,6 @@ float k_level_of(float z, float softness) {
   return ((k_asin32(z) / softness) + 0.5);
 }
 
-float k_mean_over(int groups, int here, int beside, float c, float level) {
-  float total;
-  float horizon;
-  float t;
-  total = 0.0;
-  for (int k = 0; k < groups; ++k) {
-    horizon = F(published_horizons_at + (here + k));
-    horizon = (horizon + ((F(published_horizons_at + (beside + k)) - horizon) * c));
-    t = max(0.0, min(1.0, (level - horizon)));
-    total = (total + ((t * t) * (3.0 - (2.0 * t))));
-  }
-  return (total * 0.041666666666666664);
-}
-
 float k_lit_alone_1(int node, float x, float y, float z) {
   T_if t1;
   int column;
@@ -592,7 +591,7 @@ float k_lit_alone_1(int node, float x, float y, float z) {
   step_ = (published_lit_nodes * 24);
   begin = ((column * step_) + (node * 24));
   level = k_level_of(z, published_softness);
-  return k_mean_over(published_groups, begin, (begin + step_), c, level);
+  return mean_of_groups(published_horizons_at, begin, (begin + step_), c, level);
 }
 
 float k_law_lit_alone(int a2, float a3, float a4, float a5) {
@@ -1672,20 +1671,6 @@ int k_stretch_of(int which, int thread, float s) {
   return ((I(shadow_mean_first_at + (which) * shadow_mean_first_n1 + thread) + I(shadow_piece_first_at + (thread) * shadow_piece_first_n1 + p)) + part);
 }
 
-float k_mean_over_1(int groups, int here, int beside, float c, float level) {
-  float total;
-  float horizon;
-  float t;
-  total = 0.0;
-  for (int k = 0; k < groups; ++k) {
-    horizon = F(shadow_mean_at + (here + k));
-    horizon = (horizon + ((F(shadow_mean_at + (beside + k)) - horizon) * c));
-    t = max(0.0, min(1.0, (level - horizon)));
-    total = (total + ((t * t) * (3.0 - (2.0 * t))));
-  }
-  return (total * 0.041666666666666664);
-}
-
 float k_mean_of(int stretch, float x, float y, float z) {
   int columns;
   T_if t1;
@@ -1699,7 +1684,7 @@ float k_mean_of(int stretch, float x, float y, float z) {
   c = t1.m1_;
   begin = (((stretch * (columns + 1)) + column) * 24);
   level = k_level_of(z, shadow_softness);
-  return k_mean_over_1(shadow_groups, begin, (begin + 24), c, level);
+  return mean_of_groups(shadow_mean_at, begin, (begin + 24), c, level);
 }
 
 float k_mean_lit(Hit hit, float x, float y, float z) {

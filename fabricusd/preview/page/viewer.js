@@ -97,9 +97,9 @@ export class Viewer {
     gl.uniform1i(program.at(name), unit);
   }
 
-  upload(flat, internal, format, type) {
-    const gl = this.gl, rows = Math.max(1, Math.ceil(flat.length / WIDTH));
-    const padded = new flat.constructor(rows * WIDTH), texture = this.newTexture();
+  upload(flat, internal, format, type, channels = 1) {
+    const gl = this.gl, rows = Math.max(1, Math.ceil(flat.length / (WIDTH * channels)));
+    const padded = new flat.constructor(rows * WIDTH * channels), texture = this.newTexture();
     padded.set(flat);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.texImage2D(gl.TEXTURE_2D, 0, internal, WIDTH, rows, 0, format, type, padded);
@@ -116,6 +116,7 @@ export class Viewer {
       floats: this.upload(this.floats, gl.R32F, gl.RED, gl.FLOAT),
       ints: this.upload(decode(fabric.ints), gl.R32I, gl.RED_INTEGER, gl.INT),
       bytes: this.upload(decode(fabric.bytes), gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE),
+      quads: this.upload(decode(fabric.quads), gl.RGBA32F, gl.RGBA, gl.FLOAT, 4),
     };
     this.blocks = [decode(fabric.shapes), decode(fabric.numbers)].map(data => {
       const buffer = gl.createBuffer();
@@ -144,7 +145,7 @@ export class Viewer {
 
   useFabric(program) {
     const gl = this.gl;
-    ['floats', 'ints', 'bytes'].forEach((name, k) => this.bind(program, name, k, this.tables[name]));
+    ['floats', 'ints', 'bytes', 'quads'].forEach((name, k) => this.bind(program, name, 9 + k, this.tables[name]));
     ['Shapes', 'Numbers'].forEach((name, k) => {
       const index = gl.getUniformBlockIndex(program, name);
       if (index === gl.INVALID_INDEX) return;
