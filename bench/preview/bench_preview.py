@@ -3,11 +3,11 @@
 python bench/preview/bench_preview.py [--presets NAME ...] [--shapes NAME ...] [--json FILE]
 
 The difference is the mean delta E 2000 over the pixels that the shape covers, to a path-traced
-picture of REFERENCE samples without bounces; `noise` is what the noise of that picture contributes.
-`render` is the sampling time of the path tracer at the samples at which it differs as much. Both
-follow from its difference at FEW samples, since the mean error falls with the root of the samples.
-`wall` and `cpu` are those of the whole command, Python included, the fastest of REPEATS runs after
-a first.
+picture of REFERENCE samples without bounces. `render` is the processor time of the path tracer's
+sampling at the samples at which it differs as much, and `noise` what the noise of the REFERENCE
+samples contributes; both are read off the line through its differences at FEW samples, in
+logarithms. `wall` and `cpu` are those of the whole command, Python included, the fastest of REPEATS
+runs after a first.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from fabricusd.preview.shapes import SHAPES
 from fabricusd.quality.colors import delta_e_2000
 from fabricusd.srgb import srgb_decode
 
-SIZE, REFERENCE, FEW, REPEATS = 128, 256, 4, 2
+SIZE, REFERENCE, FEW, REPEATS = 96, 256, (4, 32), 2
 COMMAND_SIZE = 512
 
 
@@ -71,14 +71,17 @@ def row(name: str, shape: str, out: Path) -> dict[str, Any]:
     """All figures of a preset on a shape."""
     fabric, _ = fabric_of(name)
     wanted, _ = traced(fabric, shape, REFERENCE, 0)
-    few, seconds = traced(fabric, shape, FEW, 1)
-    rough = difference(few, wanted)
+    rough = [traced(fabric, shape, spp, 1 + k) for k, spp in enumerate(FEW)]
+    differences = [difference(picture, wanted) for picture, _ in rough]
+    slope = np.diff(np.log(differences))[0] / np.diff(np.log(FEW))[0]
     mine = difference(preview(fabric, shape=shape, level="far", size=SIZE), wanted)
+    samples = FEW[-1] * (mine / differences[-1]) ** (1.0 / slope)
+    per_sample = rough[-1][1] / FEW[-1] * (COMMAND_SIZE / SIZE) ** 2
     times = [command(name, shape, out) for _ in range(1 + REPEATS)][1:]
     return {
         "preset": name, "shape": shape, "difference": mine,
-        "noise": rough * (FEW / REFERENCE) ** 0.5,
-        "render": seconds * (rough / mine) ** 2 * (COMMAND_SIZE / SIZE) ** 2,
+        "noise": float(differences[-1] * (REFERENCE / FEW[-1]) ** slope),
+        "render": float(samples * per_sample),
         "wall": min(w for w, _ in times), "cpu": min(c for _, c in times),
     }  # fmt: skip
 

@@ -20,6 +20,10 @@ FLAGS = [
 ]  # fmt: skip
 
 
+IDLE = "window.requestAnimationFrame = () => 0"
+"""A script before those of a page, which then draws nothing."""
+
+
 @contextmanager
 def chromium() -> Iterator[Any]:
     """A browser; the test is skipped where there is none."""
