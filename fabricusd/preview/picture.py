@@ -15,13 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.levels import LEVELS
+from fabricusd.cache import kept
 from fabricusd.errors import FabricError, did_you_mean
 from fabricusd.fabric import Fabric
 from fabricusd.images.view import View, encode
+from fabricusd.kernels.cache import fingerprint
 from fabricusd.preview.kernels.raster import NOTHING, frames, rasterise, reached
 from fabricusd.preview.kernels.start import start
 from fabricusd.preview.lights import Lights
-from fabricusd.preview.occlusion import shadow_map, sky_directions, visibility_of
+from fabricusd.preview.occlusion import Visibility, shadow_map, sky_directions, visibility_of
 from fabricusd.preview.shapes import SHAPES, Shape
 from fabricusd.preview.surfaces import R2, SKY_DIRECTIONS, Cloth, Seen, Surface
 from fabricusd.preview.tables import tables_of
@@ -191,9 +193,18 @@ class _Scene:
         """Find how much of what each vertex would send of the sky reaches the viewer.
 
         The share is that of the light from `sky_directions` that arrives, weighted by the cloth's
-        value at level `far`: cloth that shines at a grazing view lacks what it would mirror.
+        value at level `far`: cloth that shines at a grazing view lacks what it would mirror. The
+        share does not depend on the key light, and is kept in the cache.
         """
         found = visibility_of(self.shape)
+        sky = self.lights.even, self.lights.slope
+        worn_by = () if worn.material is None else (worn.material,)
+        surfaces = (part for surface in worn.surfaces for part in surface.identity())
+        key = (fingerprint(), sky, self.eye, found.first, self.arrays[0], *worn_by, *surfaces)
+        self.open = kept("open sky", key, lambda: self._open(found, worn))[found.vertex]
+
+    def _open(self, found: Visibility, worn: _Worn) -> Reals:
+        """(v,) share of the sky that reaches the vertices."""
         triangle, corner = found.first // 3, found.first % 3
         weights = np.stack((corner == 1, corner == 2), axis=-1).astype(REAL)
         share = np.ones(len(triangle), REAL)
@@ -211,7 +222,7 @@ class _Scene:
             total[above] += value
             met[above] += value * found.arrives[some[above], k]
         share[some] = np.divide(met, total, out=np.ones_like(met), where=total > 0)
-        self.open = share[found.vertex]
+        return share
 
     def drawn(self, offset: Any) -> tuple[NDArray[np.int32], Reals]:
         """The triangle in each pixel and the place in it, as `rasterise`; both are flat."""

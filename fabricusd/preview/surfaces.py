@@ -60,6 +60,10 @@ class Surface(Protocol):
         """(3, n) value at level `far`."""
         ...
 
+    def identity(self) -> tuple[object, ...]:
+        """What its values at level `far` depend on, as `cache.kept` takes it."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class Cloth:
@@ -92,6 +96,10 @@ class Cloth:
         """See `Surface`."""
         return value_far(self.tables, wi, wo)
 
+    def identity(self) -> tuple[object, ...]:
+        """See `Surface`: all values at level `far` are in the table of the sky."""
+        return (self.tables.sky,)
+
 
 @dataclass(frozen=True, eq=False)
 class Matte:
@@ -109,6 +117,10 @@ class Matte:
         """See `Surface`."""
         diffuse = np.array(self.diffuse, REAL)[:, None] * REAL(1 / math.pi)
         return np.asarray(diffuse * np.maximum(wi[2], REAL(0)), REAL)
+
+    def identity(self) -> tuple[object, ...]:
+        """See `Surface`."""
+        return (self.diffuse,)
 
 
 def _cosine_directions(u: Reals) -> Reals:

@@ -302,4 +302,4 @@ if (location.hash.length > 1) state = restored(location.hash.slice(1));
 fit();
 apply();
 requestAnimationFrame(frame);
-window.fabricusd = { viewer, data, decode, placed, get state() { return state; }, get camera() { return camera; } };
+window.fabricusd = { viewer, data, decode, placed, showScale, get state() { return state; }, get camera() { return camera; } };
