@@ -9,7 +9,9 @@ from fabricusd.errors import FabricError
 
 SHELLS = ("bash", "zsh", "tcsh")
 
-FILES = ("FILE", "SCENE", "OUT", "MESH", "A", "B", "PNG", "LOOK", "MD", "JSON", "SKY")
+FILES = (
+    "FILE", "SCENE", "SOURCE", "OUT", "MESH", "A", "B", "PNG", "HTML", "LOOK", "MD", "JSON", "SKY",
+)  # fmt: skip
 FOLDERS = ("DIR", "FOLDER")
 """Placeholders of values that are names of files, or of folders."""
 
