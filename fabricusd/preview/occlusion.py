@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.cache import kept
+from fabricusd.kernels.cache import fingerprint
 from fabricusd.preview.kernels.raster import NOTHING, rasterise, reached
 from fabricusd.preview.shapes import Shape
 from fabricusd.scene.studio import looking
@@ -72,7 +74,7 @@ def sky_directions() -> Floats:
 
 def visibility_of(shape: Shape) -> Visibility:
     """What of the sky reaches the vertices of `shape`, kept in the cache."""
-    key = (DIRECTIONS, MAP, shape.points, shape.normals)
+    key = (fingerprint(), Path(__file__).read_bytes(), shape.points, shape.normals)
     vertex = kept("occlusion", ("vertices", *key), lambda: _vertices(shape))
     count = int(vertex.max()) + 1
     first = np.empty(count, np.int64)
