@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from importlib import import_module
 from types import MappingProxyType
 from typing import Any
 
@@ -487,6 +488,12 @@ class Fabric:
 
     def __hash__(self) -> int:
         return hash((self.name, tuple(self.threads.items()), self.weave, self.warp, self.weft))
+
+    def _repr_png_(self) -> bytes:
+        """The fabric as notebooks show it: a PNG of a cylinder of it, made when it is asked for."""
+        # By name: `preview` rests on this module.
+        shown: bytes = import_module("fabricusd.preview.picture").thumbnail(self)
+        return shown
 
 
 def even(fabric: Fabric) -> Fabric:

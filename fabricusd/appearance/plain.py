@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import erf
 
 from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.scattering.models import named
@@ -138,6 +137,9 @@ def segment(
 def across(thread: Thread, i: Angles, o: Angles, w: Array) -> tuple[Array, Array]:
     """Factors (n,) of the surface and the volume term at `w` across the thread; the mean of each
     over w is 1."""
+    # Importing SciPy takes as long as importing NumPy, and authoring does without it.
+    from scipy.special import erf
+
     half = o.phi + 0.5 * wrap(i.phi - o.phi)
     h = np.where(np.abs(half) > math.pi / 2, np.sign(half), np.sin(half))
     beta = max(thread.gamma_surface, 0.1)

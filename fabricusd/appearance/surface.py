@@ -368,7 +368,7 @@ def _evaluate(law: SurfaceLaw, level: str, hit: WeaveHit, wi: Floats, wo: Floats
         else:
             points_all(real, law.published, level == "thread", hit.places, wi, wo, out)
     if law.kind != PUBLISHED_ONLY:
-        _add_conserving(real, law.conserving, LEVELS.index(level), hit.places, wi, wo, out)
+        conserving_all(real, law.conserving, LEVELS.index(level), hit.places, wi, wo, out)
     return out
 
 
@@ -423,7 +423,11 @@ def _weave_chunk(R, cloth, shadow, tables, uv, wi, wo, out, first, last):
 
 
 @njit(**KERNEL, parallel=True)
-def _add_conserving(R, tables, level, places, wi, wo, out):  # type: ignore[no-untyped-def]
+def conserving_all(R, tables, level, places, wi, wo, out):  # type: ignore[no-untyped-def]
+    """Add the values of the conserving law at a level to out, on all workers.
+
+    level : FAR, WEAVE or THREAD; places : n `Places`, not read at FAR; wi, wo, out : (3, n)
+    """
     for k in prange(wi.shape[1]):
         r, g, b = R(0), R(0), R(0)
         if level == FAR:

@@ -44,6 +44,7 @@ COMMANDS = {
     "material": "turn a bake into materials for USD, MaterialX and other tools",
     "blender-addon": "write the Blender add-on that imports materials with their garment",
     "render": "path-trace a scene for look-dev review",
+    "preview": "show a fabric at once: on a shape, in the terminal, on a sheet",
     "compare": "measure the difference between two pictures",
     "chart": "measure and plot the speed and accuracy of every method",
     "cache": "list or clear the files that are cached on disk",

@@ -19,7 +19,9 @@ from fabricusd.cache import KERNELS, cache_folder
 from fabricusd.kernels.internals import use_internals
 
 PACKAGE = Path(__file__).resolve().parents[1]
-FOLDERS = ("kernels", "appearance", "scene", "run", "reference", "bake", "geometry")
+FOLDERS = (
+    "kernels", "appearance", "scene", "run", "reference", "bake", "geometry", "preview/kernels",
+)  # fmt: skip
 """Folders of the package whose modules hold kernels, or constants that kernels read."""
 
 

@@ -118,6 +118,31 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
     return stage, str(path)
 
 
+def variant_sources(source: str | os.PathLike[str]) -> list[str]:
+    """`source` with each variant of the fabric's sets chosen in turn; FabricError without any.
+
+    Raises FabricError as `open_stage`.
+    """
+    stage, file = open_stage(source)
+    sets = find_fabric(stage, file, split_source(source)[1]).GetVariantSets()
+    found = [
+        f"{os.fspath(source)}{{{name}={variant}}}"
+        for name in sets.GetNames()
+        for variant in sets.GetVariantSet(name).GetVariantNames()
+    ]
+    if not found:
+        raise FabricError(os.fspath(source), "has no variants")
+    return found
+
+
+def holds(source: str | os.PathLike[str], kind: str) -> bool:
+    """Whether the stage of `source` has a prim of this type; FabricError as `open_stage`."""
+    # Prims expire with their stage.
+    stage, _ = open_stage(source)
+    every = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
+    return any(prim.GetTypeName() == kind for prim in every)
+
+
 def _select(prim: Usd.Prim, which: str, variant: str, file: str) -> None:
     """Select a variant of `prim` in the session layer of its stage."""
     where = f"{file}:{prim.GetPath()}{{{which}={variant}}}"

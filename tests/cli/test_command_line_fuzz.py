@@ -49,6 +49,7 @@ SAFE = {
     "fit": ["--dry-run"],
     "chart": ["--list-panels"],
     "demo": ["--output", "x.obj/never"],
+    "preview": ["--output", "x.obj/never.png"],
 }
 
 word = st.sampled_from(WORDS) | st.text(max_size=12) | st.floats().map(str) | st.integers().map(str)

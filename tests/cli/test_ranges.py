@@ -51,6 +51,9 @@ OPTIONS = {
     ("sides", "--paths"): ("0", "63", "1048577", "1.5"),
     ("material", "--lobes"): ("0", "-1", "7", "1.5"),
     ("material", "--max-error"): ("0", "-1", "1001"),
+    ("preview", "--size"): ("0", "15", "4097", "1.5"),
+    ("preview", "--samples"): ("0", "-1", "1025", "1.5"),
+    ("preview", "--exposure"): ("100000", "-101"),
 }
 
 ARGUMENTS = {
@@ -61,6 +64,7 @@ ARGUMENTS = {
     "compare": ["a.png", "b.png", "-o", "out.png"],
     "sides": ["linen_plain", "-o", "out.usda"],
     "material": ["baked", "--surface", "lobes"],
+    "preview": ["linen_plain", "-o", "out.png"],
 }
 
 TEXTS = {
@@ -148,8 +152,10 @@ def test_the_table_has_every_option_that_takes_a_number():
 OTHERS = {
     *(("bake", option) for option in ("--resolution", "--texels-per-thread", "--max-error")),
     ("render", "--imageWidth"),
+    ("preview", "--light"),
 }
-"""Options with a `type` whose values `tests/bake` judges, and another name of one above."""
+"""Options with a `type` whose values `tests/bake` judges, another name of one above, and one of two
+numbers, which `test_preview` judges."""
 
 
 BOUNDS = {

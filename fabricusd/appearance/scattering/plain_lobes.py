@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import i0e
 
 from fabricusd.fabric import Thread
 
@@ -68,6 +67,9 @@ def fresnel(ior: float, cosine: Array) -> Array:
 
 def longitudinal(a: Array, b: Array, s: float) -> Array:
     """`K(a, b; s)`, [dEon2011] eq. 7 without cancellation; K cos b integrates to 1 over b."""
+    # Importing SciPy takes as long as importing NumPy, and kernels do without it.
+    from scipy.special import i0e
+
     v = s * s
     peak = np.exp(-2 * np.sin(0.5 * (a + b)) ** 2 / v)
     return peak * i0e(np.cos(a) * np.cos(b) / v) / (v * -math.expm1(-2 / v))

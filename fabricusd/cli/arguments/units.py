@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 
-def add_units(parser: argparse.ArgumentParser) -> None:
+def add_units(parser: argparse._ActionsContainer) -> None:
     """Add `--units`, the unit of lengths in a file that does not state one."""
     parser.add_argument(
         "--units",

@@ -9,7 +9,10 @@ from fabricusd.errors import FabricError
 
 SHELLS = ("bash", "zsh", "tcsh")
 
-FILES = ("FILE", "SCENE", "OUT", "MESH", "A", "B", "PNG", "LOOK", "MD", "JSON", "SKY", "LOBES")
+FILES = (
+    "FILE", "SCENE", "SOURCE", "OUT", "MESH", "A", "B", "PNG", "HTML", "LOOK", "MD", "JSON", "SKY",
+    "LOBES",
+)  # fmt: skip
 FOLDERS = ("DIR", "FOLDER")
 """Placeholders of values that are names of files, or of folders."""
 
