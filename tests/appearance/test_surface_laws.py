@@ -192,14 +192,17 @@ def test_gaps_close_as_the_view_turns() -> None:
 
 
 @pytest.mark.parametrize("law", ["unmasked", "projected"])
-def test_no_view_is_brighter_than_a_white_sky(law: str) -> None:
-    """With threads three times as bright as published ones."""
-    fabric = scaled(replace(PRESETS["linen_plain"], surface_law=law), 3.0)
+@pytest.mark.parametrize(
+    ("name", "factor"), [("linen_plain", 3.0), ("rayon_shantung", 1.0), ("silk_shot", 1.0)]
+)
+def test_no_view_is_brighter_than_a_white_sky(law: str, name: str, factor: float) -> None:
+    """The brightest views lie a few degrees beside the threads' axes; one is 3 times published."""
+    fabric = scaled(replace(load(name), surface_law=law), factor)
     sky, weight = white_sky()
     shares = [
         weight @ surface.evaluate(fabric, sky, light(90 - polar, azimuth), shadow="horizon")
-        for polar in (0, 20, 45, 60, 75, 82, 88)
-        for azimuth in (0, 33, 150)
+        for polar in (0, 20, 45, 60, 75, 82, 85, 87, 88, 89.5)
+        for azimuth in (0, 6, 33, 84, 150)
     ]
     assert np.max(shares) < 1.03
     assert np.max(shares) > 0.97

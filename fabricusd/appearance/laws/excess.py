@@ -12,9 +12,9 @@ from numba import njit
 from fabricusd.appearance.frame import diamond
 from fabricusd.kernels.real import INLINE, index
 
-ROWS, COLUMNS = 16, 8
-"""Entries of the table: in sqrt(1 - N.wo), and in the diamond angle; one more column repeats the
-first."""
+ROWS, COLUMNS = 24, 32
+"""Entries of the table: in 1 - sqrt(N.wo), which is dense at grazing views, and in the diamond
+angle; one more column repeats the first."""
 
 EXCESS_FIELDS = ("excess",)
 """excess : (ROWS, COLUMNS + 1) real, flat - at least 1; a single entry for none"""
@@ -30,7 +30,7 @@ def excess_at(R, tables, x, y, z):
     """The divisor for a view from (x, y, z)."""
     if tables.excess.size == 1:
         return R(1)
-    across = math.sqrt(max(R(0), R(1) - min(R(1), z))) * R(ROWS - 1)
+    across = (R(1) - math.sqrt(max(R(0), min(R(1), z)))) * R(ROWS - 1)
     turn = diamond(R, x, y) * R(0.25 * COLUMNS)
     row = max(min(np.int32(across), np.int32(ROWS - 2)), np.int32(0))
     column = max(min(np.int32(turn), np.int32(COLUMNS - 1)), np.int32(0))
