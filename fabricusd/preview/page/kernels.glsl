@@ -622,14 +622,14 @@ float k_excess_at(float x, float y, float z) {
   if ((published_excess_n0 == 1)) {
     return 1.0;
   }
-  across = (sqrt(max(0.0, (1.0 - min(1.0, z)))) * 15.0);
-  turn = (k_diamond(x, y) * 2.0);
-  row = max(min(int(across), 14), 0);
-  column = max(min(int(turn), 7), 0);
+  across = ((1.0 - sqrt(max(0.0, min(1.0, z)))) * 23.0);
+  turn = (k_diamond(x, y) * 8.0);
+  row = max(min(int(across), 22), 0);
+  column = max(min(int(turn), 31), 0);
   a = (across - float(row));
   b = (turn - float(column));
-  near_ = ((row * 9) + column);
-  far_ = (near_ + 9);
+  near_ = ((row * 33) + column);
+  far_ = (near_ + 33);
   low = F(published_excess_at + near_);
   low = (low + ((F(published_excess_at + (near_ + 1)) - low) * b));
   high = F(published_excess_at + far_);
