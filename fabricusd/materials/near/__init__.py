@@ -1,0 +1,5 @@
+"""Mixtures of lobes near by: textures that say which threads a texel shows.
+
+`parts` says what a texel holds, `mixture` turns a mixture and a texel into the lobes of that texel,
+`fit` finds which lobes which threads make, and `maps` writes the textures from a bake.
+"""
