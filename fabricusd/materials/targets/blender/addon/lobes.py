@@ -14,7 +14,9 @@ from typing import Any
 import bpy
 
 from .looks import Lobe, Look, Mixture
+from .near import Texel
 from .nodes import Group
+from .threads import Threads, turning
 
 FACING, CROSSING, UPRIGHT, EVEN, SHARP = 1e-4, 0.06, 0.05, 1e-4, 0.01
 """Lower bounds of the bases of the powers p, r, s and u, q, and of N.wo in V."""
@@ -24,6 +26,8 @@ SMALLEST = 1e-6
 
 NARROWEST = 0.01
 """Least width of a lobe that is edited."""
+
+AXES = ("weft", "warp")
 
 POWERS = 7
 """Number of coefficients of each polynomial of V."""
@@ -35,14 +39,22 @@ ONE_LOBE, FORM = "fabricusd lobe", "fabricusd_form"
 """Name of the group of one lobe, and of the property that says which of its forms it is."""
 
 
-def lobes(mixture: Mixture, name: str, *, transparent: bool) -> Any:
+def lobes(
+    mixture: Mixture, name: str, *, transparent: bool,
+    near: tuple[Threads, dict[str, Any]] | None = None,
+) -> Any:  # fmt: skip
     """Build the group of a mixture; return its tree.
 
     Its inputs `Weft` and `Warp` are the threads' directions in texture space, and `Opacity`, if
     `transparent`, the share of the cloth that is not gap.
+
+    near : the single threads and their images, which say the opacity as well
     """
     group = Group(name)
-    opacity = group.input("Opacity", 1.0, low=0.0, high=1.0) if transparent else None
+    texel = Texel(group, *near) if near else None
+    opacity = None
+    if transparent and texel is None:
+        opacity = group.input("Opacity", 1.0, low=0.0, high=1.0)
     places = {
         "weft": group.input("Weft", (1.0, 0.0, 0.0)), "warp": group.input("Warp", (0.0, 1.0, 0.0))
     }  # fmt: skip
@@ -51,22 +63,35 @@ def lobes(mixture: Mixture, name: str, *, transparent: bool) -> Any:
     up = group.vector("DOT_PRODUCT", eye, normal)
     view = _view(group, mixture.view, up, eye, axes)
 
-    def shaded(title: str, color: Any, power: float, least: float) -> Any:
+    def shaded(title: str, color: Any, power: float, least: float, row: int) -> Any:
         factor = _power(group, up, least, group.input(f"{title} Power", power))
         color = group.input(title, color, color=True)
+        if texel:
+            color = group.vector("MULTIPLY", color, texel.color(texel.threads.factors[row]))
         return group.scaled(color, group.math("MULTIPLY", factor, view))
 
-    diffuse = shaded("Diffuse", mixture.diffuse, mixture.diffuse_power, EVEN)
+    diffuse = shaded("Diffuse", mixture.diffuse, mixture.diffuse_power, EVEN, -2)
     parts = [group.add("ShaderNodeBsdfDiffuse", Color=diffuse, Roughness=0.0).outputs[0]]
     if max(mixture.sheen) > FAINT:
-        sheen = shaded("Sheen", mixture.sheen, mixture.sheen_power, UPRIGHT)
+        sheen = shaded("Sheen", mixture.sheen, mixture.sheen_power, UPRIGHT, -1)
         rough = group.input("Sheen Roughness", mixture.sheen_roughness, low=0.0, high=1.0)
         node = group.add("ShaderNodeBsdfSheen", Color=sheen, Roughness=rough)
         node.distribution = "MICROFIBER"
         parts.append(node.outputs[0])
     one = _one_lobe()
+    before = 0
     for number, lobe in enumerate(mixture.lobes):
-        parts += _placed(group, one, number, lobe, axes[lobe.along], view)
+        turned = (texel, before) if texel else None
+        parts += _placed(group, one, number, lobe, axes[lobe.along], view, turned)
+        before += 2 if lobe.paired else 1
+    if texel and texel.threads.through:
+        through = texel.color(texel.threads.through)
+        parts.append(group.add("ShaderNodeBsdfTranslucent", Color=through).outputs[0])
+    if texel and transparent:
+        # The lobes are those of the texel, its gaps included, and are not dimmed once more.
+        gap = group.math("SUBTRACT", 1.0, texel.cover)
+        color = group.joined(gap, gap, gap)
+        parts.append(group.add("ShaderNodeBsdfTransparent", Color=color).outputs[0])
     cloth = group.sum(parts)
     if opacity is not None:
         gap = group.add("ShaderNodeBsdfTransparent").outputs[0]
@@ -118,8 +143,14 @@ def _view(
     return group.math("EXPONENT", total)
 
 
-def _placed(group: Group, one: Any, number: int, lobe: Lobe, axis: Any, view: Any) -> list[Any]:
-    """Add a lobe, or both of a pair, with inputs of the group for its numbers."""
+def _placed(
+    group: Group, one: Any, number: int, lobe: Lobe, axis: Any, view: Any,
+    turned: tuple[Texel, int] | None,
+) -> list[Any]:  # fmt: skip
+    """Add a lobe, or both of a pair, with inputs of the group for its numbers.
+
+    turned : the texel under the point, and how many lobes come before
+    """
     title = f"Lobe {number + 1}"
     panel = group.panel(f"{title}: along the {lobe.along}{', a pair' if lobe.paired else ''}")
 
@@ -135,12 +166,21 @@ def _placed(group: Group, one: Any, number: int, lobe: Lobe, axis: Any, view: An
         "Upright": given("Upright", lobe.upright), "Axis": axis, "View": view,
     }  # fmt: skip
     found = []
-    for sign in (1.0, -1.0) if lobe.paired else (1.0,):
+    for back, sign in enumerate((1.0, -1.0) if lobe.paired else (1.0,)):
         node = group.add("ShaderNodeGroup")
         node.node_tree = one
-        for name, value in inputs.items():
-            if name == "Tilt" and sign < 0:
-                value = group.math("MULTIPLY", value, sign)
+        mine = dict(inputs)
+        if sign < 0:
+            mine["Tilt"] = group.math("MULTIPLY", inputs["Tilt"], sign)
+        if turned:
+            texel, at = turned[0], turned[1] + back
+            known = turning(texel.threads, at, lobe.color, AXES.index(lobe.along))
+            factor = texel.color(texel.threads.factors[at])
+            mine["Color"] = group.vector("MULTIPLY", inputs["Color"], factor)
+            mine["Tilt"], mine["Width Along"] = texel.placed(
+                known, mine["Tilt"], inputs["Width Along"], texel.threads.own[at]
+            )
+        for name, value in mine.items():
             group.set(node.inputs[name], value)
         found.append(node.outputs[0])
     return found
