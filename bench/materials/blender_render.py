@@ -105,7 +105,7 @@ def add_light(job):
 def add_camera(job):
     camera = bpy.data.cameras.new("Camera")
     camera.lens, camera.sensor_width, camera.sensor_fit = job["focal_length"], 36.0, "HORIZONTAL"
-    camera.clip_start = 0.01
+    camera.clip_start, camera.clip_end = job.get("clip", 0.01), 1e5
     one = bpy.data.objects.new("Camera", camera)
     # USD's matrices apply to row vectors.
     one.matrix_world = TO_Z_UP @ Matrix(job["camera"]).transposed()

@@ -120,7 +120,7 @@ def write_levels(target: Path, pixels: Pixels) -> None:
     levels = []
     size, channels = len(pixels), tuple("RGBA")[: pixels.shape[2]]
     while True:
-        levels.append(pixels.astype(np.float16))
+        levels.append(np.ascontiguousarray(pixels, np.float16))
         if len(pixels) == 1:
             break
         pixels = halved(pixels)

@@ -126,9 +126,13 @@ def change(material, **inputs):
         group.inputs[name].default_value = value
 
 
-def from_above(picture, cells, towards_light, irradiance, size):
-    """Render a sheet of `cells` x `cells` unit squares from above, in a sun without bounces."""
+def from_above(picture, cells, towards_light, irradiance, size, transparent=False):
+    """Render a sheet of `cells` x `cells` unit squares from above, in a sun without bounces.
+
+    transparent : whether the picture is where nothing is behind the sheet's gaps
+    """
     scene = bpy.context.scene
+    scene.render.film_transparent = transparent
     for one in bpy.data.objects:
         one.visible_shadow = False
     sun = bpy.data.lights.new("Sun", "SUN")
