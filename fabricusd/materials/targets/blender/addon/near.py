@@ -17,6 +17,9 @@ STEEPEST = 1.5
 THIN = 1e-6
 """Share of a texel that is as good as none."""
 
+LEAST_HALF = 1.001 * 2.0**-15
+"""Just above what Cycles reads where a 16-bit texture holds 0."""
+
 SETS = tuple(part // (PARTS // 2) for part in range(PARTS))
 
 
@@ -41,7 +44,8 @@ class Texel:
                 [x for noun in ("weft", "warp") for x in _four(group, read[f"lobes_{noun}"])],
                 threads.share, strict=True,
             )
-        ]  # fmt: skip
+        ]
+        self.shares = [None if one is None else _from_0(group, one) for one in self.shares]
         self.sets = [self._sum(range(k * PARTS // 2, (k + 1) * PARTS // 2)) for k in (0, 1)]
         self.cover = group.math("ADD", *self.sets)
         first_second = _four(group, read["lobes_lean"])
@@ -50,7 +54,8 @@ class Texel:
         for k in (0, 1):
             size = group.math("MAXIMUM", self.sets[k], THIN)
             lean = group.math("DIVIDE", first_second[2 * k], size)
-            spread = group.math("DIVIDE", first_second[2 * k + 1], size)
+            spread = _from_0(group, first_second[2 * k + 1])
+            spread = group.math("DIVIDE", spread, size)
             flat = group.math("MULTIPLY", lean, lean)
             within = group.math("MAXIMUM", group.math("SUBTRACT", spread, flat), 0.0)
             for b in range(PARTS):
@@ -144,6 +149,11 @@ def _four(group: Group, read: tuple[Any, Any]) -> list[Any]:
     color, rest = read
     part = group.add("ShaderNodeSeparateColor", Color=color)
     return [*part.outputs[:3], rest]
+
+
+def _from_0(group: Group, number: Any) -> Any:
+    """Return a number of a texture, 0 where it is 0."""
+    return group.math("MULTIPLY", number, group.math("GREATER_THAN", number, LEAST_HALF))
 
 
 def _place(group: Group, threads: Threads) -> Any:

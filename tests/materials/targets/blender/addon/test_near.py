@@ -103,7 +103,8 @@ def rendered(tmp_path_factory):
     for name, (near, texel) in told.items():
         pixels = read_exr_layers(folder / f"{name}.exr")[0]["beauty"][::-1]
         middle = pixels[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE].reshape(CELLS * CELLS, -1)
-        found[name] = middle[:, :3], expected(near, texel, along), middle[:, 3], texel
+        cells = pixels.reshape(CELLS, SIDE, CELLS, SIDE, -1)[:, 6:11, :, 6:11, 3]
+        found[name] = middle[:, :3], expected(near, texel, along), cells, texel
     return found
 
 
@@ -118,8 +119,9 @@ def test_cycles_renders_the_lobes_of_the_texel(rendered, name):
 
 @pytest.mark.parametrize("name", ["mixed", "half a gap"])
 def test_gaps_are_transparent_by_the_shares_of_the_texel(rendered, name):
+    """Cycles chooses by chance whether a path goes through: 1600 pixels, .012 of them a deviation."""
     _, _, alpha, texel = rendered[name]
-    assert alpha == pytest.approx(float(texel.sets.sum()), abs=2e-3)
+    assert alpha.mean() == pytest.approx(float(texel.sets.sum()), abs=0.05)
 
 
 def test_the_add_on_reads_what_was_written(tmp_path):
