@@ -42,7 +42,8 @@ from fabricusd.srgb import srgb_encode  # noqa: E402
 
 PRESETS = ("linen_plain", "silk_shot", "polyester_satin_charmeuse")
 NEAREST, FRAMES, SIDE = 1.0 / 40.0, 13, 64
-"""Threads that a pixel of the first frame spans; each further frame doubles it. Pixels of a side."""
+"""Threads that a pixel of the first frame spans, which each further frame doubles; the number of
+frames; and pixels along a side."""
 
 THREADS, PITCH = 12800, 5e-4
 """Threads along a side of the cloth, and metres of a thread."""

@@ -20,13 +20,14 @@ from fabricusd.materials.lobes.fit import COUNT
 from fabricusd.materials.lobes.inputs import inputs as lobe_inputs
 from fabricusd.materials.lobes.known import mixture_of
 from fabricusd.materials.lobes.mixture import CYCLES, MATERIALX, Mixture, of_covered
-from fabricusd.materials.lobes.network import lobes
+from fabricusd.materials.lobes.network import Texel, lobes
 from fabricusd.materials.lobes.parameters import at_bounds
 from fabricusd.materials.near import AUTO
 from fabricusd.materials.near.inputs import near_inputs
 from fabricusd.materials.near.keep import moved_to, near_of
+from fabricusd.materials.near.network import NearTexel
 from fabricusd.materials.near.recipe import Files, Threads, threads_of
-from fabricusd.materials.networks.graph import Graph, Texture, Value, unrolled
+from fabricusd.materials.networks.graph import Builder, Graph, Texture, Value, unrolled
 from fabricusd.materials.networks.hair import hair
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import (
@@ -131,11 +132,13 @@ def recipes(
             opaque = cover > OPAQUE
             mixture = _mixture(maps, number, settings, made, progress)
             more: dict[str, Value | Texture] = {}
-            of_lobes = more
+            of_lobes, near = more, None
             if mixture is not None:
                 covered = 1.0 if opaque else max(cover, LEAST_COVER)
+                shown = threads.get(number)
+                near = _texel(lay, mixture, covered, shown, progress)
                 mixture = of_covered(mixture, covered)
-                more, of_lobes = _for_cycles(lay, settings, covered, threads.get(number), progress)
+                more, of_lobes = _for_cycles(lay, settings, covered, shown, progress)
             dark = {} if transmits(means) else {"transmission_color": NO_TRANSMISSION}
             if not dark:
                 _note_no_light_through(lay.name, settings, made)
@@ -146,9 +149,17 @@ def recipes(
                 ("procedural", means, {**of_means, **dark}),
             ):
                 title = name if variant == "baked" else f"{name}_plain"
-                graphs = {s: _graph(s, inputs, opaque, lay, mixture) for s in settings.surfaces}
+                texel = near if variant == "baked" else None
+                graphs = {
+                    s: _graph(s, inputs, opaque, lay, mixture, texel) for s in settings.surfaces
+                }
                 found[maps.name, number, variant] = material_recipe(
-                    title, graphs, plain, looks, opaque, inputs,
+                    title,
+                    graphs,
+                    plain,
+                    looks,
+                    opaque,
+                    inputs,
                     of_lobes if variant == "baked" else more,
                 )
                 for surface, graph in graphs.items():
@@ -158,14 +169,15 @@ def recipes(
 
 
 def _graph(
-    surface: str, inputs: Inputs, opaque: bool, lay: BakedLay, mixture: Mixture | None
-) -> Graph:
+    surface: str, inputs: Inputs, opaque: bool, lay: BakedLay, mixture: Mixture | None,
+    near: Callable[[Builder], Texel] | None,
+) -> Graph:  # fmt: skip
     if surface in GRAPHS:
         return GRAPHS[surface](inputs, opaque)
     if surface == "hair":
         return hair(inputs, opaque, lay)
     assert mixture is not None
-    return lobes(inputs, opaque, mixture, lay.matrix)
+    return lobes(inputs, opaque, mixture, lay.matrix, near)
 
 
 def _mixture(
@@ -184,14 +196,23 @@ def _mixture(
     return found
 
 
-def _threads(
-    maps: MapSet, path: Path, settings: Settings, made: Written
-) -> dict[int, Threads]:
+def _threads(maps: MapSet, path: Path, settings: Settings, made: Written) -> dict[int, Threads]:
     """Return the threads of each lay that the lobes of a garment show near by."""
     if "lobes" not in settings.surfaces:
         return {}
     files = Files(folder=lambda: maps_folder(path), files=made.files, remarks=made.remarks)
     return threads_of(maps, settings.near, files)
+
+
+def _texel(
+    lay: BakedLay, far: Mixture, cover: float, threads: Threads | None, progress: Progress | None
+) -> Callable[[Builder], Texel] | None:
+    """Return what adds the nodes of single threads to the network of MaterialX."""
+    if threads is None or lay.fabric is None:
+        return None
+    near = moved_to(near_of(lay.fabric, far, progress), threads.parts)
+    near = replace(near, factors=near.factors * cover)
+    return lambda builder: NearTexel(builder, near, threads.laid)
 
 
 def _for_cycles(

@@ -1,14 +1,14 @@
 """A mixture near by as inputs of the material, beside those of `lobes.inputs`.
 
-    cycles:near:share, :angle floats[8]    `Parts`, the parts of the weft first
-    cycles:near:spread, :tinted floats[2]  by set
-    cycles:near:own floats                 width of each lobe at one point of a thread
-    cycles:near:factors floats             of each lobe, of the diffuse part and of the sheen: three
-                                           channels for each of eight parts
-    cycles:near:through floats[24]         light through, if there is any
-    cycles:near:lobes_weft asset ...       the textures
-    cycles:near:threads floats[6]          u and v of the threads by row, and their offset, in
-    cycles:near:repeat floats[2]           repeats of the textures; absent if they lie on the UVs
+cycles:near:share, :angle floats[8]    `Parts`, the parts of the weft first
+cycles:near:spread, :tinted floats[2]  by set
+cycles:near:own floats                 width of each lobe at one point of a thread
+cycles:near:factors floats             of each lobe, of the diffuse part and of the sheen: three
+                                       channels for each of eight parts
+cycles:near:through floats[24]         light through, if there is any
+cycles:near:lobes_weft asset ...       the textures
+cycles:near:threads floats[6]          u and v of the threads by row, and their offset, in
+cycles:near:repeat floats[2]           repeats of the textures; absent if they lie on the UVs
 """
 
 from __future__ import annotations

@@ -194,7 +194,9 @@ def _layers(
 ) -> dict[str, Pixels]:
     """The textures of a tile, name by name."""
     shape = lays.shape
-    found = {name: np.zeros((*shape, 4 if name not in TINTS else 3), np.float32) for name in TEXTURES}
+    found = {
+        name: np.zeros((*shape, 4 if name not in TINTS else 3), np.float32) for name in TEXTURES
+    }
     nearest = _nearest(lays)
     for number, (one, color) in enumerate(zip(parts, colors, strict=True)):
         mine, around = lays == number, (lays < 0) & (nearest == number)
@@ -204,9 +206,7 @@ def _layers(
         for which, noun in enumerate(NOUNS):
             w = read[f"{noun}_share"][mine]
             found[SHARES[which]][mine] = w
-            lean, spread = _off(
-                read, noun, mine, one.angle[PARTS * which : PARTS * (which + 1)]
-            )
+            lean, spread = _off(read, noun, mine, one.angle[PARTS * which : PARTS * (which + 1)])
             found[LEAN][mine, 2 * which], found[LEAN][mine, 2 * which + 1] = lean, spread
             tint = np.ones((1, 3))
             if f"{noun}_thread" in read:

@@ -135,9 +135,7 @@ class NearTexel(Texel):
                 f"in{c + 1}": _dot(b, f"{name}_{noun}_{'rgb'[c]}", w, _four(half[:, c]))
                 for c in range(3)
             }
-            made = b.add(
-                f"{name}_{noun}", "combine3", "color3", "ND_combine3_color3", **channels
-            )
+            made = b.add(f"{name}_{noun}", "combine3", "color3", "ND_combine3_color3", **channels)
             tint = self.tints[k]
             if tint is not None:
                 made = b.math(f"{name}_{noun}_tinted", "multiply", "color3", made, tint)
@@ -162,7 +160,9 @@ def _place(b: Builder, laid: Laid) -> Link:
     for k, (u, v, offset) in enumerate(laid.threads):
         size = laid.repeat[k]
         scaled = _dot2(b, f"repeats_{'uv'[k]}_sum", st, (float(u / size), float(v / size)))
-        found.append(b.math(f"repeats_{'uv'[k]}", "add", "float", scaled, one(float(offset / size))))
+        found.append(
+            b.math(f"repeats_{'uv'[k]}", "add", "float", scaled, one(float(offset / size)))
+        )
     return b.add(
         "repeats", "combine2", "vector2", "ND_combine2_vector2", in1=found[0], in2=found[1]
     )
@@ -178,9 +178,7 @@ def _four(numbers: Floats) -> Value:
 
 
 def _dot(b: Builder, name: str, vector: Source, numbers: Source) -> Link:
-    return b.add(
-        name, "dotproduct", "float", "ND_dotproduct_vector4", in1=vector, in2=numbers
-    )
+    return b.add(name, "dotproduct", "float", "ND_dotproduct_vector4", in1=vector, in2=numbers)
 
 
 def _dot2(b: Builder, name: str, vector: Source, numbers: tuple[float, float]) -> Link:

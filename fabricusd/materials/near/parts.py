@@ -75,13 +75,13 @@ class Parts:
             tint=np.repeat(sets[None, :, None], 3, axis=2),
         )  # fmt: skip
 
-    def at(self, thread_set: Floats, angle: Floats, part: NDArray[np.int64]) -> Texels:
+    def at(self, thread_set: NDArray[np.int64], angle: Floats, part: NDArray[np.int64]) -> Texels:
         """Return texels that each show one point of a thread.
 
         thread_set : (n,) 0 or 1; angle : (n,) [rad]; part : (n,) index of its part
         """
         n = len(part)
-        rows, sets = np.arange(n), np.asarray(thread_set, np.int64)
+        rows, sets = np.arange(n), thread_set
         share, lean, tint = np.zeros((n, COUNT)), np.zeros((n, 2)), np.zeros((n, 2, 3))
         share[rows, part] = 1.0
         lean[rows, sets] = angle - self.angle[part]
@@ -93,10 +93,11 @@ def parts_of(fabric: Fabric) -> Parts:
     """Return the parts of a fabric."""
     nodes = curve_nodes(fabric, FINE)
     part = part_numbers(fabric, nodes.psi0, nodes.warp_start)
-    share = np.bincount(part, nodes.weight, COUNT)
+    share: Floats = np.bincount(part, nodes.weight, COUNT).astype(np.float64)
     angle = np.bincount(part, nodes.weight * nodes.psi0, COUNT) / np.maximum(share, LEAST)
     off = nodes.weight * (nodes.psi0 - angle[part]) ** 2
-    return Parts(share=share, angle=angle, spread=np.bincount(SETS[part], off, 2))
+    spread = np.bincount(SETS[part], off, 2).astype(np.float64)
+    return Parts(share=share, angle=angle, spread=spread)
 
 
 def part_numbers(fabric: Fabric, psi0: Floats, warp_start: int) -> NDArray[np.int64]:

@@ -23,6 +23,7 @@ _TYPES = {
     "vector2": Sdf.ValueTypeNames.Float2,
     "vector3": Sdf.ValueTypeNames.Float3,
     "float4": Sdf.ValueTypeNames.Float4,
+    "vector4": Sdf.ValueTypeNames.Float4,
     "floats": Sdf.ValueTypeNames.FloatArray,
     "boolean": Sdf.ValueTypeNames.Bool,
     "integer": Sdf.ValueTypeNames.Int,
@@ -63,8 +64,7 @@ def write_material(
             "config:mtlx:version", Sdf.ValueTypeNames.String, custom=False
         ).Set(MTLX_VERSION)
     for name, value in parameters.items():
-        is_file = isinstance(value, Texture)
-        kind = Sdf.ValueTypeNames.Asset if is_file else _TYPES[value.kind]
+        kind = _TYPES[value.kind] if isinstance(value, Value) else Sdf.ValueTypeNames.Asset
         _set(material.CreateInput(name, kind), value, layer_folder)
     for prefix, graph in graphs:
         _write_graph(stage, material, prefix, graph, layer_folder)

@@ -95,9 +95,7 @@ def _images_of(material: Any) -> set[Any]:
     return found - {None}
 
 
-def _group(
-    look: Look, surface: str, shared: dict[Any, Any], made: Made, images: Images
-) -> Any:
+def _group(look: Look, surface: str, shared: dict[Any, Any], made: Made, images: Images) -> Any:
     """Return the tree of a look's surface: one for all materials of the same fabric."""
     mixture = look.mixture if surface != PRINCIPLED or not look.values else None
     name = look.fabric or look.name

@@ -42,7 +42,8 @@ class Texel:
             one if known > 0.0 else None
             for one, known in zip(
                 [x for noun in ("weft", "warp") for x in _four(group, read[f"lobes_{noun}"])],
-                threads.share, strict=True,
+                threads.share,
+                strict=True,
             )
         ]
         self.shares = [None if one is None else _from_0(group, one) for one in self.shares]
@@ -166,9 +167,7 @@ def _place(group: Group, threads: Threads) -> Any:
     rows = (((a, b, 0.0), x, across), ((c, d, 0.0), y, up))
     # Exact while the UVs are: a fraction of a large number of threads.
     found = [
-        group.math(
-            "ADD", group.vector("DOT_PRODUCT", uv, tuple(v / n for v in row)), offset / n
-        )
+        group.math("ADD", group.vector("DOT_PRODUCT", uv, tuple(v / n for v in row)), offset / n)
         for row, offset, n in rows
     ]
-    return group.joined(*found, 0.0)
+    return group.joined(found[0], found[1], 0.0)

@@ -14,7 +14,7 @@ from fabricusd.images.files import read_exr_layers
 from fabricusd.materials.lobes.inputs import inputs
 from fabricusd.materials.lobes.mixture import CYCLES, of_covered
 from fabricusd.materials.near.inputs import Laid, near_inputs
-from fabricusd.materials.near.maps import write_levels, texel_pixels, texels_of
+from fabricusd.materials.near.maps import texel_pixels, texels_of, write_levels
 from fabricusd.materials.near.mixture import constants, evaluate
 from fabricusd.materials.networks.graph import Texture
 from fabricusd.materials.targets.blender.addon import looks, threads
@@ -119,7 +119,7 @@ def test_cycles_renders_the_lobes_of_the_texel(rendered, name):
 
 @pytest.mark.parametrize("name", ["mixed", "half a gap"])
 def test_gaps_are_transparent_by_the_shares_of_the_texel(rendered, name):
-    """Cycles chooses by chance whether a path goes through: 1600 pixels, .012 of them a deviation."""
+    """Cycles draws whether a path goes through; of 1600 pixels, a standard deviation is .012."""
     _, _, alpha, texel = rendered[name]
     assert alpha.mean() == pytest.approx(float(texel.sets.sum()), abs=0.05)
 
@@ -146,4 +146,5 @@ def test_a_look_that_lacks_a_part_of_the_threads_is_the_cloth_from_afar(tmp_path
     stage = Usd.Stage.Open(str(tmp_path / "repeat.usda"))
     stage.GetPrimAtPath("/Sheet/Cloth").RemoveProperty(f"inputs:cycles:near:{lost}")
     (look,) = looks.read(stage)
-    assert look.threads is None and look.mixture is not None
+    assert look.threads is None
+    assert look.mixture is not None
