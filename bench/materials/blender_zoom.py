@@ -4,10 +4,11 @@
 
 The subject is a flat cloth of even threads, and each frame is twice as wide as the one before: from
 40 pixels a thread to about 100 threads a pixel. The lobes take their threads from a texture of one
-repeat, or, as `far`, from nowhere. For each frame the script prints delta E 2000 against the
+repeat (`near`); the same, with the group's input `Afar` driven where a pixel spans threads
+(`blended`); or from nowhere (`far`). For each frame the script prints delta E 2000 against the
 reference, and how far the frame is from the one before, where both show the same cloth: the means
 of 2 x 2 pixels of the nearer frame against the middle of the wider one. It writes the frames of a
-preset below one another: reference, lobes with threads, lobes from afar.
+preset below one another: reference, and the three.
 """
 
 from __future__ import annotations
@@ -53,15 +54,24 @@ VIEW = np.array([0.25, -0.45, 0.86])
 TOWARDS = np.array([-0.1, 0.62, 0.78])
 """To the viewer and to the light: near the mirror direction, off it by some 10 degrees."""
 
-ONE, MORE = 0.5, 16
+ONE, MORE = 0.5, 8
 """Threads from which a pixel takes MORE times the samples: Cycles reads textures at points."""
 
-MODES = {"near": "repeat", "far": "off"}
+BLUR, WHOLE = 0.8, 3.2
+"""Threads that a pixel spans where `blended` begins to take the cloth from afar, and where it is
+wholly so."""
+
+MODES = {"near": "repeat", "blended": "repeat", "far": "off"}
 
 
 def spans():
     """Threads that a pixel spans, frame by frame."""
     return [NEAREST * 2.0**k for k in range(FRAMES)]
+
+
+def afar(span):
+    """The group's input `Afar`, as a user would drive it by the distance of the camera."""
+    return float(np.clip(math.log(span / BLUR) / math.log(WHOLE / BLUR), 0.0, 1.0))
 
 
 def eye(span):
@@ -129,6 +139,7 @@ def jobs_of(scene, folder, stem, spp, mode):
             "scene": str(scene), "light": "sun", "picture": str(folder / f"{stem}.{mode}.{k}.exr"),
             "size": (SIDE, SIDE), "spp": spp * (MORE if mode == "near" and span > ONE else 1),
             "bounces": 0, "irradiance": math.pi,
+            **({"afar": afar(span)} if mode == "blended" else {}),
             "towards_light": unit.tolist(), "focal_length": FOCAL, "clip": 1e-4,
             "camera": [list(row) for row in look_at(eye(span), (0.0, 0.0, 0.0))],
         }
@@ -176,8 +187,9 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "addons").mkdir(exist_ok=True)
     write_addon(folder / "addons" / "fabricusd_looks")
-    print("| preset | threads a pixel | delta E near | far | step reference | near | far |")
-    print("|---|---|---|---|---|---|---|")
+    names = " | ".join(MODES)
+    print(f"| preset | threads a pixel | delta E: {names} | step: reference | {names} |")
+    print("|---" * (3 + 2 * len(MODES)) + "|")
     for preset in options.presets:
         scene = make_scene(even(load(preset)), folder, preset)
         truth = [read(p) for p in references(scene, folder, preset, options.level, options.spp)]
@@ -185,7 +197,7 @@ def main() -> None:
         for mode in MODES:
             jobs = jobs_of(scene, folder, preset, options.spp, mode)
             made[mode] = [read(p) for p in cycles(options.blender, jobs, folder, preset)]
-        rows = (truth, made["near"], made["far"])
+        rows = (truth, *made.values())
         for k, span in enumerate(spans()):
             off = [float(delta_e_2000(made[mode][k], truth[k]).mean()) for mode in MODES]
             steps = [step(row[k - 1], row[k]) if k else math.nan for row in rows]

@@ -150,6 +150,15 @@ def from_above(picture, cells, towards_light, irradiance, size, transparent=Fals
     render(picture, size, 1)
 
 
+def give(name, value):
+    """Set an input of the groups of all materials; the number of those that have it."""
+    nodes = [node for one in bpy.data.materials for node in one.node_tree.nodes]
+    mine = [node.inputs[name] for node in nodes if name in node.inputs]
+    for socket in mine:
+        socket.default_value = value
+    return len(mine)
+
+
 def look(picture, size, spp):
     """Render through the camera that was imported."""
     scene = bpy.context.scene

@@ -37,7 +37,7 @@ COVER = 0.9
 
 CASES = {
     "point of the weft": point(1), "point of the warp": point(6), "mixed": mixed(),
-    "half a gap": mixed(gap=0.5), "repeat": mixed(seed=5),
+    "half a gap": mixed(gap=0.5), "repeat": mixed(seed=5), "afar": mixed(seed=6),
 }  # fmt: skip
 
 
@@ -93,6 +93,7 @@ def rendered(tmp_path_factory):
         told[name] = write_near_sheet(folder / f"{name}.usda", texel, along)
         steps += [
             {"do": "clear"}, {"do": "bring", "path": str(folder / f"{name}.usda")},
+            {"do": "give", "name": "Afar", "value": 1.0 if name == "afar" else 0.0},
             {
                 "do": "from_above", "picture": str(folder / f"{name}.exr"), "cells": CELLS,
                 "towards_light": TOWARDS.tolist(), "irradiance": IRRADIANCE,
@@ -104,6 +105,7 @@ def rendered(tmp_path_factory):
         pixels = read_exr_layers(folder / f"{name}.exr")[0]["beauty"][::-1]
         middle = pixels[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE].reshape(CELLS * CELLS, -1)
         cells = pixels.reshape(CELLS, SIDE, CELLS, SIDE, -1)[:, 6:11, :, 6:11, 3]
+        texel = near.parts.texel if name == "afar" else texel
         found[name] = middle[:, :3], expected(near, texel, along), cells, texel
     return found
 
