@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from fabricusd.appearance.weave.compiled import true_repeat
-from fabricusd.errors import FabricError
 from fabricusd.materials.bake_folder import BakedLay, MapSet
-from fabricusd.materials.near import AUTO, NEAR, OFF, REPEAT, TEXELS, repeat
+from fabricusd.materials.near import AUTO, OFF, REPEAT, TEXELS, repeat
 from fabricusd.materials.near.inputs import Laid
 from fabricusd.materials.near.maps import why_not, write_levels, write_near_maps
 from fabricusd.materials.near.parts import Parts
@@ -39,10 +38,8 @@ class Files:
 def threads_of(maps: MapSet, near: str, made: Files) -> dict[int, Threads]:
     """Write the textures of a garment's threads; return the threads by lay, as far as there are.
 
-    Raises FabricError if `near` is not one of NEAR.
+    near : one of `near.NEAR`
     """
-    if near not in NEAR:
-        raise FabricError("near", f"is '{near}'; it must be one of {', '.join(NEAR)}")
     if near == OFF:
         return {}
     reason = why_not(maps)

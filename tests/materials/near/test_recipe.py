@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import pytest
 from materials.near import swatches
 from materials.near.swatches import write_square
@@ -12,7 +15,6 @@ from fabricusd.bake.job import Settings as BakeSettings
 from fabricusd.errors import FabricError
 from fabricusd.materials import recipes
 from fabricusd.materials.materials import write_materials
-from fabricusd.materials.near import recipe
 from fabricusd.materials.recipes import Settings
 from fabricusd.materials.targets.blender.addon import looks
 from fabricusd.schema import load
@@ -94,6 +96,18 @@ def test_a_package_holds_the_textures(folders, tmp_path, quick):
     assert all("cloth.usdz[" in path for _, path in found.threads.files)
 
 
-def test_an_unknown_source_of_threads_is_refused(folders):
+def test_an_unknown_source_of_threads_is_refused_before_any_work(folders, tmp_path):
+    settings = Settings(surfaces=("lobes",), near="far")
     with pytest.raises(FabricError, match="near is 'far'; it must be one of auto, texels"):
-        recipe.threads_of(None, "far", None)
+        write_materials(folders["fine"], tmp_path / "look.usda", settings)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_asset_has_copies_of_the_textures(folders, tmp_path, quick):
+    settings = Settings(surfaces=("lobes",), targets={"asset": tmp_path / "coat"})
+    write_materials(folders["fine"], tmp_path / "look.usda", settings)
+    shutil.rmtree(tmp_path / "look_maps")
+    found = with_threads(tmp_path / "coat" / "coat.usda")
+    for _, path in found.threads.files:
+        assert (tmp_path / "coat") in Path(path).parents
+        assert Path(path).is_file()
