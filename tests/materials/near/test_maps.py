@@ -6,13 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from materials import scenes
 from materials.near.swatches import bake_square
 
 from fabricusd.appearance import surface
 from fabricusd.fabric import even
 from fabricusd.images.files import read_mip_level
+from fabricusd.materials.bake_folder import read_bake_folder
 from fabricusd.materials.near import maps as near_maps
-from fabricusd.materials.near.maps import LEAN, SHARES, TINTS, texels_of, why_not
+from fabricusd.materials.near.maps import LEAN, NEEDED, SHARES, TINTS, texels_of, why_not
 from fabricusd.materials.near.parts import mean_of, parts_of
 from fabricusd.materials.near.repeat import repeat_layers
 from fabricusd.schema import load
@@ -84,6 +86,27 @@ def test_outside_the_layout_is_the_mean_of_the_lay(tmp_path):
     whole = np.broadcast_to(parts[0].share[:4], (outside.sum(), 4))
     assert pixels[outside] == pytest.approx(whole, abs=1e-3)
     assert pixels[~outside].std(axis=0).min() > 0.1
+
+
+def test_each_fabric_of_a_garment_has_its_own_parts_on_every_tile(tmp_path, monkeypatch):
+    """The first face wears linen, the second velvet, and the tiles part within the second."""
+    monkeypatch.setattr(scenes, "MAPS", (*scenes.MAPS, *NEEDED))
+    _, folder = scenes.bake_shirt(tmp_path, udim=True)
+    maps = read_bake_folder(folder).garments[0]
+    files, parts = near_maps.write_near_maps(maps, tmp_path)
+    assert sorted(path.name for path in files[LEAN].values()) == [
+        "Body.lobes_lean.1001.exr", "Body.lobes_lean.1002.exr",
+    ]  # fmt: skip
+    for one, name in zip(parts, ("linen_plain", "velvet"), strict=True):
+        truth = parts_of(load(name))
+        assert one.share == pytest.approx(truth.share, abs=0.05)
+        seen = (truth.share > 0.05) & (one.share > 0)
+        assert one.angle[seen] == pytest.approx(truth.angle[seen], abs=0.1)
+    for tile, path in files[SHARES[0]].items():
+        lay = read_mip_level(maps.textures["lay"][tile])[..., 0]
+        for number in np.unique(lay[lay < 2]).astype(int):
+            mean = read_mip_level(path)[lay == number].mean(axis=0)
+            assert mean == pytest.approx(parts[number].share[:4], abs=0.1)
 
 
 @pytest.mark.parametrize("lost", ["weft_share", "warp_spread"])
