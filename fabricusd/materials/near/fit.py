@@ -28,6 +28,7 @@ from fabricusd.materials.lobes.mixture import (
     view_factor,
     weight,
 )
+from fabricusd.materials.lobes.mixture import evaluate as evaluate_far
 from fabricusd.materials.lobes.target import GRAZING, LIGHTS, fitted_directions
 from fabricusd.materials.near.mixture import NearMixture, placed
 from fabricusd.materials.near.parts import COUNT, LEAST, SETS, Parts, parts_of
@@ -45,6 +46,9 @@ ROUNDS, AGAIN = 8, 3
 RIDGE = 2e-2
 """Weight of the likely factors. With a tenth of it, the lobes of shot silk are not told apart near
 by, and the mean over texels of a thread's width is 3.8 off the far mixture, not .7."""
+
+MEAN = 1.0
+"""Weight of the mean over the points, which is to be the far mixture; the points have 1."""
 
 FAINT = 0.1
 """Likely factor of threads across a lobe's axis, before the mean is 1."""
@@ -76,6 +80,7 @@ class Problem:
         steep = len(wi) - len(GRAZING) * LIGHTS
         self.wi, self.wo = wi[:steep:EVERY], wo[:steep:EVERY]
         self.true = radiance(fabric, self.points, self.wi, self.wo)
+        self.far = evaluate_far(far, self.wi, self.wo)
 
     def solved(self, near: NearMixture, rounds: int) -> NearMixture:
         """Return `near` with better factors."""
@@ -89,7 +94,10 @@ class Problem:
         units, part = self._units(near), self.points.part
         values = np.einsum("plnc,plc->pnc", units, near.factors[:, part].swapaxes(0, 1))
         off = np.abs(_root(values) - _root(np.pi * self.true)).mean(axis=(1, 2))
-        return float(100.0 * self.points.weight @ off / self.points.weight.sum())
+        share = self.points.weight / self.points.weight.sum()
+        mean = np.einsum("p,pnc->nc", self.points.weight, values)
+        apart = np.abs(_root(mean) - _root(np.pi * self.far)).mean()
+        return float(100.0 * (share @ off + MEAN * apart))
 
     def _units(self, near: NearMixture) -> Floats:
         """(points, lobes + 2, n, 3) value of each summand whose factor is 1, times pi."""
@@ -117,6 +125,8 @@ class Problem:
         part = points.part
         now = np.einsum("plnc,plc->pnc", units, near.factors[:, part].swapaxes(0, 1))
         weights = _secant(now, np.pi * self.true) * np.sqrt(points.weight)[:, None, None]
+        mean, far = np.einsum("p,pnc->nc", points.weight, now), np.pi * self.far
+        mean_weights = _secant(mean, far) * np.sqrt(MEAN * points.weight.sum())
         found = np.empty_like(near.factors)
         for c in range(3):
             square, right = np.zeros((count, COUNT) * 2), np.zeros((count, COUNT))
@@ -126,6 +136,11 @@ class Problem:
                 wanted = np.pi * self.true[mine, :, c] * weights[mine, :, c]
                 square[:, b, :, b] += np.einsum("pkn,pln->kl", rows, rows)
                 right[:, b] += np.einsum("pkn,pn->k", rows, wanted)
+            whole = np.zeros((count, COUNT, len(far)))
+            for p, b in enumerate(part):
+                whole[:, b] += points.weight[p] * units[p, :, :, c] * mean_weights[:, c]
+            square += np.einsum("kbn,ldn->kbld", whole, whole, optimize=True)
+            right += whole @ (far[:, c] * mean_weights[:, c])
             found[:, :, c] = _least(square, right, near.parts.share, self.likely)
         return found
 
