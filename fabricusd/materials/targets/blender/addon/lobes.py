@@ -63,43 +63,72 @@ def lobes(
     up = group.vector("DOT_PRODUCT", eye, normal)
     view = _view(group, mixture.view, up, eye, axes)
 
-    def shaded(title: str, color: Any, power: float, least: float, row: int) -> Any:
-        factor = _power(group, up, least, group.input(f"{title} Power", power))
-        color = group.input(title, color, color=True)
-        if texel:
-            color = group.vector("MULTIPLY", color, texel.color(texel.threads.factors[row]))
-        return group.scaled(color, group.math("MULTIPLY", factor, view))
-
-    diffuse = shaded("Diffuse", mixture.diffuse, mixture.diffuse_power, EVEN, -2)
-    parts = [group.add("ShaderNodeBsdfDiffuse", Color=diffuse, Roughness=0.0).outputs[0]]
-    if max(mixture.sheen) > FAINT:
-        sheen = shaded("Sheen", mixture.sheen, mixture.sheen_power, UPRIGHT, -1)
-        rough = group.input("Sheen Roughness", mixture.sheen_roughness, low=0.0, high=1.0)
-        node = group.add("ShaderNodeBsdfSheen", Color=sheen, Roughness=rough)
-        node.distribution = "MICROFIBER"
-        parts.append(node.outputs[0])
+    shades = {
+        title: (
+            group.input(title, color, color=True),
+            _power(group, up, least, group.input(f"{title} Power", power)),
+        )
+        for title, color, power, least in (
+            ("Diffuse", mixture.diffuse, mixture.diffuse_power, EVEN),
+            ("Sheen", mixture.sheen, mixture.sheen_power, UPRIGHT),
+        )
+    }
+    rough = group.input("Sheen Roughness", mixture.sheen_roughness, low=0.0, high=1.0)
+    given = [
+        _given(group, number, lobe, axes[lobe.along], view)
+        for number, lobe in enumerate(mixture.lobes)
+    ]
     one = _one_lobe()
-    before = 0
-    for number, lobe in enumerate(mixture.lobes):
-        turned = (texel, before) if texel else None
-        parts += _placed(group, one, number, lobe, axes[lobe.along], view, turned)
-        before += 2 if lobe.paired else 1
-    if texel and texel.threads.through:
-        through = texel.color(texel.threads.through)
-        parts.append(group.add("ShaderNodeBsdfTranslucent", Color=through).outputs[0])
-    if texel and transparent:
+
+    def summed(texel: Texel | None) -> Any:
+        parts = []
+        for row, title in ((-2, "Diffuse"), (-1, "Sheen")):
+            color, factor = shades[title]
+            if texel:
+                color = group.vector("MULTIPLY", color, texel.color(texel.threads.factors[row]))
+            color = group.scaled(color, group.math("MULTIPLY", factor, view))
+            if title == "Diffuse":
+                node = group.add("ShaderNodeBsdfDiffuse", Color=color, Roughness=0.0)
+            elif max(mixture.sheen) > FAINT:
+                node = group.add("ShaderNodeBsdfSheen", Color=color, Roughness=rough)
+                node.distribution = "MICROFIBER"
+            else:
+                continue
+            parts.append(node.outputs[0])
+        before = 0
+        for lobe, inputs in zip(mixture.lobes, given, strict=True):
+            parts += _placed(group, one, lobe, inputs, (texel, before) if texel else None)
+            before += 2 if lobe.paired else 1
+        return group.sum(parts)
+
+    if texel:
+        cloth = _near(group, summed, texel, transparent)
+    else:
+        cloth = summed(None)
+        cloth = cloth if opacity is None else group.seen_through(cloth, opacity)
+    return group.end(cloth)
+
+
+def _near(group: Group, summed: Any, texel: Texel, transparent: bool) -> Any:
+    """Return the lobes of a texel, mixed by `Afar` with those of the whole cloth."""
+    threads = texel.threads
+    near, far = [summed(texel)], summed(None)
+    if transparent:
         # The lobes are those of the texel, its gaps included, and are not dimmed once more.
         gap = group.math("SUBTRACT", 1.0, texel.cover)
         color = group.joined(gap, gap, gap)
-        parts.append(group.add("ShaderNodeBsdfTransparent", Color=color).outputs[0])
-    cloth = group.sum(parts)
-    if opacity is not None:
-        gap = group.add("ShaderNodeBsdfTransparent").outputs[0]
-        mix = group.add("ShaderNodeMixShader", Fac=opacity)
-        group.tree.links.new(gap, mix.inputs[1])
-        group.tree.links.new(cloth, mix.inputs[2])
-        cloth = mix.outputs[0]
-    return group.end(cloth)
+        near.append(group.add("ShaderNodeBsdfTransparent", Color=color).outputs[0])
+        far = group.seen_through(far, sum(threads.share))
+    afar = [far]
+    if threads.through:
+        color = texel.color(threads.through)
+        near.append(group.add("ShaderNodeBsdfTranslucent", Color=color).outputs[0])
+        whole = threads.whole(threads.through)
+        afar.append(group.add("ShaderNodeBsdfTranslucent", Color=whole).outputs[0])
+    # Cycles does not evaluate what a factor of 0 or 1 leaves out.
+    return group.mixed(
+        group.sum(near), group.sum(afar), group.input("Afar", 0.0, low=0.0, high=1.0)
+    )
 
 
 def _frame(group: Group) -> tuple[Any, Any]:
@@ -143,21 +172,15 @@ def _view(
     return group.math("EXPONENT", total)
 
 
-def _placed(
-    group: Group, one: Any, number: int, lobe: Lobe, axis: Any, view: Any,
-    turned: tuple[Texel, int] | None,
-) -> list[Any]:  # fmt: skip
-    """Add a lobe, or both of a pair, with inputs of the group for its numbers.
-
-    turned : the texel under the point, and how many lobes come before
-    """
+def _given(group: Group, number: int, lobe: Lobe, axis: Any, view: Any) -> dict[str, Any]:
+    """Return inputs of the group for the numbers of a lobe, or of a pair."""
     title = f"Lobe {number + 1}"
     panel = group.panel(f"{title}: along the {lobe.along}{', a pair' if lobe.paired else ''}")
 
     def given(name: str, value: Any, **more: Any) -> Any:
         return group.input(f"{title} {name}", value, panel=panel, **more)
 
-    inputs = {
+    return {
         "Color": given("Color", lobe.color, color=True),
         "Tilt": given("Tilt", lobe.tilt, low=-1.5, high=1.5),
         "Width Along": given("Width Along", lobe.alpha_along, low=NARROWEST, high=1.0),
@@ -165,6 +188,15 @@ def _placed(
         "Facing": given("Facing", lobe.facing), "Crossing": given("Crossing", lobe.crossing),
         "Upright": given("Upright", lobe.upright), "Axis": axis, "View": view,
     }  # fmt: skip
+
+
+def _placed(
+    group: Group, one: Any, lobe: Lobe, inputs: dict[str, Any], turned: tuple[Texel, int] | None
+) -> list[Any]:
+    """Add a lobe, or both of a pair.
+
+    turned : the texel under the point, and how many lobes come before
+    """
     found = []
     for back, sign in enumerate((1.0, -1.0) if lobe.paired else (1.0,)):
         node = group.add("ShaderNodeGroup")

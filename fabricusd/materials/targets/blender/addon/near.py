@@ -26,8 +26,6 @@ SETS = tuple(part // (PARTS // 2) for part in range(PARTS))
 class Texel:
     """Sockets of what the texel under a point shows.
 
-    The group's input `Afar` blends it with what the whole cloth shows: 1 is the far mixture.
-
     shares : of each part, None for a part that the cloth has not
     sets : share of the weft and of the warp
     cover : their sum
@@ -48,11 +46,7 @@ class Texel:
                 strict=True,
             )
         ]
-        self.afar = group.input("Afar", 0.0, low=0.0, high=1.0)
-        self.shares = [
-            None if one is None else self._blended(_from_0(group, one), threads.share[b])
-            for b, one in enumerate(self.shares)
-        ]
+        self.shares = [None if one is None else _from_0(group, one) for one in self.shares]
         self.sets = [self._sum(range(k * PARTS // 2, (k + 1) * PARTS // 2)) for k in (0, 1)]
         self.cover = group.math("ADD", *self.sets)
         first_second = _four(group, read["lobes_lean"])
@@ -60,9 +54,8 @@ class Texel:
         self.squares: list[Any] = [None] * PARTS
         for k in (0, 1):
             size = group.math("MAXIMUM", self.sets[k], THIN)
-            lean = group.math("DIVIDE", self._blended(first_second[2 * k], 0.0), size)
+            lean = group.math("DIVIDE", first_second[2 * k], size)
             spread = _from_0(group, first_second[2 * k + 1])
-            spread = self._blended(spread, threads.spread[k])
             spread = group.math("DIVIDE", spread, size)
             flat = group.math("MULTIPLY", lean, lean)
             within = group.math("MAXIMUM", group.math("SUBTRACT", spread, flat), 0.0)
@@ -125,11 +118,6 @@ class Texel:
         here = math("MINIMUM", math("MAXIMUM", here, narrow), 1.0)
         return tilt, math("SQRT", here)
 
-    def _blended(self, number: Any, whole: float) -> Any:
-        """Return a number of the texel, or by `Afar` that of the whole cloth."""
-        off = self.group.math("SUBTRACT", whole, number)
-        return self.group.math("MULTIPLY_ADD", off, self.afar, number)
-
     def _weighted(self, weights: Sequence[Any], parts: Sequence[int], by: Any) -> Any:
         """Return the sum of the weights of `parts`, times the sockets `by` if there are any."""
         total: Any = 0.0
@@ -152,9 +140,6 @@ class Texel:
         if color is None:
             return None
         size = self.group.math("MAXIMUM", self.sets[k], THIN)
-        whole = (sum(w for b, w in enumerate(self.threads.share) if SETS[b] == k),) * 3
-        off = self.group.vector("SUBTRACT", whole, color)
-        color = self.group.vector("MULTIPLY_ADD", off, self.afar, color)
         ratio = self.group.vector("DIVIDE", color, size)
         part = self.threads.tinted[k]
         return self.group.vector("MULTIPLY_ADD", ratio, (part,) * 3, (1.0 - part,) * 3)

@@ -82,6 +82,17 @@ class Nodes:
         uv.name, uv.uv_map = "UV", UV
         return uv.outputs[0]
 
+    def mixed(self, none: Any, whole: Any, factor: Any) -> Any:
+        """Return a closure that goes from `none` to `whole`."""
+        node = self.add("ShaderNodeMixShader", Fac=factor)
+        self.tree.links.new(none, node.inputs[1])
+        self.tree.links.new(whole, node.inputs[2])
+        return node.outputs[0]
+
+    def seen_through(self, cloth: Any, opacity: Any) -> Any:
+        """Return a closure that covers the share `opacity`; the rest is gap."""
+        return self.mixed(self.add("ShaderNodeBsdfTransparent").outputs[0], cloth, opacity)
+
     def image(self, image: Any) -> Any:
         """Add an image node; return its colour."""
         return self.tiled(image, self.uv(), repeats=False)[0]

@@ -44,6 +44,13 @@ class Threads:
     matrix: tuple[float, ...]
     repeat: tuple[float, ...]
 
+    def whole(self, rows: Rows) -> tuple[float, float, float]:
+        """Return the sum of rows over the parts of the whole cloth."""
+        r, g, b = (
+            sum(row[c] * w for row, w in zip(rows, self.share, strict=True)) for c in range(3)
+        )
+        return r, g, b
+
 
 @dataclass(frozen=True, kw_only=True)
 class Turning:

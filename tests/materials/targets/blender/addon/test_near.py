@@ -38,7 +38,12 @@ COVER = 0.9
 CASES = {
     "point of the weft": point(1), "point of the warp": point(6), "mixed": mixed(),
     "half a gap": mixed(gap=0.5), "repeat": mixed(seed=5), "afar": mixed(seed=6),
+    "half afar": mixed(seed=7),
 }  # fmt: skip
+
+
+AFAR = {"afar": 1.0, "half afar": 0.5}
+"""The group's input of that name; 0 in all other cases."""
 
 
 def laid(folder, name, texel, size=4):
@@ -93,7 +98,7 @@ def rendered(tmp_path_factory):
         told[name] = write_near_sheet(folder / f"{name}.usda", texel, along)
         steps += [
             {"do": "clear"}, {"do": "bring", "path": str(folder / f"{name}.usda")},
-            {"do": "give", "name": "Afar", "value": 1.0 if name == "afar" else 0.0},
+            {"do": "give", "name": "Afar", "value": AFAR.get(name, 0.0)},
             {
                 "do": "from_above", "picture": str(folder / f"{name}.exr"), "cells": CELLS,
                 "towards_light": TOWARDS.tolist(), "irradiance": IRRADIANCE,
@@ -105,8 +110,9 @@ def rendered(tmp_path_factory):
         pixels = read_exr_layers(folder / f"{name}.exr")[0]["beauty"][::-1]
         middle = pixels[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE].reshape(CELLS * CELLS, -1)
         cells = pixels.reshape(CELLS, SIDE, CELLS, SIDE, -1)[:, 6:11, :, 6:11, 3]
-        texel = near.parts.texel if name == "afar" else texel
-        found[name] = middle[:, :3], expected(near, texel, along), cells, texel
+        away, whole = AFAR.get(name, 0.0), expected(near, near.parts.texel, along)
+        truth = (1.0 - away) * expected(near, texel, along) + away * whole
+        found[name] = middle[:, :3], truth, cells, texel
     return found
 
 
