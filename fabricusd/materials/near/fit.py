@@ -1,9 +1,9 @@
 """Find which threads make which lobes of a mixture, so that it holds near by.
 
 The colour of a lobe on a part of the threads enters the radiance linearly. It is found by
-non-negative least squares, `scipy.optimize.nnls`, on the cube roots of the channels, which is close to delta E
-2000, reweighted until they are the mean. The means of the factors over the cloth are 1, so that the
-cloth from afar stays what it was. The width of each lobe at a point is then sought on a grid.
+`scipy.optimize.nnls` on the cube roots of the channels, which is close to delta E 2000, reweighted
+until they are the mean. The means of the factors over the cloth are 1, so that the cloth from afar
+stays what it was. The width of each lobe at a point is then sought on a grid.
 """
 
 from __future__ import annotations
