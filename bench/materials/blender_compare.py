@@ -181,7 +181,8 @@ def jobs_of(subject, preset, scene, folder, light):
         bake(scene, baked, BakeSettings(resolution=512, fit=True))
     surfaces = ("openpbr",) if behind else ("openpbr", "lobes")
     if not (baked / "look.usda").exists():
-        write_materials(baked, settings=Settings(surfaces=surfaces))
+        # The reference is level far; `blender_zoom.py` compares single threads.
+        write_materials(baked, settings=Settings(surfaces=surfaces, near="off"))
     shader = folder / f"{preset}.osl"
     if light == "sun":
         write_osl(load(preset), shader)

@@ -42,6 +42,11 @@ def render(job):
         )  # fmt: skip
     else:
         bpy.ops.wm.usd_import(filepath=job["layer"], import_cameras=False, import_lights=False)
+    if "afar" in job:
+        for material in bpy.data.materials:
+            for node in material.node_tree.nodes if material.node_tree else ():
+                if "Afar" in node.inputs:
+                    node.inputs["Afar"].default_value = job["afar"]
     if job["material"] == "osl":
         shade_by_osl(job)
     if job["light"] == "sky":
@@ -105,7 +110,7 @@ def add_light(job):
 def add_camera(job):
     camera = bpy.data.cameras.new("Camera")
     camera.lens, camera.sensor_width, camera.sensor_fit = job["focal_length"], 36.0, "HORIZONTAL"
-    camera.clip_start = 0.01
+    camera.clip_start, camera.clip_end = job.get("clip", 0.01), 1e5
     one = bpy.data.objects.new("Camera", camera)
     # USD's matrices apply to row vectors.
     one.matrix_world = TO_Z_UP @ Matrix(job["camera"]).transposed()

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fabricusd.cli.arguments.number import number
+from fabricusd.materials.near import AUTO, NEAR
 from fabricusd.materials.targets import TARGETS
 
 EPILOG = """example:
@@ -52,6 +53,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="E",
         help="fewer lobes where their mean delta E 2000 is at most E (default: N lobes)",
     )
+    parser.add_argument(
+        "--near", choices=NEAR, default=AUTO,
+        help="threads that the surface 'lobes' shows near by in Blender: those of the bake's "
+        "'texels', one 'repeat' of even threads, or 'off'; 'auto' takes the texels where 4 of them "
+        "show a thread, and else the repeat (default: auto)",
+    )  # fmt: skip
     for target in TARGETS:
         given: dict[str, Any] = {"metavar": target.metavar}
         given = given if target.metavar else {"action": "store_true"}
@@ -90,6 +97,7 @@ def run(options: argparse.Namespace) -> int:
         Settings(
             surfaces=tuple(options.surface), fitted=not options.no_fit, targets=targets,
             colorway=options.colorway, lobes=options.lobes, max_error=options.max_error,
+            near=options.near,
         ),
         scene=options.scene, clobber=not options.no_clobber, dry_run=options.dry_run,
         progress=None if options.quiet else say,

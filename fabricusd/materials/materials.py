@@ -18,6 +18,7 @@ from fabricusd.fabric import Fabric
 from fabricusd.files import remove_partial_files, write_json
 from fabricusd.materials.bake_folder import BakeFolder, read_bake_folder
 from fabricusd.materials.bound_prims import BoundScene, find_bound_prims
+from fabricusd.materials.near import NEAR
 from fabricusd.materials.networks.surfaces import GRAPHS, MAPS
 from fabricusd.materials.recipes import OF_THREADS, Progress, Settings, Written, recipes
 from fabricusd.materials.targets import Job, chosen
@@ -157,6 +158,8 @@ def _check_surfaces(folder: BakeFolder, settings: Settings) -> None:
             )
     if "lobes" in settings.surfaces and not settings.fitted:
         raise FabricError("surface 'lobes'", "is fitted; it cannot be written with --no-fit")
+    if settings.near not in NEAR:
+        raise FabricError("near", f"is '{settings.near}'; it must be one of {', '.join(NEAR)}")
     RANGES["lobes"].require("lobes", settings.lobes)
     if settings.max_error is not None:
         RANGES["max_error"].require("max_error", settings.max_error)

@@ -21,9 +21,14 @@ from fabricusd.materials.lobes.fit import COUNT
 from fabricusd.materials.lobes.inputs import inputs as lobe_inputs
 from fabricusd.materials.lobes.known import mixture_of
 from fabricusd.materials.lobes.mixture import CYCLES, MATERIALX, Mixture, of_covered
-from fabricusd.materials.lobes.network import lobes
+from fabricusd.materials.lobes.network import Texel, lobes
 from fabricusd.materials.lobes.parameters import at_bounds
-from fabricusd.materials.networks.graph import Graph, Texture, Value, unrolled
+from fabricusd.materials.near import AUTO
+from fabricusd.materials.near.inputs import near_inputs
+from fabricusd.materials.near.keep import moved_to, near_of
+from fabricusd.materials.near.network import NearTexel
+from fabricusd.materials.near.recipe import Files, Threads, threads_of
+from fabricusd.materials.networks.graph import Builder, Graph, Texture, Value, unrolled
 from fabricusd.materials.networks.hair import hair
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import (
@@ -76,6 +81,7 @@ class Settings:
         the document all
     lobes, max_error : number of lobes of surface "lobes", and the mean delta E 2000 that fewer may
         have; None takes that number
+    near : where lobes take single threads from, one of `near.NEAR`
     fitted : whether the parameters are sought; otherwise the textures stand as they are
     targets : what is written besides, names of `targets.TARGETS`, and where
     colorway : name of an asset's variant, "" for the fabrics' names
@@ -85,6 +91,7 @@ class Settings:
     fitted: bool = True
     lobes: int = COUNT
     max_error: float | None = None
+    near: str = AUTO
     targets: Wanted = field(default_factory=dict)
     colorway: str = ""
 
@@ -113,6 +120,7 @@ def recipes(
     documents = []
     for maps in folder.garments:
         found_looks, seen, fitted = _garment_looks(maps, path, settings, made, progress)
+        threads = _threads(maps, path, settings, made)
         for number, lay in enumerate(maps.lays):
             textures = texture_inputs(seen[number], path, made)
             takes_threads = fitted is not maps and seen[number] is maps
@@ -125,11 +133,14 @@ def recipes(
             assert isinstance(cover, float)
             opaque = cover > OPAQUE
             mixture = _mixture(maps, number, settings, made, progress)
-            more: dict[str, Value] = {}
+            more: dict[str, Value | Texture] = {}
+            of_lobes, near = more, None
             if mixture is not None:
                 covered = 1.0 if opaque else max(cover, LEAST_COVER)
+                shown = threads.get(number)
+                near = _texel(lay, mixture, covered, shown, progress)
                 mixture = of_covered(mixture, covered)
-                more = _for_cycles(lay, settings, covered)
+                more, of_lobes = _for_cycles(lay, settings, covered, shown, progress)
             dark = {} if transmits(means) else {"transmission_color": NO_TRANSMISSION}
             if not dark:
                 _note_no_light_through(lay.name, settings, made)
@@ -140,9 +151,18 @@ def recipes(
                 ("procedural", means, {**of_means, **dark}),
             ):
                 title = name if variant == "baked" else f"{name}_plain"
-                graphs = {s: _graph(s, inputs, opaque, lay, mixture) for s in settings.surfaces}
+                texel = near if variant == "baked" else None
+                graphs = {
+                    s: _graph(s, inputs, opaque, lay, mixture, texel) for s in settings.surfaces
+                }
                 found[maps.name, number, variant] = material_recipe(
-                    title, graphs, plain, looks, opaque, inputs, more
+                    title,
+                    graphs,
+                    plain,
+                    looks,
+                    opaque,
+                    inputs,
+                    of_lobes if variant == "baked" else more,
                 )
                 for surface, graph in graphs.items():
                     tail = "" if len(graphs) == 1 else f"_{surface}"
@@ -151,14 +171,15 @@ def recipes(
 
 
 def _graph(
-    surface: str, inputs: Inputs, opaque: bool, lay: BakedLay, mixture: Mixture | None
-) -> Graph:
+    surface: str, inputs: Inputs, opaque: bool, lay: BakedLay, mixture: Mixture | None,
+    near: Callable[[Builder], Texel] | None,
+) -> Graph:  # fmt: skip
     if surface in GRAPHS:
         return GRAPHS[surface](inputs, opaque)
     if surface == "hair":
         return hair(inputs, opaque, lay)
     assert mixture is not None
-    return lobes(inputs, opaque, mixture, lay.matrix)
+    return lobes(inputs, opaque, mixture, lay.matrix, near)
 
 
 def _mixture(
@@ -177,11 +198,38 @@ def _mixture(
     return found
 
 
-def _for_cycles(lay: BakedLay, settings: Settings, cover: float) -> dict[str, Value]:
-    """Return the inputs from which Blender's add-on builds the lobes; their fit is at hand."""
+def _threads(maps: MapSet, path: Path, settings: Settings, made: Written) -> dict[int, Threads]:
+    """Return the threads of each lay that the lobes of a garment show near by."""
+    if "lobes" not in settings.surfaces:
+        return {}
+    files = Files(folder=lambda: maps_folder(path), files=made.files, remarks=made.remarks)
+    return threads_of(maps, settings.near, files)
+
+
+def _texel(
+    lay: BakedLay, far: Mixture, cover: float, threads: Threads | None, progress: Progress | None
+) -> Callable[[Builder], Texel] | None:
+    """Return what adds the nodes of single threads to the network of MaterialX."""
+    if threads is None or lay.fabric is None:
+        return None
+    near = moved_to(near_of(lay.fabric, far, progress), threads.parts)
+    near = replace(near, factors=near.factors * cover)
+    return lambda builder: NearTexel(builder, near, threads.laid)
+
+
+def _for_cycles(
+    lay: BakedLay, settings: Settings, cover: float, threads: Threads | None,
+    progress: Progress | None,
+) -> tuple[dict[str, Value | Texture], dict[str, Value | Texture]]:  # fmt: skip
+    """Return the inputs from which Blender's add-on builds the lobes, without threads and with."""
     assert lay.fabric is not None
     found = mixture_of(lay.fabric, settings.lobes, CYCLES, max_error=settings.max_error)
-    return lobe_inputs(of_covered(found, cover), lay.fabric.name, lay.matrix)
+    far: dict[str, Value | Texture] = {}
+    far |= lobe_inputs(of_covered(found, cover), lay.fabric.name, lay.matrix)
+    if threads is None:
+        return far, far
+    near = moved_to(near_of(lay.fabric, found, progress), threads.parts)
+    return far, far | near_inputs(near, threads.laid, cover)
 
 
 def lit_through(look: Look) -> Look:
@@ -200,7 +248,7 @@ def _note_no_light_through(fabric: str, settings: Settings, made: Written) -> No
 
 def material_recipe(
     name: str, graphs: Mapping[str, Graph], plain: Inputs, looks: Mapping[str, Look], opaque: bool,
-    inputs: Inputs | None = None, more: Mapping[str, Value] | None = None,
+    inputs: Inputs | None = None, more: Mapping[str, Value | Texture] | None = None,
 ) -> MaterialRecipe:  # fmt: skip
     """A material of UsdPreviewSurface over `plain` and the first of `graphs`.
 

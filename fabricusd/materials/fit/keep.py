@@ -32,12 +32,12 @@ def kept_fit(
     def made() -> Mapping[int, Fitted]:
         return {0: fit(kind, texels, fabric, baked=baked)}
 
-    return _kept((kind, *_key(texels), *_key(baked), *_cloth(fabric)), made, waiting)[0]
+    return _kept((kind, *_key(texels), *_key(baked), *cloth_key(fabric)), made, waiting)[0]
 
 
 def kept_fit_threads(texels: TexelSample, fabric: Fabric, *, waiting: Waiting) -> dict[int, Fitted]:
     """Return `fit.fit_threads` of these arguments."""
-    key = ("threads", *_key(texels), *_cloth(fabric))
+    key = ("threads", *_key(texels), *cloth_key(fabric))
     return _kept(key, lambda: fit_threads(texels, fabric), waiting)
 
 
@@ -65,7 +65,8 @@ def _key(texels: TexelSample) -> tuple[object, ...]:
     return tuple(np.round(np.atleast_1d(getattr(texels, one.name)), 7) for one in fields(texels))
 
 
-def _cloth(fabric: Fabric) -> tuple[object, ...]:
+def cloth_key(fabric: Fabric) -> tuple[object, ...]:
+    """What a fit depends on of a fabric."""
     # colour-science changes how NumPy prints its numbers, and a fit imports it.
     with np.printoptions(legacy=False):
         said = repr(replace(fabric, weave=_ANY_WEAVE, back=None))

@@ -7,7 +7,8 @@ reflectance of that node and not in a `multiply` behind it, because `multiply` c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,40 +34,94 @@ Floats = NDArray[np.float64]
 _UP = Value("vector3", (0.0, 0.0, 1.0))
 _ACROSS = Value("vector3", (1.0, 0.0, 0.0))
 
+LEAST_COVER = 1e-3
+"""Cover of a texel of which nothing is seen."""
 
-def lobes(maps: Inputs, opaque: bool, mixture: Mixture, matrix: Floats) -> Graph:
-    """Return a surface of lobes; textures provide opacity only.
+
+class Texel(Protocol):
+    """What a texel shows of single threads; `near.network` makes its nodes.
+
+    cover : share of the texel that threads cover
+    """
+
+    cover: Link
+
+    def color(self, name: str, row: int, rgb: Sequence[float]) -> Source:
+        """Return a colour of the mixture at the texel, gaps included: of a lobe by its number, of
+        the diffuse part (-2), of the sheen (-1)."""
+
+    def placed(self, name: str, number: int) -> tuple[Source, Source]:
+        """Return the tilt and the widths of a lobe; of a pair, each has its own number."""
+
+    def through(self) -> Source | None:
+        """Return the share of the light from behind that comes through; None without any."""
+
+
+def lobes(
+    maps: Inputs, opaque: bool, mixture: Mixture, matrix: Floats,
+    near: Callable[[Builder], Texel] | None = None,
+) -> Graph:  # fmt: skip
+    """Return a surface of lobes; without `near`, textures provide opacity only.
 
     mixture : in the form of MaterialX
     matrix : (2, 2) from the texture coordinates to threads, as in `BakedLay`
+    near : adds the nodes of the texel under a point
     """
     assert mixture.form == MATERIALX
     b = Builder()
+    texel = near(b) if near else None
     eye, normal, upright = _frame(b)
     axes = _axes(b, matrix)
-    view = _view(b, mixture, upright, eye, axes) if mixture.view else one(1.0)
-    parts = [_diffuse(b, mixture, normal, upright, view)]
+    view: Source = _view(b, mixture, upright, eye, axes) if mixture.view else one(1.0)
+    if texel and not opaque:
+        # The opacity dims the lobes of a texel, which are those of its gaps as well.
+        least = b.math("cover_floor", "max", "float", texel.cover, one(LEAST_COVER))
+        view = b.math("view_covered", "divide", "float", view, least)
+    parts = [_diffuse(b, mixture, normal, upright, view, texel)]
     if max(mixture.sheen) > 1e-4:
         parts.append(
             b.add(
                 "sheen", "sheen_bsdf", "BSDF", "ND_sheen_bsdf",
                 color=_shaded(
-                    b, "sheen", mixture.sheen, mixture.sheen_power, (upright, UPRIGHT), view
+                    b, "sheen", _seen(texel, "sheen", -1, mixture.sheen), mixture.sheen_power,
+                    (upright, UPRIGHT), view,
                 ),
                 roughness=one(mixture.sheen_roughness),
                 normal=normal, mode=Value("string", "zeltner"),
             )
         )  # fmt: skip
+    number = 0
     for k, lobe in enumerate(mixture.lobes):
         for tilt, side in zip(lobe.tilts, ("", "_back"), strict=False):
+            name = f"lobe{k}{side}"
+            color = _seen(texel, name, number, lobe.color)
+            widths: Source = Value("vector2", (lobe.alpha_along, lobe.alpha_across))
+            placed = texel.placed(name, number) if texel else (one(tilt), widths)
             parts.append(
-                _placed(b, f"lobe{k}{side}", lobe, tilt, axes[lobe.along], normal, eye, view)
+                _placed(b, name, lobe, (color, *placed), axes[lobe.along], normal, eye, view)
             )
+            number += 1
+    through = texel.through() if texel else None
+    if texel and through is not None:
+        if not opaque:
+            least = b.math("cover_floor", "max", "float", texel.cover, one(LEAST_COVER))
+            through = b.math("through_covered", "divide", "color3", through, least, short=True)
+        parts.append(
+            b.add(
+                "through_bsdf", "translucent_bsdf", "BSDF", "ND_translucent_bsdf",
+                color=through, normal=normal,
+            )
+        )  # fmt: skip
     inputs: dict[str, Source] = {"bsdf": _sum(b, parts), "thin_walled": Value("boolean", True)}
     if not opaque:
-        inputs["opacity"] = Maps(b, maps)("opacity")
+        inputs["opacity"] = texel.cover if texel else Maps(b, maps)("opacity")
     b.nodes["surface"] = Node("surface", "surface", "surfaceshader", "ND_surface", inputs)
     return Graph(tuple(b.nodes.values()), "surface", "out", "mtlx", (LOBE,))
+
+
+def _seen(texel: Texel | None, name: str, row: int, rgb: tuple[float, float, float]) -> Source:
+    """Return a colour of the mixture, of the texel if there is one."""
+    return texel.color(name, row, rgb) if texel else _color(rgb)
 
 
 def _frame(b: Builder) -> tuple[Link, Link, Link]:
@@ -129,19 +184,22 @@ def _view(b: Builder, mixture: Mixture, upright: Link, eye: Link, axes: tuple[Li
 
 
 def _shaded(
-    b: Builder, name: str, rgb: tuple[float, float, float], power: float,
+    b: Builder, name: str, rgb: Source, power: float,
     base: tuple[Link, float], view: Source,
 ) -> Link:  # fmt: skip
     """Return a colour times V and a power of the cosine to the viewer, its lower bound given."""
     least = b.math(f"{name}_cosine", "max", "float", base[0], one(base[1]))
     raised = b.math(f"{name}_power", "power", "float", least, one(power))
     seen = b.math(f"{name}_view", "multiply", "float", raised, view)
-    return b.math(f"{name}_color", "multiply", "color3", _color(rgb), seen, short=True)
+    return b.math(f"{name}_color", "multiply", "color3", rgb, seen, short=True)
 
 
-def _diffuse(b: Builder, mixture: Mixture, normal: Link, upright: Link, view: Source) -> Link:
+def _diffuse(
+    b: Builder, mixture: Mixture, normal: Link, upright: Link, view: Source, texel: Texel | None
+) -> Link:
     color = _shaded(
-        b, "diffuse", mixture.diffuse, mixture.diffuse_power, (upright, EVEN), view
+        b, "diffuse", _seen(texel, "diffuse", -2, mixture.diffuse), mixture.diffuse_power,
+        (upright, EVEN), view,
     )  # fmt: skip
     return b.add(
         "diffuse", "oren_nayar_diffuse_bsdf", "BSDF", "ND_oren_nayar_diffuse_bsdf",
@@ -150,13 +208,14 @@ def _diffuse(b: Builder, mixture: Mixture, normal: Link, upright: Link, view: So
 
 
 def _placed(
-    b: Builder, name: str, lobe: Lobe, tilt: float, axis: Link, normal: Link, eye: Link,
-    view: Source,
+    b: Builder, name: str, lobe: Lobe, placed: tuple[Source, Source, Source], axis: Link,
+    normal: Link, eye: Link, view: Source,
 ) -> Link:  # fmt: skip
+    """Add a lobe of the colour, tilt and widths `placed`."""
+    color, tilt, widths = placed
     return b.add(
         name, LOBE.category, LOBE.kind, LOBE.identifier,
-        color=_color(lobe.color), tilt=one(tilt),
-        roughness=Value("vector2", (lobe.alpha_along, lobe.alpha_across)),
+        color=color, tilt=tilt, roughness=widths,
         facing=one(lobe.facing), crossing=one(lobe.crossing), upright=one(lobe.upright),
         axis=axis, normal=normal, eye=eye, view=view,
     )  # fmt: skip

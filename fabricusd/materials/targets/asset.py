@@ -170,7 +170,14 @@ class _Copies:
 
     def in_recipe(self, recipe: MaterialRecipe) -> MaterialRecipe:
         """The recipe with its textures in the folder."""
-        return replace(recipe, graphs=tuple((n, self._in_graph(g)) for n, g in recipe.graphs))
+        return replace(
+            recipe,
+            graphs=tuple((n, self._in_graph(g)) for n, g in recipe.graphs),
+            parameters={
+                name: self.of(one) if isinstance(one, Texture) else one
+                for name, one in recipe.parameters.items()
+            },
+        )
 
     def _in_graph(self, graph: Graph) -> Graph:
         nodes = tuple(

@@ -22,7 +22,7 @@ from fabricusd.fabric import Binding
 from fabricusd.files import whole_file
 from fabricusd.materials.bake_folder import BakedLay, MapSet
 from fabricusd.materials.bound_prims import BoundPrim, BoundScene, NewUV
-from fabricusd.materials.networks.graph import Graph, Value
+from fabricusd.materials.networks.graph import Graph, Texture, Value
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import Inputs
 from fabricusd.materials.targets.flat import SCOPE
@@ -49,7 +49,7 @@ class MaterialRecipe:
 
     name: str
     graphs: tuple[tuple[str, Graph], ...]
-    parameters: Mapping[str, Value]
+    parameters: Mapping[str, Value | Texture]
     inputs: Inputs = field(default_factory=dict)
     looks: Mapping[str, Look] = field(default_factory=dict)
     opaque: bool = False

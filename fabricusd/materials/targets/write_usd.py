@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pxr import Sdf, Usd, UsdShade
+from pxr import Sdf, Usd, UsdShade, Vt
 
 from fabricusd.materials.networks.graph import Graph, Link, Parameter, Source, Texture, Value
 from fabricusd.materials.targets.paths import asset_path
@@ -22,6 +23,7 @@ _TYPES = {
     "vector2": Sdf.ValueTypeNames.Float2,
     "vector3": Sdf.ValueTypeNames.Float3,
     "float4": Sdf.ValueTypeNames.Float4,
+    "vector4": Sdf.ValueTypeNames.Float4,
     "floats": Sdf.ValueTypeNames.FloatArray,
     "boolean": Sdf.ValueTypeNames.Bool,
     "integer": Sdf.ValueTypeNames.Int,
@@ -46,7 +48,7 @@ def write_material(
     stage: Usd.Stage,
     path: Sdf.Path,
     graphs: list[tuple[str, Graph]],
-    parameters: dict[str, Value],
+    parameters: Mapping[str, Value | Texture],
     layer_folder: Path,
 ) -> UsdShade.Material:
     """Write a Material with an output for each graph.
@@ -62,7 +64,8 @@ def write_material(
             "config:mtlx:version", Sdf.ValueTypeNames.String, custom=False
         ).Set(MTLX_VERSION)
     for name, value in parameters.items():
-        _set(material.CreateInput(name, _TYPES[value.kind]), value)
+        kind = _TYPES[value.kind] if isinstance(value, Value) else Sdf.ValueTypeNames.Asset
+        _set(material.CreateInput(name, kind), value, layer_folder)
     for prefix, graph in graphs:
         _write_graph(stage, material, prefix, graph, layer_folder)
     return material
@@ -119,5 +122,9 @@ def _set(
         given.Set(Sdf.AssetPath(asset_path(source.path, folder)))
         linear = _LINEAR.removesuffix("_scene") if context == "mtlx" else _LINEAR
         given.GetAttr().SetColorSpace(linear if source.color else _RAW)
+    elif source.kind == "floats":
+        # USD would take a tuple of two to four numbers for a vector.
+        assert isinstance(source.value, tuple)
+        given.Set(Vt.FloatArray(source.value))
     else:
         given.Set(source.value)

@@ -23,9 +23,13 @@ MATRIX = np.array([[30.0, 12.0], [-16.0, 40.0]])
 RECORDED = json.loads(Path(__file__).with_name("materialx_lobes.json").read_text())
 OPACITY = {"opacity": Value("float", 0.5)}
 
+PIXELS: dict[str, np.ndarray] = {}
+"""What textures hold, by the names of their files."""
+
 MATH = {
     "multiply": np.multiply, "add": np.add, "subtract": np.subtract, "max": np.maximum,
-    "power": np.power, "dotproduct": np.dot,
+    "power": np.power, "dotproduct": np.dot, "divide": np.divide,
+    "combine2": lambda a, b: np.array((a, b)),
 }  # fmt: skip
 PLAIN = {
     "sin": np.sin, "cos": np.cos, "sign": np.sign, "absval": np.abs, "sqrt": np.sqrt, "exp": np.exp,
@@ -45,6 +49,8 @@ def value_of(graph, source, eye, light):
         return np.asarray(source.value)
     assert isinstance(source, Link)
     node = graph.node(source.node)
+    if node.category == "image":
+        return PIXELS[node.inputs["file"].path.stem]
     given = {k: value_of(graph, s, eye, light) for k, s in node.inputs.items() if k != "space"}
     if node.kind == "BSDF":
         return closure(node, given, eye, light)
@@ -52,6 +58,14 @@ def value_of(graph, source, eye, light):
         return MATH[node.category](given["in1"], given["in2"])
     if node.category in PLAIN:
         return PLAIN[node.category](given["in"])
+    if node.category == "combine3":
+        return np.array([given[f"in{k}"] for k in (1, 2, 3)])
+    if node.category == "extract":
+        return given["in"][int(given["index"])]
+    if node.category == "mix":
+        return given["bg"] + given["mix"] * (given["fg"] - given["bg"])
+    if node.category == "clamp":
+        return np.clip(given["in"], given["low"], given["high"])
     if node.category == "normalize":
         return given["in"] / np.linalg.norm(given["in"])
     if node.category == "ifgreater":

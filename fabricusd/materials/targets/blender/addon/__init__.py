@@ -9,6 +9,8 @@ and nothing of fabricusd outside this folder.
     nodes        node trees, node by node
     principled   the group of a fitted Principled BSDF
     lobes        the group of a sum of tilted lobes
+    threads      what a look says of single threads, without Blender
+    near         the lobes of the texel under a point
     build        give Blender's materials the groups of a stage
     world        the dome light
     hook         do so after any USD import
@@ -20,7 +22,7 @@ from __future__ import annotations
 bl_info = {
     "name": "fabricusd looks",
     "author": "fabricusd authors",
-    "version": (1, 1, 0),
+    "version": (1, 2, 0),
     "blender": (4, 2, 0),
     "location": "File > Import > fabricusd look (.usda, .usdz)",
     "category": "Import-Export",

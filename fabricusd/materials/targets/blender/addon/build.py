@@ -14,6 +14,7 @@ from .lobes import lays, lobes
 from .looks import Look
 from .nodes import Nodes
 from .principled import NUMBERS, TITLES, principled
+from .threads import Threads
 
 LOBES, PRINCIPLED, BEST = SURFACES = ("LOBES", "PRINCIPLED", "BEST")
 """Which surface a material gets; the best is the lobes where a look has them."""
@@ -53,7 +54,7 @@ def build(
         for material in mine:
             if material.node_tree is None:
                 material.use_nodes = True
-            group = _group(look, surface, shared, made)
+            group = _group(look, surface, shared, made, images)
             replaced |= _images_of(material)
             _wire(material, look, group, images)
             made.groups.setdefault(group.name, []).append(material)
@@ -94,15 +95,16 @@ def _images_of(material: Any) -> set[Any]:
     return found - {None}
 
 
-def _group(look: Look, surface: str, shared: dict[Any, Any], made: Made) -> Any:
+def _group(look: Look, surface: str, shared: dict[Any, Any], made: Made, images: Images) -> Any:
     """Return the tree of a look's surface: one for all materials of the same fabric."""
     mixture = look.mixture if surface != PRINCIPLED or not look.values else None
     name = look.fabric or look.name
     if mixture is not None:
-        key: Any = (mixture, look.transparent)
+        key: Any = (mixture, look.transparent, look.threads)
         if key not in shared:
-            shared[key] = lobes(mixture, name, transparent=look.transparent)
-            if look.lit_through:
+            near = _near(look, images)
+            shared[key] = lobes(mixture, name, transparent=look.transparent, near=near)
+            if look.lit_through and not (near and near[0].through):
                 made.left_out.append(f"light through {name}, which lobes have not")
     else:
         textures = tuple(sorted(look.maps))
@@ -110,6 +112,16 @@ def _group(look: Look, surface: str, shared: dict[Any, Any], made: Made) -> Any:
         if key not in shared:
             shared[key] = principled(look, name)
     return shared[key]
+
+
+def _near(look: Look, images: Images) -> tuple[Threads, dict[str, Any]] | None:
+    """Return the threads of a look and their images; None if one of these cannot be read."""
+    if look.threads is None:
+        return None
+    found = {
+        name: images(path, data=True, four="tint" not in name) for name, path in look.threads.files
+    }
+    return None if None in found.values() else (look.threads, found)
 
 
 def _wire(material: Any, look: Look, tree: Any, images: Images) -> None:
@@ -121,7 +133,8 @@ def _wire(material: Any, look: Look, tree: Any, images: Images) -> None:
     output = nodes.add("ShaderNodeOutputMaterial", Surface=group.outputs[0])
     if "Weft" in group.inputs:
         for name, value in lays(look).items():
-            nodes.set(group.inputs[name], value)
+            if name in group.inputs:
+                nodes.set(group.inputs[name], value)
         # Cycles would bend the tilted normals of lobes back towards the viewer.
         if hasattr(material, "cycles"):
             material.cycles.use_bump_map_correction = False

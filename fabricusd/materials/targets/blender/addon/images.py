@@ -23,10 +23,11 @@ class Images:
         self.loaded: dict[str, Any] = {}
         self.missing: list[str] = []
 
-    def __call__(self, path: str, *, data: bool) -> Any:
+    def __call__(self, path: str, *, data: bool, four: bool = False) -> Any:
         """Return the image at `path`, `FILE` or `FILE.usdz[FILE]`; None if it cannot be read.
 
         data : whether the image holds data rather than linear Rec. 709 colour
+        four : whether its fourth channel is data and no opacity
         """
         if path not in self.loaded:
             try:
@@ -37,6 +38,8 @@ class Images:
         image = self.loaded[path]
         if image is not None:
             image.colorspace_settings.name = "Non-Color" if data else "Linear Rec.709"
+            if four:
+                image.alpha_mode = "CHANNEL_PACKED"
         return image
 
 

@@ -14,7 +14,9 @@ from typing import Any
 import bpy
 
 from .looks import Lobe, Look, Mixture
+from .near import Texel
 from .nodes import Group
+from .threads import Threads, turning
 
 FACING, CROSSING, UPRIGHT, EVEN, SHARP = 1e-4, 0.06, 0.05, 1e-4, 0.01
 """Lower bounds of the bases of the powers p, r, s and u, q, and of N.wo in V."""
@@ -24,6 +26,8 @@ SMALLEST = 1e-6
 
 NARROWEST = 0.01
 """Least width of a lobe that is edited."""
+
+AXES = ("weft", "warp")
 
 POWERS = 7
 """Number of coefficients of each polynomial of V."""
@@ -35,14 +39,22 @@ ONE_LOBE, FORM = "fabricusd lobe", "fabricusd_form"
 """Name of the group of one lobe, and of the property that says which of its forms it is."""
 
 
-def lobes(mixture: Mixture, name: str, *, transparent: bool) -> Any:
+def lobes(
+    mixture: Mixture, name: str, *, transparent: bool,
+    near: tuple[Threads, dict[str, Any]] | None = None,
+) -> Any:  # fmt: skip
     """Build the group of a mixture; return its tree.
 
     Its inputs `Weft` and `Warp` are the threads' directions in texture space, and `Opacity`, if
     `transparent`, the share of the cloth that is not gap.
+
+    near : the single threads and their images, which say the opacity as well
     """
     group = Group(name)
-    opacity = group.input("Opacity", 1.0, low=0.0, high=1.0) if transparent else None
+    texel = Texel(group, *near) if near else None
+    opacity = None
+    if transparent and texel is None:
+        opacity = group.input("Opacity", 1.0, low=0.0, high=1.0)
     places = {
         "weft": group.input("Weft", (1.0, 0.0, 0.0)), "warp": group.input("Warp", (0.0, 1.0, 0.0))
     }  # fmt: skip
@@ -51,30 +63,72 @@ def lobes(mixture: Mixture, name: str, *, transparent: bool) -> Any:
     up = group.vector("DOT_PRODUCT", eye, normal)
     view = _view(group, mixture.view, up, eye, axes)
 
-    def shaded(title: str, color: Any, power: float, least: float) -> Any:
-        factor = _power(group, up, least, group.input(f"{title} Power", power))
-        color = group.input(title, color, color=True)
-        return group.scaled(color, group.math("MULTIPLY", factor, view))
-
-    diffuse = shaded("Diffuse", mixture.diffuse, mixture.diffuse_power, EVEN)
-    parts = [group.add("ShaderNodeBsdfDiffuse", Color=diffuse, Roughness=0.0).outputs[0]]
-    if max(mixture.sheen) > FAINT:
-        sheen = shaded("Sheen", mixture.sheen, mixture.sheen_power, UPRIGHT)
-        rough = group.input("Sheen Roughness", mixture.sheen_roughness, low=0.0, high=1.0)
-        node = group.add("ShaderNodeBsdfSheen", Color=sheen, Roughness=rough)
-        node.distribution = "MICROFIBER"
-        parts.append(node.outputs[0])
+    shades = {
+        title: (
+            group.input(title, color, color=True),
+            _power(group, up, least, group.input(f"{title} Power", power)),
+        )
+        for title, color, power, least in (
+            ("Diffuse", mixture.diffuse, mixture.diffuse_power, EVEN),
+            ("Sheen", mixture.sheen, mixture.sheen_power, UPRIGHT),
+        )
+    }
+    rough = group.input("Sheen Roughness", mixture.sheen_roughness, low=0.0, high=1.0)
+    given = [
+        _given(group, number, lobe, axes[lobe.along], view)
+        for number, lobe in enumerate(mixture.lobes)
+    ]
     one = _one_lobe()
-    for number, lobe in enumerate(mixture.lobes):
-        parts += _placed(group, one, number, lobe, axes[lobe.along], view)
-    cloth = group.sum(parts)
-    if opacity is not None:
-        gap = group.add("ShaderNodeBsdfTransparent").outputs[0]
-        mix = group.add("ShaderNodeMixShader", Fac=opacity)
-        group.tree.links.new(gap, mix.inputs[1])
-        group.tree.links.new(cloth, mix.inputs[2])
-        cloth = mix.outputs[0]
+
+    def summed(texel: Texel | None) -> Any:
+        parts = []
+        for row, title in ((-2, "Diffuse"), (-1, "Sheen")):
+            color, factor = shades[title]
+            if texel:
+                color = group.vector("MULTIPLY", color, texel.color(texel.threads.factors[row]))
+            color = group.scaled(color, group.math("MULTIPLY", factor, view))
+            if title == "Diffuse":
+                node = group.add("ShaderNodeBsdfDiffuse", Color=color, Roughness=0.0)
+            elif max(mixture.sheen) > FAINT:
+                node = group.add("ShaderNodeBsdfSheen", Color=color, Roughness=rough)
+                node.distribution = "MICROFIBER"
+            else:
+                continue
+            parts.append(node.outputs[0])
+        before = 0
+        for lobe, inputs in zip(mixture.lobes, given, strict=True):
+            parts += _placed(group, one, lobe, inputs, (texel, before) if texel else None)
+            before += 2 if lobe.paired else 1
+        return group.sum(parts)
+
+    if texel:
+        cloth = _near(group, summed, texel, transparent)
+    else:
+        cloth = summed(None)
+        cloth = cloth if opacity is None else group.seen_through(cloth, opacity)
     return group.end(cloth)
+
+
+def _near(group: Group, summed: Any, texel: Texel, transparent: bool) -> Any:
+    """Return the lobes of a texel, mixed by `Afar` with those of the whole cloth."""
+    threads = texel.threads
+    near, far = [summed(texel)], summed(None)
+    if transparent:
+        # The lobes are those of the texel, its gaps included, and are not dimmed once more.
+        gap = group.math("SUBTRACT", 1.0, texel.cover)
+        color = group.joined(gap, gap, gap)
+        near.append(group.add("ShaderNodeBsdfTransparent", Color=color).outputs[0])
+        far = group.seen_through(far, sum(threads.share))
+    afar = [far]
+    if threads.through:
+        color = texel.color(threads.through)
+        near.append(group.add("ShaderNodeBsdfTranslucent", Color=color).outputs[0])
+        whole = threads.whole(threads.through)
+        afar.append(group.add("ShaderNodeBsdfTranslucent", Color=whole).outputs[0])
+    # Cycles does not evaluate what a factor of 0 or 1 leaves out.
+    return group.mixed(
+        group.sum(near), group.sum(afar), group.input("Afar", 0.0, low=0.0, high=1.0)
+    )
 
 
 def _frame(group: Group) -> tuple[Any, Any]:
@@ -118,15 +172,15 @@ def _view(
     return group.math("EXPONENT", total)
 
 
-def _placed(group: Group, one: Any, number: int, lobe: Lobe, axis: Any, view: Any) -> list[Any]:
-    """Add a lobe, or both of a pair, with inputs of the group for its numbers."""
+def _given(group: Group, number: int, lobe: Lobe, axis: Any, view: Any) -> dict[str, Any]:
+    """Return inputs of the group for the numbers of a lobe, or of a pair."""
     title = f"Lobe {number + 1}"
     panel = group.panel(f"{title}: along the {lobe.along}{', a pair' if lobe.paired else ''}")
 
     def given(name: str, value: Any, **more: Any) -> Any:
         return group.input(f"{title} {name}", value, panel=panel, **more)
 
-    inputs = {
+    return {
         "Color": given("Color", lobe.color, color=True),
         "Tilt": given("Tilt", lobe.tilt, low=-1.5, high=1.5),
         "Width Along": given("Width Along", lobe.alpha_along, low=NARROWEST, high=1.0),
@@ -134,13 +188,31 @@ def _placed(group: Group, one: Any, number: int, lobe: Lobe, axis: Any, view: An
         "Facing": given("Facing", lobe.facing), "Crossing": given("Crossing", lobe.crossing),
         "Upright": given("Upright", lobe.upright), "Axis": axis, "View": view,
     }  # fmt: skip
+
+
+def _placed(
+    group: Group, one: Any, lobe: Lobe, inputs: dict[str, Any], turned: tuple[Texel, int] | None
+) -> list[Any]:
+    """Add a lobe, or both of a pair.
+
+    turned : the texel under the point, and how many lobes come before
+    """
     found = []
-    for sign in (1.0, -1.0) if lobe.paired else (1.0,):
+    for back, sign in enumerate((1.0, -1.0) if lobe.paired else (1.0,)):
         node = group.add("ShaderNodeGroup")
         node.node_tree = one
-        for name, value in inputs.items():
-            if name == "Tilt" and sign < 0:
-                value = group.math("MULTIPLY", value, sign)
+        mine = dict(inputs)
+        if sign < 0:
+            mine["Tilt"] = group.math("MULTIPLY", inputs["Tilt"], sign)
+        if turned:
+            texel, at = turned[0], turned[1] + back
+            known = turning(texel.threads, at, lobe.color, AXES.index(lobe.along))
+            factor = texel.color(texel.threads.factors[at])
+            mine["Color"] = group.vector("MULTIPLY", inputs["Color"], factor)
+            mine["Tilt"], mine["Width Along"] = texel.placed(
+                known, mine["Tilt"], inputs["Width Along"], texel.threads.own[at]
+            )
+        for name, value in mine.items():
             group.set(node.inputs[name], value)
         found.append(node.outputs[0])
     return found

@@ -9,6 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from . import threads
+from .threads import Threads
+
 SURFACE = "ND_open_pbr_surface_surfaceshader"
 
 Color = tuple[float, float, float]
@@ -87,6 +90,7 @@ class Look:
     constants : what replaces a map that has no texture
     transparent : whether the cloth has gaps
     mixture : the lobes, if the look has them; weft, warp : directions of threads in texture space
+    threads : the single threads that the lobes show near by, if the look has them
     """
 
     path: str
@@ -99,6 +103,7 @@ class Look:
     mixture: Mixture | None
     weft: tuple[float, float] = (1.0, 0.0)
     warp: tuple[float, float] = (0.0, 1.0)
+    threads: Threads | None = None
 
     @property
     def is_known(self) -> bool:
@@ -154,13 +159,14 @@ class _Material:
         transparent = bool(surface and surface.GetInput(opacity))
         constants = {name: self._fixed(*where) for name, where in CONSTANTS.items()}
         constants["opacity"] = self._fixed("surface", opacity) if transparent else None
+        mixture = self._mixture()
         return Look(
             path=str(prim.GetPath()), name=prim.GetName(),
             fabric=str(self._value("cycles:fabric") or ""),
             values=self._fitted() if self.is_openpbr else {},
             maps={name: file for name in MAPS if (file := self._file(name)) is not None},
             constants={name: value for name, value in constants.items() if value is not None},
-            transparent=transparent, mixture=self._mixture(),
+            transparent=transparent, mixture=mixture, threads=self._threads(mixture),
             weft=_pair(self._value("cycles:weft"), (1.0, 0.0)),
             warp=_pair(self._value("cycles:warp"), (0.0, 1.0)),
         )  # fmt: skip
@@ -195,8 +201,11 @@ class _Material:
         shader = self.shaders.get(name)
         if shader is None:
             return None
-        given = shader.GetInput("file")
-        asset = given.Get()
+        return self._resolved(shader.GetInput("file"))
+
+    def _resolved(self, given: Any) -> str | None:
+        """Return the file that an input names; None if there is no such input or value."""
+        asset = given.Get() if given else None
         if asset is None:
             return None
         if "<UDIM>" in asset.path:
@@ -211,6 +220,16 @@ class _Material:
         found = self.shaders.get(shader)
         given = found.GetInput(name) if found else None
         return _plain(given.Get()) if given and not given.HasConnectedSource() else None
+
+    def _threads(self, mixture: Mixture | None) -> Threads | None:
+        if mixture is None:
+            return None
+        count = sum(2 if one.paired else 1 for one in mixture.lobes)
+        return threads.read(
+            lambda name: _plain(self._value(f"cycles:near:{name}") or ()),
+            lambda name: self._resolved(self._input(f"cycles:near:{name}")),
+            count,
+        )
 
     def _mixture(self) -> Mixture | None:
         if not self._input("cycles:diffuse"):

@@ -76,13 +76,32 @@ class Nodes:
             total = node.outputs[0]
         return total
 
-    def image(self, image: Any) -> Any:
-        """Add an image node; return its colour."""
+    def uv(self) -> Any:
+        """Return the UVs of the look."""
         uv = self.tree.nodes.get("UV") or self.add("ShaderNodeUVMap")
         uv.name, uv.uv_map = "UV", UV
-        node = self.add("ShaderNodeTexImage", Vector=uv.outputs[0])
-        node.image, node.extension = image, "EXTEND"
-        return node.outputs["Color"]
+        return uv.outputs[0]
+
+    def mixed(self, none: Any, whole: Any, factor: Any) -> Any:
+        """Return a closure that goes from `none` to `whole`."""
+        node = self.add("ShaderNodeMixShader", Fac=factor)
+        self.tree.links.new(none, node.inputs[1])
+        self.tree.links.new(whole, node.inputs[2])
+        return node.outputs[0]
+
+    def seen_through(self, cloth: Any, opacity: Any) -> Any:
+        """Return a closure that covers the share `opacity`; the rest is gap."""
+        return self.mixed(self.add("ShaderNodeBsdfTransparent").outputs[0], cloth, opacity)
+
+    def image(self, image: Any) -> Any:
+        """Add an image node; return its colour."""
+        return self.tiled(image, self.uv(), repeats=False)[0]
+
+    def tiled(self, image: Any, where: Any, *, repeats: bool) -> tuple[Any, Any]:
+        """Add an image node that reads at `where`; return its colour and its fourth channel."""
+        node = self.add("ShaderNodeTexImage", Vector=where)
+        node.image, node.extension = image, "REPEAT" if repeats else "EXTEND"
+        return node.outputs["Color"], node.outputs["Alpha"]
 
     def arrange(self) -> None:
         """Lay the nodes out in columns, in the order in which they were added."""

@@ -126,9 +126,13 @@ def change(material, **inputs):
         group.inputs[name].default_value = value
 
 
-def from_above(picture, cells, towards_light, irradiance, size):
-    """Render a sheet of `cells` x `cells` unit squares from above, in a sun without bounces."""
+def from_above(picture, cells, towards_light, irradiance, size, transparent=False):
+    """Render a sheet of `cells` x `cells` unit squares from above, in a sun without bounces.
+
+    transparent : whether the picture is where nothing is behind the sheet's gaps
+    """
     scene = bpy.context.scene
+    scene.render.film_transparent = transparent
     for one in bpy.data.objects:
         one.visible_shadow = False
     sun = bpy.data.lights.new("Sun", "SUN")
@@ -144,6 +148,15 @@ def from_above(picture, cells, towards_light, irradiance, size):
     scene.camera = eye
     scene.cycles.max_bounces = 0
     render(picture, size, 1)
+
+
+def give(name, value):
+    """Set an input of the groups of all materials; the number of those that have it."""
+    nodes = [node for one in bpy.data.materials for node in one.node_tree.nodes]
+    mine = [node.inputs[name] for node in nodes if name in node.inputs]
+    for socket in mine:
+        socket.default_value = value
+    return len(mine)
 
 
 def look(picture, size, spp):

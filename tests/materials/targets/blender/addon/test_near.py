@@ -1,0 +1,158 @@
+"""Lobes near by as nodes: Cycles renders what `near.mixture` says of a texel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from materials.lobes.mixtures import LEVEL, PAIR, mixture
+from materials.near.cloths import mixed, near_mixture, point
+from pxr import Sdf, Usd, UsdShade
+
+from fabricusd.images.files import read_exr_layers
+from fabricusd.materials.lobes.inputs import inputs
+from fabricusd.materials.lobes.mixture import CYCLES, of_covered
+from fabricusd.materials.near.inputs import Laid, near_inputs
+from fabricusd.materials.near.maps import texel_pixels, texels_of, write_levels
+from fabricusd.materials.near.mixture import constants, evaluate
+from fabricusd.materials.networks.graph import Texture
+from fabricusd.materials.targets.blender.addon import looks, threads
+from fabricusd.materials.targets.write_usd import write_material
+from tests.materials.targets.blender.addon.blender import in_blender
+from tests.materials.targets.blender.addon.test_lobes import (
+    CELLS,
+    IRRADIANCE,
+    MATRIX,
+    SIDE,
+    TOWARDS,
+    frames,
+    write_sheet,
+)
+
+FAR = replace(
+    mixture(CYCLES, PAIR, replace(LEVEL, tilt=0.4, alpha_along=0.3)), sheen=(0.0, 0.0, 0.0)
+)
+COVER = 0.9
+
+CASES = {
+    "point of the weft": point(1), "point of the warp": point(6), "mixed": mixed(),
+    "half a gap": mixed(gap=0.5), "repeat": mixed(seed=5), "afar": mixed(seed=6),
+    "half afar": mixed(seed=7),
+}  # fmt: skip
+
+
+AFAR = {"afar": 1.0, "half afar": 0.5}
+"""The group's input of that name; 0 in all other cases."""
+
+
+def laid(folder, name, texel, size=4):
+    """Textures all of whose texels are `texel`, or else, of a repeat, all but one quarter."""
+    textures, layers = {}, {}
+    for key, row in texel_pixels(texel).items():
+        pixels = np.tile(row.reshape(1, 1, -1), (size, size, 1))
+        path = folder / f"{name}.{key}.exr".replace(" ", "_")
+        if name == "repeat":
+            pixels[:, size // 2 :] *= 0.0
+        write_levels(path, pixels)
+        textures[key] = Texture(path)
+        layers[key] = pixels.astype(np.float16).astype(np.float32)[:1, :1]
+    # The squares show UVs from .15 to .85: an eighth of a repeat, before its middle.
+    turned = np.array(((0.5, 0.0, 0.1), (0.0, 0.5, 0.0)))
+    found = Laid(textures=textures)
+    if name == "repeat":
+        found = Laid(textures=textures, threads=turned, repeat=(2, 4))
+    return found, texels_of(layers)
+
+
+def write_near_sheet(path, texel, along):
+    """The sheet of the far mixture, with inputs for one texel; return the texel as it is stored."""
+    near = near_mixture(FAR)
+    write_sheet(path, FAR, along, COVER)
+    textures, stored = laid(path.parent, path.stem, texel)
+    stage = Usd.Stage.Open(str(path))
+    given = inputs(of_covered(FAR, COVER), "cloth", MATRIX) | near_inputs(near, textures, COVER)
+    write_material(stage, Sdf.Path("/Sheet/Cloth"), [], given, path.parent)
+    UsdShade.Material(stage.GetPrimAtPath("/Sheet/Cloth"))
+    stage.GetRootLayer().Save()
+    return near, stored
+
+
+def expected(near, texel, along):
+    """(n, 3) radiance of each square."""
+    sides = np.where(along[:, 2:, 2] < 0, -1.0, 1.0)
+    axes = np.linalg.inv(MATRIX)
+    axes = axes / np.linalg.norm(axes, axis=0)
+    weft, warp = (axes[0, k] * along[:, 0] + axes[1, k] * along[:, 1] for k in (0, 1))
+    frame = np.stack((weft, warp, sides * along[:, 2]), axis=1)
+    return IRRADIANCE * evaluate(near, texel, frame @ TOWARDS, frame @ (0.0, 0.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    """Radiance that Cycles renders, what is expected, and opacity, by the name of the case."""
+    along, found, told = frames(), {}, {}
+    folder = tmp_path_factory.mktemp("near")
+    steps = []
+    for name, texel in CASES.items():
+        told[name] = write_near_sheet(folder / f"{name}.usda", texel, along)
+        steps += [
+            {"do": "clear"}, {"do": "bring", "path": str(folder / f"{name}.usda")},
+            {"do": "give", "name": "Afar", "value": AFAR.get(name, 0.0)},
+            {
+                "do": "from_above", "picture": str(folder / f"{name}.exr"), "cells": CELLS,
+                "towards_light": TOWARDS.tolist(), "irradiance": IRRADIANCE,
+                "size": [CELLS * SIDE, CELLS * SIDE], "transparent": True,
+            },
+        ]  # fmt: skip
+    in_blender(folder, *steps)
+    for name, (near, texel) in told.items():
+        pixels = read_exr_layers(folder / f"{name}.exr")[0]["beauty"][::-1]
+        middle = pixels[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE].reshape(CELLS * CELLS, -1)
+        cells = pixels.reshape(CELLS, SIDE, CELLS, SIDE, -1)[:, 6:11, :, 6:11, 3]
+        away, whole = AFAR.get(name, 0.0), expected(near, near.parts.texel, along)
+        truth = (1.0 - away) * expected(near, texel, along) + away * whole
+        found[name] = middle[:, :3], truth, cells, texel
+    return found
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_cycles_renders_the_lobes_of_the_texel(rendered, name):
+    ours, truth, _, _ = rendered[name]
+    lit = truth.max(axis=1) > 0.01 * truth.max()
+    assert lit.sum() > 15
+    assert np.abs(ours - truth)[~lit].max(initial=0.0) < 2e-3 * truth.max()
+    assert np.abs(ours[lit] / truth[lit] - 1.0).max() < 2e-3
+
+
+@pytest.mark.parametrize("name", ["mixed", "half a gap"])
+def test_gaps_are_transparent_by_the_shares_of_the_texel(rendered, name):
+    """Cycles draws whether a path goes through; of 1600 pixels, a standard deviation is .012."""
+    _, _, alpha, texel = rendered[name]
+    assert alpha.mean() == pytest.approx(float(texel.sets.sum()), abs=0.05)
+
+
+def test_the_add_on_reads_what_was_written(tmp_path):
+    near, _ = write_near_sheet(tmp_path / "repeat.usda", mixed(), frames())
+    (look,) = looks.read(Usd.Stage.Open(str(tmp_path / "repeat.usda")))
+    read = look.threads
+    assert read.share == pytest.approx(near.parts.share, rel=1e-6)
+    assert np.array(read.factors) == pytest.approx(near.factors * COVER, rel=1e-6)
+    assert read.matrix == pytest.approx((0.5, 0.0, 0.0, 0.5, 0.1, 0.0))
+    assert read.repeat == (2.0, 4.0)
+    assert [name for name, _ in read.files] == list(threads.TEXTURES)
+    for number, (lobe, _) in enumerate(near.lobes):
+        mine = threads.turning(read, number, lobe.color, lobe.along)
+        known = constants(near, number)
+        assert mine.mean == pytest.approx(known.mean, abs=1e-6)
+        assert mine.variance == pytest.approx(known.variance, abs=1e-6)
+
+
+@pytest.mark.parametrize("lost", ["own", "factors", "lobes_lean"])
+def test_a_look_that_lacks_a_part_of_the_threads_is_the_cloth_from_afar(tmp_path, lost):
+    write_near_sheet(tmp_path / "repeat.usda", mixed(), frames())
+    stage = Usd.Stage.Open(str(tmp_path / "repeat.usda"))
+    stage.GetPrimAtPath("/Sheet/Cloth").RemoveProperty(f"inputs:cycles:near:{lost}")
+    (look,) = looks.read(stage)
+    assert look.threads is None
+    assert look.mixture is not None
