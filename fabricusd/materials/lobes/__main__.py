@@ -21,7 +21,7 @@ from fabricusd.geometry.nearest import refit as albedo_factor
 from fabricusd.materials.lobes import known
 from fabricusd.materials.lobes.fit import COUNTS, fit, refit
 from fabricusd.materials.lobes.judge import Judge, Judged
-from fabricusd.materials.lobes.mixture import CYCLES, FORMS, MATERIALX, Mixture
+from fabricusd.materials.lobes.mixture import CYCLES, FORMS, Mixture
 from fabricusd.materials.lobes.parameters import at_bounds
 from fabricusd.schema import load
 
@@ -29,6 +29,10 @@ PUBLISHED = (
     "linen_plain", "silk_crepe_de_chine", "polyester_satin_charmeuse",
     "polyester_satin_charmeuse_back", "silk_shot", "velvet", "wool_flannel", "rayon_shantung",
 )  # fmt: skip
+
+
+BRIGHTER = 0.01
+"""How much brighter than the cloth, in the worst view, a mixture may be and still count as not so."""
 
 
 def _arguments() -> argparse.Namespace:
@@ -50,15 +54,28 @@ def _worn(name: str, laws: list[str]) -> Iterator[Fabric]:
             yield scaled(replace(other, surface_law=law), albedo_factor(other, law))
 
 
-def _mixtures(fabric: Fabric, counts: list[int], *, again: bool) -> Iterator[Mixture]:
+def _mixtures(
+    name: str, fabric: Fabric, counts: list[int], judge: Judge, *, again: bool
+) -> Iterator[Mixture]:
+    """The mixtures in every form.
+
+    again : fit them, from the usual starts and from what the table holds under that name; the one
+        that is not brighter than the cloth is kept, and of two the nearer
+    """
     for count in counts:
-        if again:
-            found = fit(fabric, count)
-            yield found
-            yield refit(fabric, known.in_form(found, MATERIALX))
-        else:
+        if not again:
             for form in FORMS:
                 yield known.mixture_of(fabric, count, form)
+            continue
+        first = fit(fabric, count)
+        for form in FORMS:
+            tried = [first if form == CYCLES else refit(fabric, known.in_form(first, form))]
+            tried += [refit(fabric, one) for one in known.held(name, fabric, count, form)]
+            yield min(tried, key=lambda one: _rank(judge(one)))
+
+
+def _rank(judged: Judged) -> tuple[bool, float]:
+    return judged.excess > BRIGHTER, judged.delta_e
 
 
 def _line(name: str, law: str, mixture: Mixture, judged: Judged) -> str:
@@ -82,7 +99,7 @@ def main() -> int:
     for name in given.names or PUBLISHED:
         for fabric in _worn(name, given.law):
             judge, held = Judge(fabric), []
-            for one in _mixtures(fabric, given.lobes, again=given.write):
+            for one in _mixtures(name, fabric, given.lobes, judge, again=given.write):
                 held.append(one)
                 print(_line(name, fabric.surface_law, one, judge(one)), flush=True)
                 for told in at_bounds(one) if given.bounds else ():

@@ -47,9 +47,9 @@ def mixture_of(
     """
     if max_error is None:
         row = find(fabric)
-        for held in row["mixtures"] if row else ():
-            if held["form"] == form and _count(held) == count:
-                return from_dict(held)
+        for one in row["mixtures"] if row else ():
+            if one["form"] == form and _count(one) == count:
+                return from_dict(one)
 
     def made() -> NDArray[np.uint8]:
         if form != CYCLES:
@@ -73,6 +73,13 @@ def find(fabric: Fabric) -> Mapping[str, Any] | None:
         if np.abs(mine - theirs).max() <= ALIKE * max(float(np.abs(theirs).mean()), 1e-9):
             return row
     return None
+
+
+def held(name: str, fabric: Fabric, count: int, form: str) -> list[Mixture]:
+    """The mixtures of the table for a preset's name and law, be it still the same cloth or not."""
+    rows = [one for one in _table() if (one["name"], one["law"]) == (name, fabric.surface_law)]
+    found = [from_dict(one) for row in rows for one in row["mixtures"] if one["form"] == form]
+    return [one for one in found if one.count == count]
 
 
 def probes(fabric: Fabric) -> Floats:
