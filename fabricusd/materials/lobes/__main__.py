@@ -32,7 +32,7 @@ PUBLISHED = (
 
 
 BRIGHTER = 0.01
-"""How much brighter than the cloth, in the worst view, a mixture may be and still count as not so."""
+"""Excess in the worst view up to which a mixture counts as no brighter than the cloth."""
 
 
 def _arguments() -> argparse.Namespace:
