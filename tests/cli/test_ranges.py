@@ -51,6 +51,10 @@ OPTIONS = {
     ("sides", "--paths"): ("0", "63", "1048577", "1.5"),
     ("material", "--lobes"): ("0", "-1", "7", "1.5"),
     ("material", "--max-error"): ("0", "-1", "1001"),
+    ("measure", "--seed"): (str(2**63), "1.5"),
+    ("measure", "--workers"): ("0", "-1", "1025", "100000"),
+    ("fit", "--seed"): (str(2**63), "1.5"),
+    ("fit", "--workers"): ("0", "-1", "1025", "100000"),
     ("preview", "--size"): ("0", "15", "4097", "1.5"),
     ("preview", "--samples"): ("0", "-1", "1025", "1.5"),
     ("preview", "--exposure"): ("100000", "-101"),
@@ -65,6 +69,8 @@ ARGUMENTS = {
     "sides": ["linen_plain", "-o", "out.usda"],
     "material": ["baked", "--surface", "lobes"],
     "preview": ["linen_plain", "-o", "out.png"],
+    "measure": ["shoot", "-o", "out.usda"],
+    "fit": ["lobes.csv", "-o", "out.usda"],
 }
 
 TEXTS = {

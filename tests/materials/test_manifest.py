@@ -189,12 +189,12 @@ def test_links_out_of_the_folder_are_not_followed(folder, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["look.json", "look.mtlx", "look_maps", "look_maps/Body.normal.1001.png"]
+    "name", ["look.json", "look.mtlx", "look_maps", "look_maps/Body.normal.*png"]
 )
 def test_a_look_is_not_written_through_a_link_out_of_the_folder(folder, name):
     write_materials(folder, None, PLAIN)
     outside = folder.parent / "outside"
-    place = folder / name
+    (place,) = folder.glob(name)
     if place.is_dir():
         shutil.rmtree(place)
         outside.mkdir()
