@@ -43,7 +43,8 @@ class MapSet:
     prims : paths in the scene that was baked
     own_uv : False if the textures do not use the scene's own UVs
     udim : whether the textures are UDIM tiles
-    spanned : texels of the bake per side of a texel of the maps that shape reflections
+    spanned : "lay" and the number of the lay whose mean the maps that shape reflections hold; ""
+        where they are those of the bake
     """
 
     folder: Path
@@ -57,7 +58,7 @@ class MapSet:
     udim: bool
     error: dict[str, float]
     fingerprint: str
-    spanned: int = 1
+    spanned: str = ""
 
     def pattern(self, texture: str) -> Path | None:
         """Return a map's file, with `<UDIM>` for the tile's number; None if the map is missing."""

@@ -294,7 +294,7 @@ def maps_folder(path: Path) -> Path:
 def _coded_normals(maps: MapSet, path: Path, made: Written) -> Path:
     """Write normals as 16-bit PNG files, mapped to [0, 1] as readers of normal maps expect."""
     folder = maps_folder(path)
-    name = "normal" if maps.spanned == 1 else f"normal.mean{maps.spanned}"
+    name = f"normal.{maps.spanned}" if maps.spanned else "normal"
     for number, source in maps.textures["normal"].items():
         target = folder / f"{maps.name}.{name}.{number}.png"
         if target in made.files:
@@ -329,14 +329,13 @@ def _garment_looks(
     do not, the maps that shape reflections are those of `spanning`.
     """
     looks, seen, factors = [], [], {}
-    means: dict[int, MapSet] = {0: maps}
     for number, lay in enumerate(maps.lays):
-        level = level_of(maps, lay)
-        if level not in means:
-            means[level], files = write_spanning_maps(maps, level, maps_folder(path))
+        shown = maps
+        if level_of(maps, lay) > 0:
+            shown, files = write_spanning_maps(maps, number, maps_folder(path))
             made.files += files
-        seen.append(means[level])
-        of_lay, of_threads = _looks(means[level], number, settings, made, progress)
+        seen.append(shown)
+        of_lay, of_threads = _looks(shown, number, settings, made, progress)
         looks.append(of_lay)
         if of_threads:
             factors[number] = of_threads

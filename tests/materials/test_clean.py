@@ -181,9 +181,8 @@ def test_a_package_of_the_web_holds_pictures_of_eight_bits(written, tmp_path):
     for name in pictures:
         picture = tmp_path / Path(name).name
         picture.write_bytes(package.GetFile(name))
-        # Maps that shape reflections span several texels of the bake, whose number is in the name.
-        spanned = re.search(r"\.mean(\d+)\.", Path(name).name)
-        side = 64 // int(spanned[1]) if spanned else 64
+        # Maps that shape reflections are the mean of a lay.
+        side = 1 if re.search(r"\.lay\d+\.", Path(name).name) else 64
         assert shape_of(picture)[:2] == (side, side)
         assert picture.read_bytes()[24] == 8  # bits a channel, by the PNG specification
 

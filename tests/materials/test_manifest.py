@@ -194,7 +194,7 @@ def test_links_out_of_the_folder_are_not_followed(folder, name):
 def test_a_look_is_not_written_through_a_link_out_of_the_folder(folder, name):
     write_materials(folder, None, PLAIN)
     outside = folder.parent / "outside"
-    (place,) = folder.glob(name)
+    place = min(folder.glob(name))
     if place.is_dir():
         shutil.rmtree(place)
         outside.mkdir()

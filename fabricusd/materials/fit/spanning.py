@@ -3,7 +3,8 @@
 Between the texel of a warp and that of a weft, every reader interpolates: the mean of the two
 directions lies at 45 degrees, along which nothing in the cloth lies, and cloth near one texel per
 thread shows chequers. The bake's own mip levels are means of the threads' moments, not of their
-directions. There, these maps come from the mip level whose texels span several threads.
+directions. There, these maps are the mean of the mip level whose texels span several threads: one
+texel, since in a level of them the smoother direction jumps with the unevenness of balanced cloth.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ RESOLVED = 4.0
 SPANNED = 4.0
 """Threads that a texel of these maps spans at least, where threads are not resolved."""
 
-LEVELS = 32
-"""More mip levels than a texture has."""
+FLAT = {"tangent": (1.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
+"""What stands for a lay without texels."""
 
 CHANNELS = {
     "roughness_along": ("Y",),
@@ -55,52 +56,84 @@ def lobe_level(matrix: Floats, width: int) -> int:
 
 
 def level_of(maps: MapSet, lay: BakedLay) -> int:
-    """The mip level that the look of a lay takes these maps from.
+    """The mip level whose mean the look of a lay takes these maps from.
 
-    It is 0 where each thread is fitted by itself, which starts at fewer texels per thread.
+    It is 0, for the bake's own maps, where one of them is missing, and where each thread is fitted
+    by itself, which starts at fewer texels per thread.
     """
-    files = maps.textures.get("roughness_along", {})
-    if not files or resolved(maps, lay):
+    if any(not maps.textures.get(name) for name in CHANNELS) or resolved(maps, lay):
         return 0
-    return lobe_level(lay.matrix, shape_of(next(iter(files.values())))[1])
+    return lobe_level(lay.matrix, _width(maps))
 
 
-def write_spanning_maps(maps: MapSet, level: int, folder: Path) -> tuple[MapSet, list[Path]]:
-    """Write the maps of CHANNELS from mip level `level` on to `folder`.
+def write_spanning_maps(maps: MapSet, number: int, folder: Path) -> tuple[MapSet, list[Path]]:
+    """Write the maps of CHANNELS as the mean of the lay `number` to `folder`, of one texel each.
+
+    A cloth lies in one direction of its UVs, so from afar these maps are constant. The mean is that
+    of covariances of slopes: of `alpha^2` along and across the tangent, taken as a tensor.
 
     Returns the new map set, and the files.
     """
+    found = _mean(maps, number)
     textures = {name: dict(files) for name, files in maps.textures.items()}
     made = []
+    tag = f"lay{number}"
     for name, channels in CHANNELS.items():
-        for tile, source in maps.textures.get(name, {}).items():
-            number = f".{tile}" if maps.udim else ""
-            target = folder / f"{maps.name}.{name}.mean{2**level}{number}.exr"
-            levels = _levels(source, level, len(channels))
-            bands = [partial(_whole, one) for one in levels]
+        pixel = np.array(found[name], np.float16).reshape(1, 1, len(channels))
+        for tile in maps.textures.get(name, {}):
+            udim = f".{tile}" if maps.udim else ""
+            target = folder / f"{maps.name}.{name}.{tag}{udim}.exr"
             said = {"oiio:ColorSpace": "Raw"}
-            write_mip_exr(target, bands, len(levels[0]), channels, np.float16, said)
+            write_mip_exr(target, [partial(_whole, pixel)], 1, channels, np.float16, said)
             textures[name][tile] = target
             made.append(target)
-    return replace(maps, textures=textures, spanned=2**level), made
+    return replace(maps, textures=textures, spanned=tag), made
 
 
-def _levels(source: Path, first: int, channels: int) -> list[NDArray[np.float16]]:
-    """The mip levels of a texture from `first` on; its last one if it has fewer."""
-    found: list[NDArray[np.float16]] = []
-    for level in range(LEVELS):
+def _mean(maps: MapSet, number: int) -> dict[str, tuple[float, ...]]:
+    """The mean of each map of CHANNELS over the texels of a lay, on all tiles."""
+    level = lobe_level(maps.lays[number].matrix, _width(maps))
+    tensor, normal = np.zeros((2, 2)), np.zeros(3)
+    for tile in maps.textures["roughness_along"]:
+        read = {name: _pixels(maps.textures[name][tile], level) for name in CHANNELS}
+        mine = np.linalg.norm(read["normal"][..., :3], axis=-1) > 0.5
+        if "lay" in maps.textures:
+            lays = read_mip_level(maps.textures["lay"][tile])[..., 0]
+            middle = lays.shape[0] // mine.shape[0] // 2
+            step = lays.shape[0] // mine.shape[0]
+            mine &= lays[middle::step, middle::step] == number
+        along = read["tangent"][mine][:, :2]
+        along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+        across = np.stack((-along[:, 1], along[:, 0]), axis=1)
+        for axis, name in ((along, "roughness_along"), (across, "roughness_across")):
+            weight = read[name][mine][:, 0].astype(np.float64) ** 4
+            tensor += np.einsum("n,na,nb->ab", weight, axis, axis)
+        normal += read["normal"][mine][:, :3].sum(axis=0, dtype=np.float64)
+    length = float(np.linalg.norm(normal))
+    if length == 0.0:
+        return {name: (0.5,) if len(c) == 1 else FLAT[name] for name, c in CHANNELS.items()}
+    # The normals' sum tells the number of texels but for their tilt, which is small at this level.
+    values, axes = np.linalg.eigh(tensor / length)
+    smooth, rough = np.maximum(values, 0.0) ** 0.25
+    return {
+        "roughness_along": (float(smooth),), "roughness_across": (float(rough),),
+        "tangent": (float(axes[0, 0]), float(axes[1, 0]), 0.0),
+        "normal": tuple(float(x) for x in normal / length),
+    }  # fmt: skip
+
+
+def _width(maps: MapSet) -> int:
+    return shape_of(next(iter(maps.textures["roughness_along"].values())))[1]
+
+
+def _pixels(file: Path, level: int) -> Floats:
+    """(h, w, c) of a mip level, or of the coarsest above it that the file has."""
+    for one in range(level, 0, -1):
         try:
-            pixels = read_mip_level(source, level)
+            return read_mip_level(file, one)
         except FabricError:
-            if level == 0:
-                raise
-            break
-        if level <= first:
-            found = []
-        found.append(pixels[..., :channels].astype(np.float16))
-        if len(pixels) == 1:
-            break
-    return found
+            continue
+    return read_mip_level(file)
 
 
 def _whole(level: NDArray[Any]) -> Iterator[NDArray[Any]]:
