@@ -136,12 +136,12 @@ def test_what_cannot_be_imported_is_said_in_one_line(folder, tmp_path):
 def test_a_lost_texture_is_named_and_a_constant_replaces_it(folder, tmp_path):
     copy = tmp_path / "look"
     shutil.copytree(folder, copy)
-    next((copy / "plain" / "baked").glob("*.tangent.exr")).unlink()
+    (copy / "openpbr_maps" / "Body.tangent.lay0.exr").unlink()
     path = str(copy / "openpbr.usda")
     told = in_blender(tmp_path, {"do": "bring", "path": path}, {"do": "groups"}, {"do": "said"})
     nodes, _ = told[1]["material Body_0"]
     assert not any(p and "tangent" in p[0] for _, _, _, p, _ in nodes)
-    assert "Left out textures that cannot be read (Body.tangent.exr)" in told[2]
+    assert "Left out textures that cannot be read (Body.tangent.lay0.exr)" in told[2]
 
 
 def test_a_surface_that_blender_has_not_stays_as_blender_imports_it(folder, tmp_path):
