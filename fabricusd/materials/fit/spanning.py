@@ -95,7 +95,7 @@ def _mean(maps: MapSet, number: int) -> dict[str, tuple[float, ...]]:
     level = lobe_level(maps.lays[number].matrix, _width(maps))
     tensor, normal = np.zeros((2, 2)), np.zeros(3)
     for tile in maps.textures["roughness_along"]:
-        read = {name: _pixels(maps.textures[name][tile], level) for name in CHANNELS}
+        read = {name: level_pixels(maps.textures[name][tile], level) for name in CHANNELS}
         mine = np.linalg.norm(read["normal"][..., :3], axis=-1) > 0.5
         if "lay" in maps.textures:
             lays = read_mip_level(maps.textures["lay"][tile])[..., 0]
@@ -126,7 +126,7 @@ def _width(maps: MapSet) -> int:
     return shape_of(next(iter(maps.textures["roughness_along"].values())))[1]
 
 
-def _pixels(file: Path, level: int) -> Floats:
+def level_pixels(file: Path, level: int) -> Floats:
     """(h, w, c) of a mip level, or of the coarsest above it that the file has."""
     for one in range(level, 0, -1):
         try:

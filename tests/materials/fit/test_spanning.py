@@ -79,7 +79,7 @@ def test_a_lay_in_two_directions_of_texels_keeps_its_axes(tmp_path, monkeypatch)
         textures={name: {1001: name} for name in CHANNELS},
         lays=[SimpleNamespace(matrix=np.eye(2) * 8)],
     )
-    monkeypatch.setattr(spanning, "_pixels", lambda file, level: given[file])
+    monkeypatch.setattr(spanning, "level_pixels", lambda file, level: given[file])
     monkeypatch.setattr(spanning, "_width", lambda maps: 4)
     found = spanning._mean(maps, 0)
     x = 0.5 * (0.4**4 + 0.7**4)

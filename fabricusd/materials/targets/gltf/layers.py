@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.errors import FabricError
-from fabricusd.images.files import read_mip_level
+from fabricusd.materials.fit.spanning import level_pixels
 from fabricusd.materials.networks.graph import Texture, Value
 from fabricusd.materials.networks.look import Look
 from fabricusd.materials.networks.surfaces import Inputs
@@ -61,7 +60,7 @@ def layers_of(
         if isinstance(source, Value):
             return np.atleast_1d(np.asarray(source.value, np.float32))[None, None]
         assert isinstance(source, Texture)
-        return _pixels(of_tile(source, tile), level)
+        return level_pixels(of_tile(source, tile), level)
 
     smooth, rough = alphas(
         read("roughness_along", level)[..., :1], read("roughness_across", level)[..., :1], look
@@ -77,7 +76,9 @@ def layers_of(
         roughness=np.sqrt(smooth),
         direction=rougher(read("tangent", level)),
         strength=strength(smooth, rough),
-        normal=_coded(_pixels(normals, level)) if coded and normals else read("normal")[..., :3],
+        normal=_coded(level_pixels(normals, level))
+        if coded and normals
+        else read("normal")[..., :3],
         tint=read("specular_tint")[..., :3],
         through=through,
     )
@@ -91,16 +92,6 @@ def of_tile(source: Texture, tile: int) -> Path:
 def _scaled(color: Floats, factors: tuple[float, float, float]) -> Floats:
     # Textures may have 16 million texels: keep them in single precision.
     return np.asarray(np.clip(color[..., :3] * np.array(factors, np.float32), 0.0, 1.0))
-
-
-def _pixels(file: Path, level: int) -> Floats:
-    """(h, w, c) of a mip level, or of the coarsest above it that the file has."""
-    for one in range(level, 0, -1):
-        try:
-            return read_mip_level(file, one)
-        except FabricError:
-            continue
-    return read_mip_level(file)
 
 
 def _coded(normals: Floats) -> Floats:
