@@ -1787,3 +1787,252 @@ T_fff k_fuzz_over(int row, float ix, float iy, float iz, float ox, float oy, flo
   b = k_channel(2, way, row, m, x, n, y, met_i, met_o, above, k, a, e, b);
   return T_fff(r, g, b);
 }
+
+float k_across_deviation(float gamma_surface) {
+  return max(gamma_surface, 0.1);
+}
+
+float k_erf32(float x) {
+  float a;
+  float z;
+  float p;
+  float near_;
+  float b;
+  float far_;
+  a = abs(x);
+  z = (a * a);
+  p = (-0.000802084128 + (z * 7.88911952e-05));
+  p = (-0.0268544446 + (z * (0.00518953534 + (z * p))));
+  p = (-0.376126271 + (z * (0.112836002 + (z * p))));
+  near_ = (a * (1.12837917 + (z * p)));
+  b = min(a, 4.0);
+  p = (-0.000441336377 + (b * 2.16868499e-05));
+  p = (-0.0252082567 + (b * (0.00420456187 + (b * p))));
+  p = (0.633219893 + (b * (0.108418577 + (b * p))));
+  p = (-0.000188040226 + (b * (1.12957842 + (b * p))));
+  far_ = (1.0 - k_exp32((-p)));
+  return (x < 0.0 ? -abs(((a < 1.0) ? near_ : far_)) : abs(((a < 1.0) ? near_ : far_)));
+}
+
+T_ff k_across(int row, float w, float sin_phi_i, float cos_phi_i, float sin_phi_o, float cos_phi_o) {
+  float y;
+  float x;
+  float edge;
+  float h;
+  float beta;
+  float scale;
+  float ends;
+  float z;
+  float d;
+  y = (sin_phi_i + sin_phi_o);
+  x = (cos_phi_i + cos_phi_o);
+  edge = ((y > 0.0) ? 1.0 : ((y < 0.0) ? -1.0 : 0.0));
+  h = ((x < 0.0) ? edge : (y / max(sqrt(((x * x) + (y * y))), 1e-06)));
+  beta = k_across_deviation(F(published_threads_at + (row) * published_threads_n1 + 6));
+  scale = (sqrt(0.5) / beta);
+  ends = (k_erf32(((1.0 - h) * scale)) + k_erf32(((1.0 + h) * scale)));
+  z = ((beta * (sqrt(6.283185307179586) / 4.0)) * ends);
+  d = ((w - h) * scale);
+  return T_ff((k_exp32(((-d) * d)) / z), (1.0 + ((0.5 * w) * (sin_phi_i + sin_phi_o))));
+}
+
+T_ff k_across_at(int row, float w, float b_i, float n_i, float b_o, float n_o) {
+  T_ff t1;
+  float sin_i;
+  float cos_i;
+  T_ff t2;
+  float sin_o;
+  float cos_o;
+  t1 = k_unit_azimuth(b_i, n_i, k_cos_inclination(b_i, n_i));
+  sin_i = t1.m0_;
+  cos_i = t1.m1_;
+  t2 = k_unit_azimuth(b_o, n_o, k_cos_inclination(b_o, n_o));
+  sin_o = t2.m0_;
+  cos_o = t2.m1_;
+  return k_across(row, w, sin_i, cos_i, sin_o, cos_o);
+}
+
+T_ff k_segment_at_1(int model, int row, float c, float s, float w, SetPair pair) {
+  T_ff t1;
+  float surface;
+  float volume;
+  float n_i;
+  float n_o;
+  T_ff t2;
+  float on_surface;
+  float on_volume;
+  t1 = k_segment(model, row, c, s, pair);
+  surface = t1.m0_;
+  volume = t1.m1_;
+  n_i = ((s * pair.along_i_) + (c * pair.up_i_));
+  n_o = ((s * pair.along_o_) + (c * pair.up_o_));
+  t2 = k_across_at(row, w, pair.across_i_, n_i, pair.across_o_, n_o);
+  on_surface = t2.m0_;
+  on_volume = t2.m1_;
+  return T_ff((surface * on_surface), (volume * on_volume));
+}
+
+T_fff k_point_value_1(Place place, float ix, float iy, float iz, float ox, float oy, float oz) {
+  int row;
+  float q;
+  SetPair pair;
+  float c;
+  float s;
+  float p;
+  T_ff t1;
+  float surface;
+  float volume;
+  row = place.thread_;
+  if (((iz <= 0.0) || (oz <= 0.0) || (F(published_threads_at + (row) * published_threads_n1 + 13) != 0.0))) {
+    return T_fff(0.0, 0.0, 0.0);
+  }
+  q = k_normalization(ix, iy, iz, ox, oy, oz);
+  if ((q <= 1e-12)) {
+    return T_fff(0.0, 0.0, 0.0);
+  }
+  pair = k_along_set(place.thread_set_, ix, iy, iz, ox, oy, oz);
+  c = k_cos32(place.psi0_);
+  s = k_sin32(place.psi0_);
+  p = k_law_weight(c, s, pair);
+  t1 = k_segment_at_1(int(F(published_threads_at + (row) * published_threads_n1 + 3)), row, c, s, place.w_, pair);
+  surface = t1.m0_;
+  volume = t1.m1_;
+  p = (p / q);
+  surface = (surface * p);
+  volume = (volume * (p * place.shade_));
+  return T_fff((surface + (volume * F(published_threads_at + (row) * published_threads_n1 + 0))), (surface + (volume * F(published_threads_at + (row) * published_threads_n1 + 1))), (surface + (volume * F(published_threads_at + (row) * published_threads_n1 + 2))));
+}
+
+T_ff k_across_1(int row, float w, float sin_phi_i, float cos_phi_i, float sin_phi_o, float cos_phi_o) {
+  float y;
+  float x;
+  float edge;
+  float h;
+  float beta;
+  float scale;
+  float ends;
+  float z;
+  float d;
+  y = (sin_phi_i + sin_phi_o);
+  x = (cos_phi_i + cos_phi_o);
+  edge = ((y > 0.0) ? 1.0 : ((y < 0.0) ? -1.0 : 0.0));
+  h = ((x < 0.0) ? edge : (y / max(sqrt(((x * x) + (y * y))), 1e-06)));
+  beta = k_across_deviation(F(conserving_threads_at + (row) * conserving_threads_n1 + 6));
+  scale = (sqrt(0.5) / beta);
+  ends = (k_erf32(((1.0 - h) * scale)) + k_erf32(((1.0 + h) * scale)));
+  z = ((beta * (sqrt(6.283185307179586) / 4.0)) * ends);
+  d = ((w - h) * scale);
+  return T_ff((k_exp32(((-d) * d)) / z), (1.0 + ((0.5 * w) * (sin_phi_i + sin_phi_o))));
+}
+
+T_ff k_across_at_1(int row, float w, float b_i, float n_i, float b_o, float n_o) {
+  T_ff t1;
+  float sin_i;
+  float cos_i;
+  T_ff t2;
+  float sin_o;
+  float cos_o;
+  t1 = k_unit_azimuth(b_i, n_i, k_cos_inclination(b_i, n_i));
+  sin_i = t1.m0_;
+  cos_i = t1.m1_;
+  t2 = k_unit_azimuth(b_o, n_o, k_cos_inclination(b_o, n_o));
+  sin_o = t2.m0_;
+  cos_o = t2.m1_;
+  return k_across_1(row, w, sin_i, cos_i, sin_o, cos_o);
+}
+
+T_fff k_across_value(Place place, float ix, float iy, float iz, float ox, float oy, float oz) {
+  int row;
+  float scale;
+  float angle;
+  float c;
+  float s;
+  T_ff t1;
+  float surface;
+  float volume;
+  T_fff t2;
+  float b_i;
+  float n_i;
+  T_fff t3;
+  float b_o;
+  float n_o;
+  T_ff t4;
+  float across_surface;
+  float across_volume;
+  T_fff t5;
+  float on_surface;
+  float on_volume;
+  float lost;
+  int side;
+  row = place.thread_;
+  scale = ((k_visible(ix, iy, iz) * k_visible(ox, oy, oz)) * abs(iz));
+  if (((conserving_opaque != 0) && ((iz > 0.0) != (oz > 0.0)))) {
+    scale = 0.0;
+  }
+  angle = min(max(place.psi0_, -1.4835298641951802), 1.4835298641951802);
+  c = k_cos32(angle);
+  s = k_sin32(angle);
+  t1 = k_facet_terms(row, place.thread_set_, c, s, ix, iy, iz, ox, oy, oz);
+  surface = t1.m0_;
+  volume = t1.m1_;
+  t2 = k_to_thread(place.thread_set_, c, s, ix, iy, iz);
+  b_i = t2.m1_;
+  n_i = t2.m2_;
+  t3 = k_to_thread(place.thread_set_, c, s, ox, oy, oz);
+  b_o = t3.m1_;
+  n_o = t3.m2_;
+  t4 = k_across_at_1(row, place.w_, b_i, n_i, b_o, n_o);
+  across_surface = t4.m0_;
+  across_volume = t4.m1_;
+  t5 = k_between_sides(ix, iy, iz, ox, oy, oz);
+  on_surface = t5.m0_;
+  on_volume = t5.m1_;
+  lost = t5.m2_;
+  scale = (scale / c);
+  surface = (surface * ((across_surface * on_surface) * scale));
+  volume = (volume * (((across_volume * on_volume) * scale) * place.shade_));
+  lost = (lost / conserving_covered);
+  side = (((iz > 0.0) == (oz > 0.0)) ? 0 : 1);
+  return T_fff(((surface + (volume * F(conserving_threads_at + (row) * conserving_threads_n1 + 0))) + (lost * F(conserving_strength_at + (side) * conserving_strength_n1 + 0))), ((surface + (volume * F(conserving_threads_at + (row) * conserving_threads_n1 + 1))) + (lost * F(conserving_strength_at + (side) * conserving_strength_n1 + 1))), ((surface + (volume * F(conserving_threads_at + (row) * conserving_threads_n1 + 2))) + (lost * F(conserving_strength_at + (side) * conserving_strength_n1 + 2))));
+}
+
+T_fff k_conserving_level_value_1(Place place, float ix, float iy, float iz, float ox, float oy, float oz) {
+  float in_gaps;
+  float share;
+  T_fff t1;
+  float red;
+  float green;
+  float blue;
+  int row;
+  T_fff t2;
+  T_fff t3;
+  in_gaps = 0.0;
+  if ((conserving_covered < 1.0)) {
+    in_gaps = min(k_share_of_gaps(ix, iy, iz), k_share_of_gaps(ox, oy, oz));
+  }
+  if ((place.thread_set_ > 1)) {
+    if ((in_gaps == 0.0)) {
+      return T_fff(0.0, 0.0, 0.0);
+    }
+    share = (in_gaps / (1.0 - conserving_covered));
+    t1 = k_conserving_value(ix, iy, iz, ox, oy, oz);
+    red = t1.m0_;
+    green = t1.m1_;
+    blue = t1.m2_;
+    return T_fff((share * red), (share * green), (share * blue));
+  }
+  share = (1.0 - in_gaps);
+  row = place.thread_;
+  if (((F(conserving_threads_at + (row) * conserving_threads_n1 + 13) == 1.0))) {
+    t2 = k_across_value(place, ix, iy, iz, ox, oy, oz);
+    red = t2.m0_;
+    green = t2.m1_;
+    blue = t2.m2_;
+  } else {
+    t3 = k_conserving_point_value(place, ix, iy, iz, ox, oy, oz);
+    red = t3.m0_;
+    green = t3.m1_;
+    blue = t3.m2_;
+  }
+  return T_fff((share * red), (share * green), (share * blue));
+}

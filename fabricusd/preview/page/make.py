@@ -40,8 +40,8 @@ MOST_BYTES = 64 << 20
 LEVEL = "auto"
 
 SCRIPTS = (
-    "viewer.js", "state.js", "inputs.js", "camera.js", "cloth.js", "weave.js", "compare.js",
-    "server.js", "main.js",
+    "viewer.js", "server.js", "state.js", "inputs.js", "camera.js", "cloth.js", "weave.js",
+    "compare.js", "files.js", "main.js",
 )  # fmt: skip
 """Parts of the page's script, one after the other: each may use those before it."""
 
@@ -85,9 +85,10 @@ def page_data(fabric: Fabric, lights: Lights, mesh: Shape | None) -> dict[str, A
     """Everything that the page's script begins with."""
     shapes = {} if mesh is None else {"scene": mesh}
     shapes.update({name: SHAPES[name](fabric) for name in ON_PAGE})
+    back = side_data(back_of(fabric), back=True, live=fabric.back is None)
     return {
         "name": fabric.name, "level": LEVEL, "shaders": shaders(), "ground": BACKGROUND,
-        "sides": {"front": side_data(fabric), "back": side_data(back_of(fabric), back=True)},
+        "sides": {"front": side_data(fabric), "back": back},
         "meshes": {name: mesh_arrays(shape) for name, shape in shapes.items()},
         "light": {
             "azimuth": math.degrees(lights.azimuth), "elevation": math.degrees(lights.elevation),
@@ -97,15 +98,18 @@ def page_data(fabric: Fabric, lights: Lights, mesh: Shape | None) -> dict[str, A
     }  # fmt: skip
 
 
-def side_data(fabric: Fabric, *, back: bool = False) -> dict[str, Any]:
-    """One side of a cloth as the page draws it; a back has no controls."""
+def side_data(fabric: Fabric, *, back: bool = False, live: bool = True) -> dict[str, Any]:
+    """One side of a cloth as the page draws it; a back has no controls.
+
+    live : whether the threads are those of the front, so that their numbers can be written here too
+    """
     tables, rows = fabric_tables(fabric)
     even = " Threads are drawn even." if fabric.is_uneven else ""
     covered = coverage(fabric)
     ends, picks = fabric.weave.cells.shape
     return {
         "about": f"{words(fabric)}.{even}", "fabric": tables, "rows": rows,
-        "live": is_live(fabric), "threads": [] if back else thread_controls(fabric),
+        "live": live and is_live(fabric), "threads": [] if back else thread_controls(fabric),
         "weave": (
             "" if max(ends, picks) > MOST_DRAWN else "/".join(rows_of(fabric.weave.cells))
         ),

@@ -17,7 +17,7 @@ export class Viewer {
     if (!gl.getExtension('EXT_color_buffer_float')) throw Error('this graphics card cannot sum float pictures');
     this.programs = new Map();
     this.blank = gl.createVertexArray();
-    this.level = 0; this.frames = 0; this.view = 0; this.exposure = 0;
+    this.level = 0; this.frames = 0; this.view = 0; this.exposure = 0; this.ground = 0;
     this.lay = [1, 0];
     this.light = { azimuth: 0, elevation: 0 };
     this.shadowTargets = [this.depthTarget(), this.depthTarget()];
@@ -266,11 +266,55 @@ export class Viewer {
     gl.useProgram(program);
     gl.bindVertexArray(this.blank);
     this.bind(program, 'total', 5, this.sum.texture);
+    this.tone(program);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  tone(program) {
+    const gl = this.gl;
     gl.uniform1f(program.at('scale'), 1 / this.frames);
     gl.uniform1f(program.at('exposure'), this.exposure);
-    gl.uniform1f(program.at('ground'), this.fabric.ground);
+    gl.uniform1f(program.at('ground'), this.ground);
     gl.uniform1i(program.at('view'), this.view);
+  }
+
+  // A picture by the path tracer, (n n 4) floats with rows from the top, to compare with.
+  setTraced(pixels, size) {
+    const gl = this.gl;
+    if (this.traced) gl.deleteTexture(this.traced.texture);
+    this.traced = { size, texture: this.newTexture() };
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, size, size, 0, gl.RGBA, gl.FLOAT, pixels);
+  }
+
+  // Draw a wipe (mode 0) or the differences (1); split : share of the width that the page has.
+  compare(mode, split, target = null) {
+    const gl = this.gl, program = this.program(this.shaders.screen, this.shaders.compare), { width, height } = this.canvas;
+    const side = Math.min(width, height), { size, texture } = this.traced;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
+    gl.viewport(0, 0, target ? size : width, target ? size : height);
+    gl.useProgram(program);
+    gl.bindVertexArray(this.blank);
+    this.bind(program, 'total', 5, this.sum.texture);
+    this.bind(program, 'traced', 6, texture);
+    this.tone(program);
+    gl.uniform1f(program.at('split'), split * width);
+    gl.uniform4f(program.at('square'), (width - side) / 2, (height - side) / 2, side, size);
+    gl.uniform1i(program.at('mode'), mode);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  // Delta E 2000 and the lesser cover of each pixel of the picture, by fours.
+  differences() {
+    const gl = this.gl, { size } = this.traced, frame = gl.createFramebuffer(), texture = this.newTexture();
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, size, size, 0, gl.RGBA, gl.FLOAT, null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+    this.compare(2, 0, frame);
+    const found = new Float32Array(4 * size * size);
+    gl.readPixels(0, 0, size, size, gl.RGBA, gl.FLOAT, found);
+    gl.deleteTexture(texture);
+    gl.deleteFramebuffer(frame);
+    return found;
   }
 
   // Mean radiance and cover of all frames, rows from the top.

@@ -9,6 +9,7 @@ from typing import Any
 
 from fabricusd.errors import FabricError, one_line
 
+
 def parsed(body: bytes, allowed: Mapping[str, type]) -> dict[str, Any]:
     """The object in a request's body. allowed : name -> kind of its value; any may be left out.
 

@@ -12,6 +12,7 @@ import hmac
 import json
 import secrets
 import socket
+import socketserver
 import sys
 import threading
 from http import HTTPStatus
@@ -21,8 +22,12 @@ from typing import Any
 from fabricusd.errors import FabricError, debugging, described, one_line
 from fabricusd.preview.page.make import POLICY, script, shell, style
 from fabricusd.preview.serve.session import Session
+from fabricusd.ranges import Range
 
 LOOPBACK = "127.0.0.1"
+
+PORTS = Range(low=0, high=65535, whole=True)
+"""Ports to choose from; 0 is any that is free."""
 
 TOKEN = "X-Fabricusd-Token"
 """Header of the token."""
@@ -86,7 +91,8 @@ class Server(ThreadingHTTPServer):
         if hasattr(socket, "SO_EXCLUSIVEADDRUSE"):
             self.allow_reuse_address = False
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
-        super(ThreadingHTTPServer, self).server_bind()
+        socketserver.TCPServer.server_bind(self)
+        self.server_name, self.server_port = LOOPBACK, self.server_address[1]
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """Serve a connection in a thread, or close it where too many are open."""

@@ -63,6 +63,12 @@ class Session:
             found: dict[str, Any] = reply(said)
             return found
 
+    def end(self, patience: float = 10.0) -> None:
+        """Break off what is being computed, and wait for it for at most so many seconds."""
+        self.stop.asked = True
+        if self._turn.acquire(timeout=patience):
+            self._turn.release()
+
     def _cloth(self, said: Mapping[str, Any]) -> Fabric:
         """The cloth that a request names, with its changes, from the side that it names."""
         at = whole("cloth", said.get("cloth", 0), 0, 2**31)
@@ -80,7 +86,10 @@ class Session:
         if said.get("first"):
             return {**page_data(fabric, self.lights, self.mesh), **self._about()}
         back = said.get("side") == "back"
-        return {"side": side_data(fabric, back=back), "swatch": mesh_arrays(swatch(fabric))}
+        # A mirrored back has the threads of the front.
+        live = not back or self.cloths[said.get("cloth", 0)].back is None
+        side = side_data(fabric, back=back, live=live)
+        return {"side": side, "swatch": mesh_arrays(swatch(fabric))}
 
     def _about(self) -> dict[str, Any]:
         file = str(self.file.name) if self.file else ""
@@ -113,10 +122,11 @@ class Session:
             raise FabricError("/save", "has no file; start with --save FILE")
         at = said.get("cloth", 0)
         fabric = self._cloth({**said, "side": "front"})
-        exists = self.file.exists()
-        if exists and self.saved not in (None, at) or exists and self.saved is None and at != 0:
+        # A file that is there from the start is that of the first cloth.
+        if self.file.exists() and at != (self.saved or 0):
             raise FabricError(
-                self.file.name, "holds another cloth; serve the new one with a --save FILE of its own"
+                self.file.name,
+                "holds another cloth; serve the new one with a --save FILE of its own",
             )
         name = said.get("variant", "")
         if not 0 < len(name) <= LONGEST_NAME:

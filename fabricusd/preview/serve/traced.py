@@ -18,13 +18,16 @@ from fabricusd.preview.lights import Lights
 from fabricusd.preview.page.arrays import array
 from fabricusd.preview.reference import scene_of_shape
 from fabricusd.preview.serve.said import number, numbers, whole
-from fabricusd.preview.shapes import Shape
+from fabricusd.preview.shapes import SHAPES, Shape
 from fabricusd.reference.render import render_scene
 from fabricusd.scene.scene import Camera
 from fabricusd.stop import Stop
 
 MOST_SIZE, MOST_SAMPLES = 1024, 1024
 """Pixels along a side of a picture, and samples of a pixel."""
+
+FIRST = 256, 64
+"""Pixels along a side, and samples of a pixel, of the picture that goes into a page."""
 
 VIEW: Mapping[str, type] = {
     "level": str, "size": int, "samples": int, "eye": list, "right": list, "up": list,
@@ -89,11 +92,6 @@ def view_of(said: Mapping[str, Any]) -> View:
     )  # fmt: skip
 
 
-def first_view(shape: Shape, lights: Lights, *, size: int, samples: int, level: str) -> View:
-    """The view that a page begins with."""
-    return View(level=level, size=size, samples=samples, camera=shape.camera(), lights=lights)
-
-
 def traced(fabric: Fabric, shape: Shape, view: View, stop: Stop | None = None) -> dict[str, Any]:
     """Radiance and cover as the page takes them, without bounces, and the time that took [s].
 
@@ -114,3 +112,15 @@ def traced(fabric: Fabric, shape: Shape, view: View, stop: Stop | None = None) -
         "pixels": array(pixels, "f4"), "seconds": round(time.perf_counter() - begun, 3),
         "sampling": round(result.seconds, 3),
     }  # fmt: skip
+
+
+def first_reference(
+    fabric: Fabric, mesh: Shape | None, lights: Lights, samples: int | None
+) -> dict[str, Any]:
+    """The view that a page begins with, at level `far`; samples : of a pixel, None for FIRST[1]."""
+    shape = SHAPES["cylinder"](fabric) if mesh is None else mesh
+    size, most = FIRST
+    view = View(
+        level=LEVELS[0], size=size, samples=samples or most, camera=shape.camera(), lights=lights
+    )
+    return traced(fabric, shape, view)

@@ -70,4 +70,6 @@ def _woven(fabric: Fabric, text: str) -> Weave:
 def require_small(cells: int, where: str) -> None:
     """Raise FabricError for a weave of more than MOST_CELLS cells."""
     if cells > MOST_CELLS:
-        raise FabricError(where, f"has {cells} cells; it must have at most {MOST_CELLS} to be served")
+        raise FabricError(
+            where, f"has {cells} cells; it must have at most {MOST_CELLS} to be served"
+        )

@@ -251,6 +251,7 @@ def _of_word(prim: Usd.Prim, change: Change) -> Iterator[Value]:
 def held_in_file(
     prim: Usd.Prim, table: tuple[Attribute, ...], field: str, value: Any, owner: type
 ) -> Value:
+    """A field of a dataclass as the value of its attribute, in the file's unit."""
     entry = next(each for each in table if each.field == field and each.owner is owner)
     (spec,) = named(prim, entry.name)
     held = from_si(value, entry)

@@ -1,4 +1,4 @@
-"""A whole fabric as a variant of the one in a layer: what it sets otherwise goes into the variant."""
+"""A whole fabric as a variant of the one in a layer: the variant holds what it sets otherwise."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def _differs(value: Value) -> bool:
 def _wanted(prim: Usd.Prim, threads: Sequence[Usd.Prim], fabric: Fabric) -> Iterator[Value]:
     """Every number of the fabric, and its weave, as values of attributes."""
     for at, thread in zip(threads, fabric.threads.values(), strict=True):
-        table = attributes.THREAD
+        table: tuple[Attribute, ...] = attributes.THREAD
         if thread.target_basis == "none":
             table = tuple(entry for entry in table if entry.field != "target_color")
         yield from _all(at, (*table, attributes.TARGET_BASIS), thread, Thread)
@@ -103,8 +103,6 @@ def _wanted(prim: Usd.Prim, threads: Sequence[Usd.Prim], fabric: Fabric) -> Iter
         yield prim, spec, value
 
 
-def _all(
-    prim: Usd.Prim, table: tuple[Attribute, ...], owner: Any, kind: type
-) -> Iterator[Value]:
+def _all(prim: Usd.Prim, table: tuple[Attribute, ...], owner: Any, kind: type) -> Iterator[Value]:
     for entry in table:
         yield held_in_file(prim, table, entry.field, getattr(owner, entry.field), kind)
