@@ -21,9 +21,12 @@ function placed() {
 
 const metresPerPixel = () => 2 * camera.distance / (data.focal * Math.min(viewer.canvas.width, viewer.canvas.height));
 
-function levelNow() {
+// The number of the level that is drawn: beside a traced picture, the level of that.
+const levelNow = () => comparing() ? traced.level : levelFor(metresPerPixel());
+
+function levelFor(size) {  // metres that a pixel shows
   if (state.level !== 'auto') return LEVELS.indexOf(state.level);
-  const size = metresPerPixel(), [u, v] = cloth.fabric.density, [ends, picks] = cloth.fabric.repeat;
+  const [u, v] = cloth.fabric.density, [ends, picks] = cloth.fabric.repeat;
   return size * u > 0.4 * ends && size * v > 0.4 * picks ? 0 : 1;
 }
 

@@ -1,12 +1,12 @@
 // The path tracer's picture of the same view: a wipe, where the two differ, and what each took.
 const MOST_TRACED = 512;
-let traced = null;  // { of, samples, seconds, found } of the picture that was traced last
+let traced = null;  // { of, level, samples, seconds, found } of the picture that was traced last
 let mode = 'page', tracing = false, begun = 0, took = 0;
 
 // What the picture depends on; exposure and view are laid over both.
 function viewKey() {
   const { grain, azimuth, elevation, key, sky, shape } = state, { width, height } = canvas;
-  return JSON.stringify([wholeOf(state), shape, grain, azimuth, elevation, key, sky, levelNow(), camera, width / height]);
+  return JSON.stringify([wholeOf(state), shape, grain, azimuth, elevation, key, sky, state.level, camera, width / height]);
 }
 
 const comparing = () => mode !== 'page' && traced !== null && traced.of === viewKey();
@@ -27,7 +27,7 @@ async function trace() {
   try {
     takeTraced(await ask('/render', {
       cloth: number, side, shape, threads, weave, coverage, grain, azimuth, elevation, key, even, slope, eye, right, up,
-      focal: data.focal, size, samples: Math.round(+by('samples').value) || 64, level: LEVELS[levelNow()],
+      focal: data.focal, size, samples: Math.round(+by('samples').value) || 64, level: LEVELS[levelFor(metresPerPixel() * Math.min(canvas.width, canvas.height) / size)],
     }), of);
     trouble('');
   } catch (error) {
@@ -41,9 +41,10 @@ async function trace() {
 
 function takeTraced(found, of) {
   viewer.setTraced(decode(found.pixels), found.size);
-  traced = { of, samples: found.samples, seconds: found.seconds, size: found.size, found: null };
+  traced = { of, level: LEVELS.indexOf(found.level), samples: found.samples, seconds: found.seconds, size: found.size, found: null };
   for (const option of by('compare').options) option.disabled = false;
   if (mode === 'page') by('compare').value = mode = 'wipe';
+  viewer.frames = 0;
   showCompared();
 }
 
@@ -100,6 +101,6 @@ function makeCompare() {
   if (!served) by('trace').textContent = 'Show the reference';
   by('samplesRow').hidden = !served;
   by('compareWhy').textContent = served || data.reference ? '' : `The path tracer ${NEEDS_SERVER}, or a page made with --reference.`;
-  by('compare').onchange = () => { mode = by('compare').value; showCompared(); showPicture(); };
+  by('compare').onchange = () => { mode = by('compare').value; viewer.frames = 0; showCompared(); };
   by('wipe').oninput = () => showPicture();
 }

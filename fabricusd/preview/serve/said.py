@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -17,6 +16,8 @@ def parsed(body: bytes, allowed: Mapping[str, type]) -> dict[str, Any]:
     """
     try:
         found = json.loads(body.decode("utf-8"), parse_constant=_refuse)
+        # Half of a pair of surrogates is no text, and no name of a file.
+        json.dumps(found, ensure_ascii=False).encode("utf-8")
     except (ValueError, RecursionError) as error:
         raise FabricError("the request", f"is not JSON: {one_line(str(error), 80)}") from None
     if not isinstance(found, dict):
@@ -47,7 +48,8 @@ def _refuse(word: str) -> float:
 def number(where: str, value: Any, low: float, high: float) -> float:
     """`value`, if it is a finite number in range; FabricError otherwise."""
     fits = isinstance(value, int | float) and not isinstance(value, bool)
-    if not fits or not math.isfinite(value) or not low <= value <= high:
+    # NaN is in no range, and infinity is beyond all of them.
+    if not fits or not low <= value <= high:
         raise FabricError(where, f"is not a number from {low:g} to {high:g}")
     return float(value)
 

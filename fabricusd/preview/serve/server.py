@@ -170,6 +170,9 @@ class Handler(BaseHTTPRequestHandler):
             raise Refusal(HTTPStatus.MISDIRECTED_REQUEST, "this is not the host that was asked for")
         if self.headers.get("Sec-Fetch-Site", "same-origin") not in ("same-origin", "none"):
             raise Refusal(HTTPStatus.FORBIDDEN, "another page has no business here")
+        # The base class makes one slash of several.
+        if self.requestline.split()[1] != self.path:
+            raise Refusal(HTTPStatus.NOT_FOUND, "there is nothing here")
         if self.headers.get("Transfer-Encoding") is not None:
             raise Refusal(HTTPStatus.NOT_IMPLEMENTED, "send Content-Length")
 

@@ -19,7 +19,7 @@ from fabricusd.schema.access import value as composed
 from fabricusd.schema.attributes import Attribute
 from fabricusd.schema.edit.dye import Value
 from fabricusd.schema.edit.edit import author, format_of, held_in_file, named
-from fabricusd.schema.edit.variant import Variant
+from fabricusd.schema.edit.variant import Variant, names_of
 from fabricusd.schema.findings import faults
 from fabricusd.schema.source import find_fabric, no_warnings, open_stage, usd_errors
 from fabricusd.schema.write import export, save
@@ -39,6 +39,7 @@ def save_variant(
     for a name that is none, for a layer that cannot be changed, and for a fabric with faults.
     """
     target = Path(path)
+    names_of(name)
     with whole_file(target) as temporary:
         if target.exists():
             shutil.copyfile(target, temporary)
