@@ -5,8 +5,8 @@ let mode = 'page', tracing = false, begun = 0, took = 0;
 
 // What the picture depends on; exposure and view are laid over both.
 function viewKey() {
-  const { grain, azimuth, elevation, key, sky, shape } = state, { width, height } = canvas;
-  return JSON.stringify([wholeOf(state), shape, grain, azimuth, elevation, key, sky, state.level, camera, width / height]);
+  const { grain, azimuth, elevation, key, sky, shape } = state, { clientWidth, clientHeight } = canvas;
+  return JSON.stringify([wholeOf(state), shape, grain, azimuth, elevation, key, sky, state.level, camera, clientWidth, clientHeight]);
 }
 
 const comparing = () => mode !== 'page' && traced !== null && traced.of === viewKey();
@@ -85,8 +85,8 @@ function measure() {
 function watchFrame(now) {
   if (viewer.frames <= 1) begun = now;
   if (viewer.frames < MOST_FRAMES) took = now - begun;
-  const n = viewer.frames;
-  if (comparing() && n !== traced.found?.frames && (n === MOST_FRAMES || (n & (n - 1)) === 0)) measure();
+  const n = viewer.frames, fine = Math.min(canvas.width, canvas.height) >= (traced?.size ?? 0);
+  if (comparing() && fine && n !== traced.found?.frames && (n === MOST_FRAMES || (n & (n - 1)) === 0)) measure();
   showCompared();
 }
 

@@ -60,6 +60,6 @@ fit();
 apply();
 requestAnimationFrame(frame);
 window.fabricusd = {
-  viewer, decode, placed, showScale, get data() { return data; }, get cloth() { return cloth; },
+  viewer, decode, placed, lights, showScale, whole: () => wholeOf(state), get traced() { return traced; }, get data() { return data; }, get cloth() { return cloth; },
   get state() { return state; }, get camera() { return camera; },
 };
