@@ -152,8 +152,8 @@ def _json(server: Server, rng: random.Random, secret: str) -> bytes:
     body = rng.choice(
         (
             text[: rng.randrange(1, len(text))], b"", b"[]", b"null", b"3", b"[" * 100_000,
-            b'{"a":' * 5000, b'{"cloth": NaN}', b'{"cloth": Infinity}', rng.randbytes(60), b"\xff" + text,
-            text + b"x", json.dumps(json.dumps(said)).encode(),
+            b'{"a":' * 5000, b'{"cloth": NaN}', b'{"cloth": Infinity}', rng.randbytes(60),
+            b"\xff" + text, text + b"x", json.dumps(json.dumps(said)).encode(),
         )
     )  # fmt: skip
     return _sent(server, path, body)
@@ -190,7 +190,8 @@ def _file(server: Server, rng: random.Random, secret: str) -> bytes:
     )  # fmt: skip
     content = rng.choice(
         (
-            b"", b"#usda 1.0\n", b"#usda 1.0\ndef {{", rng.randbytes(50), b"\x89PNG" + rng.randbytes(80),
+            b"", b"#usda 1.0\n", b"#usda 1.0\ndef {{", rng.randbytes(50),
+            b"\x89PNG" + rng.randbytes(80),
             f"#usda 1.0\n(\nsubLayers = [\n@{secret}@\n]\n)\n".encode(),
             f'#usda 1.0\ndef "A" (\nreferences = @{secret}@\n) {{\n}}\n'.encode(),
             f'#usda 1.0\ndef "A" (\npayload = @{secret}@</Fabric>\n) {{\n}}\n'.encode(),

@@ -72,10 +72,15 @@ def test_numbers_beyond_the_page_s_tables_and_coverage_are_made_by_the_server(sh
     assert tab.evaluate("fabricusd.state.coverage") == [-1, -1]
 
 
-def test_a_draft_is_opened_and_undone(shown):
+def test_a_draft_is_dropped_opened_and_undone(shown):
     tab = shown.tab
     draft = wif_text(from_fabric(Fabric(name="Fabric"))).encode()
-    tab.set_input_files("#open", {"name": "mine.wif", "mimeType": "", "buffer": draft})
+    tab.evaluate(
+        "text => { const held = new DataTransfer(); held.items.add(new File([text], 'mine.wif'));"
+        "document.body.dispatchEvent(new DragEvent('drop', { dataTransfer: held, bubbles: true,"
+        "cancelable: true })); }",
+        draft.decode(),
+    )
     shown.until("fabricusd.data.name === 'mine'")
     shown.rest()
     assert "mine.wif is open" in tab.inner_text("#told")

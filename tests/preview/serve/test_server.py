@@ -1,4 +1,4 @@
-"""The server: who is answered, with what headers, and what thousands of bad requests do: nothing."""
+"""The server: who is answered, with what headers, and that thousands of bad requests do nothing."""
 
 from __future__ import annotations
 
@@ -68,7 +68,8 @@ def test_a_sound_request_is_answered(server):
 @pytest.mark.parametrize(
     ("other", "status"),
     [
-        ({"Origin": "http://evil.example"}, 403), ({"Origin": "null"}, 403), ({"Origin": None}, 403),
+        ({"Origin": "http://evil.example"}, 403), ({"Origin": "null"}, 403),
+        ({"Origin": None}, 403),
         ({"Origin": "http://127.0.0.1:1"}, 403), ({served.TOKEN: None}, 403),
         ({served.TOKEN: "x"}, 403), ({"Host": "evil.example"}, 421), ({"Host": None}, 421),
         ({"Sec-Fetch-Site": "cross-site"}, 403), ({"Sec-Fetch-Site": "same-site"}, 403),
