@@ -39,16 +39,16 @@ void main() {
   mat2 turn = mat2(lay.z, -lay.w, lay.w, lay.z);
   wo.xy = turn * wo.xy;
   look_up(m * lay.xy);
-  vec3 total = vec3(0.0), wi = local * key;
-  wi.xy = turn * wi.xy;
-
-  vec3 at = place + n * lift;
-  float lit = shadows ? reaches(key_map, key_depth, at) : 1.0;
-  if (lit > 0.0) total += cloth(wi, wo) * (key_power * lit);
-  wi = local * sky;
-  wi.xy = turn * wi.xy;
-  lit = shadows ? reaches(sky_map, sky_depth, at) : 1.0;
-  // The sky's directions are even over the sphere: each stands for 4 pi.
-  if (lit > 0.0) total += cloth(wi, wo) * (12.566370614 * (even + slope * dot(zenith, sky)) * lit);
+  vec3 total = vec3(0.0), at = place + n * lift;
+  // In a loop, since a compiler of shaders puts in the kernels once for each call. The sky's
+  // directions are even over the sphere: each stands for 4 pi.
+  float power[2] = float[2](key_power, 12.566370614 * (even + slope * dot(zenith, sky)));
+  for (int k = 0; k < 2; ++k) {
+    float lit = power[k];
+    if (shadows) lit *= k == 0 ? reaches(key_map, key_depth, at) : reaches(sky_map, sky_depth, at);
+    vec3 wi = local * (k == 0 ? key : sky);
+    wi.xy = turn * wi.xy;
+    if (lit > 0.0) total += cloth(wi, wo) * lit;
+  }
   color = vec4(total, 1.0);
 }
