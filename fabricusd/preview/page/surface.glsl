@@ -1,8 +1,8 @@
-// One frame: the key light, and one direction of the sky.
+// One frame: the key light, and one direction of the sky; two where nothing is in their way.
 in vec3 place, normal, tangent;
 in float hand;
 in vec2 metres;
-uniform vec3 eye, key, zenith, sky;
+uniform vec3 eye, key, zenith, sky, other_sky;
 uniform float key_power, even, slope, lift;
 uniform vec4 lay;              // threads per metre along u and v, cosine and sine of the grain's turn
 uniform bool shadows;
@@ -40,13 +40,16 @@ void main() {
   wo.xy = turn * wo.xy;
   look_up(m * lay.xy);
   vec3 total = vec3(0.0), at = place + n * lift;
-  // In a loop, since a compiler of shaders puts in the kernels once for each call. The sky's
-  // directions are even over the sphere: each stands for 4 pi.
-  float power[2] = float[2](key_power, 12.566370614 * (even + slope * dot(zenith, sky)));
-  for (int k = 0; k < 2; ++k) {
-    float lit = power[k];
+  // In a loop, since a compiler of shaders puts in the kernels once for each call.
+  for (int k = 0; k < (shadows ? 2 : 3); ++k) {
+    vec3 to = k == 0 ? key : k == 1 ? sky : other_sky;
+    // The sky's directions are even over the sphere: each stands for 4 pi. Without shadows, those
+    // below the cloth are turned over, and two stand for the half above it.
+    if (!shadows && k > 0 && dot(n, to) < 0.0) to = -to;
+    float solid = shadows ? 12.566370614 : 3.141592654;
+    float lit = k == 0 ? key_power : solid * (even + slope * dot(zenith, to));
     if (shadows) lit *= k == 0 ? reaches(key_map, key_depth, at) : reaches(sky_map, sky_depth, at);
-    vec3 wi = local * (k == 0 ? key : sky);
+    vec3 wi = local * to;
     wi.xy = turn * wi.xy;
     if (lit > 0.0) total += cloth(wi, wo) * lit;
   }

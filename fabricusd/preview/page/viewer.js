@@ -1,6 +1,7 @@
 // WebGL2: the tables of a fabric, a mesh, and the mean of frames that each add a direction of sky.
 const HEAD = '#version 300 es\nprecision highp float;\nprecision highp int;\n';
 const WIDTH = 2048, SHADOW = 1024;
+const R4 = [0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101];  // [Roberts2018]
 const KINDS = { f4: Float32Array, i4: Int32Array, u1: Uint8Array, u2: Uint16Array, i2: Int16Array, u4: Uint32Array };
 
 export const decode = a => {
@@ -216,9 +217,9 @@ export class Viewer {
   // One frame more, of the camera's { eye, matrix }.
   draw(camera, lights) {
     const gl = this.gl, { width, height } = this.canvas, k = this.frames;
-    const number = [0.7548776662466927, 0.5698402909980532].map(a => (0.5 + k * a) % 1);
+    const number = R4.slice(0, 2).map(a => (0.5 + k * a) % 1);
     const tent = k ? number.map(u => u < 0.5 ? Math.sqrt(2 * u) - 1 : 1 - Math.sqrt(2 - 2 * u)) : [0, 0];
-    const sky = skyDirection(k), key = this.keyDirection(), shadows = !this.mesh.convex;
+    const [sky, other] = [2 * k, 2 * k + 1].map(skyDirection), key = this.keyDirection(), shadows = !this.mesh.convex;
     gl.bindVertexArray(this.mesh.vao);
     gl.enable(gl.DEPTH_TEST);
     let maps = [null, null];
@@ -238,6 +239,7 @@ export class Viewer {
     gl.uniform3fv(program.at('eye'), camera.eye);
     gl.uniform3fv(program.at('key'), key);
     gl.uniform3fv(program.at('sky'), sky);
+    gl.uniform3fv(program.at('other_sky'), other);
     gl.uniform3f(program.at('zenith'), 0, 1, 0);
     for (const [name, value] of Object.entries(lights)) gl.uniform1f(program.at(name), value);
     gl.uniform4f(program.at('lay'), ...this.fabric.density, ...this.lay);
@@ -362,9 +364,9 @@ function axesAlong(towards) {
   return [x, cross(z, x), z];
 }
 
-// Direction number k of the sky: evenly over the sphere, in the order of the R1 sequence.
+// Direction number k of the sky: evenly over the sphere, apart from the places in the pixels.
 function skyDirection(k) {
-  const y = 1 - 2 * ((0.5 + k * 0.7548776662466927) % 1), turn = 2 * Math.PI * ((0.5 + k * 0.5698402909980532) % 1);
+  const [y, turn] = [1 - 2 * ((0.5 + k * R4[2]) % 1), 2 * Math.PI * ((0.5 + k * R4[3]) % 1)];
   const flat = Math.sqrt(1 - y * y);
   return [flat * Math.cos(turn), y, flat * Math.sin(turn)];
 }
