@@ -27,7 +27,7 @@ SHADER = Path(__file__).resolve().parents[1] / "page" / "kernels.glsl"
 LAWS = tuple(laws.REGISTRY)
 """Value of the macro LAW -> name of the surface law."""
 
-FACES = ("exp", "log", "sin", "cos", "atan2", "asin", "erf", "i0e")
+FACES = ("exp", "log", "sin", "cos", "atan2", "asin", "acos", "erf", "i0e")
 """Elementary functions of kernels, which are translated as their float32 versions."""
 
 LAW_PARTS = ("overlap", "weight", "mask", "total", "openness", "lit_alone")
@@ -53,7 +53,7 @@ def shader() -> str:
     """The GLSL of all kernels that the page needs."""
     special: dict[int, Any] = {
         id(split): _split, id(entry_at): _entry, id(real._unless_nan): _nan,
-        id(mean_over): _mean, id(mean_over.py_func): _mean, id(real.acos): _acos,
+        id(mean_over): _mean, id(mean_over.py_func): _mean,
     }  # fmt: skip
     for name in FACES:
         single = real._atan2_32 if name == "atan2" else getattr(real, f"_{name}32")
@@ -94,10 +94,6 @@ def _mean(translation: Translation, arguments: list[Value]) -> Value:
     _, table, _, here, beside, c, level = arguments
     given = ", ".join(a.code for a in (here, beside, c, level))
     return Value(f"mean_of_groups({table.type.name}_at, {given})", FLOAT)
-
-
-def _acos(translation: Translation, arguments: list[Value]) -> Value:
-    return Value(f"acos_of({arguments[1].code})", FLOAT)
 
 
 def _split(translation: Translation, arguments: list[Value]) -> Value:

@@ -85,15 +85,6 @@ def declarations() -> str:
         "int B(int k) { return int(texelFetch(bytes, ivec2(k & 2047, k >> 11), 0).r); }",
     ]
     lines += [
-        "// [AbramowitzStegun1964] 4.4.46. By way of atan2, as kernels have it, drivers that compile",
-        "// in software took 2 s longer for the law `masked`.",
-        "float acos_of(float x) {",
-        "  float a = min(abs(x), 1.0), p = 0.0066700901 - a * 0.0012624911;",
-        "  p = 0.0308918810 + a * (-0.0170881256 + a * p);",
-        "  p = 0.0889789874 + a * (-0.0501743046 + a * p);",
-        "  p = (1.5707963050 + a * (-0.2145988016 + a * p)) * sqrt(1.0 - a);",
-        "  return x < 0.0 ? 3.14159265359 - p : p;",
-        "}",
         "// `laws.lit.mean_over`, by four groups at a time.",
         "float mean_of_groups(int at, int here, int beside, float c, float level) {",
         "  float total = 0.0;",

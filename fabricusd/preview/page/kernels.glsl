@@ -12,15 +12,6 @@ layout(std140) uniform Numbers { vec4 numbers[17]; };
 float F(int k) { return texelFetch(floats, ivec2(k & 2047, k >> 11), 0).r; }
 int I(int k) { return texelFetch(ints, ivec2(k & 2047, k >> 11), 0).r; }
 int B(int k) { return int(texelFetch(bytes, ivec2(k & 2047, k >> 11), 0).r); }
-// [AbramowitzStegun1964] 4.4.46. By way of atan2, as kernels have it, drivers that compile
-// in software took 2 s longer for the law `masked`.
-float acos_of(float x) {
-  float a = min(abs(x), 1.0), p = 0.0066700901 - a * 0.0012624911;
-  p = 0.0308918810 + a * (-0.0170881256 + a * p);
-  p = 0.0889789874 + a * (-0.0501743046 + a * p);
-  p = (1.5707963050 + a * (-0.2145988016 + a * p)) * sqrt(1.0 - a);
-  return x < 0.0 ? 3.14159265359 - p : p;
-}
 // `laws.lit.mean_over`, by four groups at a time.
 float mean_of_groups(int at, int here, int beside, float c, float level) {
   float total = 0.0;
@@ -178,6 +169,39 @@ float k_cos_half_difference(float sin_i, float cos_i, float sin_o, float cos_o) 
   return (0.5 * sqrt(((s * s) + (c * c))));
 }
 
+float k_atan2_32(float y, float x) {
+  float a;
+  float b;
+  float low;
+  float high;
+  float t;
+  float z;
+  float p;
+  float angle;
+  a = abs(x);
+  b = abs(y);
+  low = mix(b, a, (a < b));
+  high = mix(a, b, (a < b));
+  t = (low / max(high, 1e-37));
+  z = (t * t);
+  p = (-0.0162828691 + (z * 0.00290351746));
+  p = (-0.0753365739 + (z * (0.0430391445 + (z * p))));
+  p = (-0.142071315 + (z * (0.106546688 + (z * p))));
+  p = (-0.333330939 + (z * (0.199930538 + (z * p))));
+  angle = (t + ((t * z) * p));
+  angle = mix(angle, (1.57079633 - angle), (a < b));
+  angle = mix(angle, (3.14159265 - angle), (x < 0.0));
+  return mix(abs(angle), -abs(angle), y < 0.0);
+}
+
+float k_acos32(float x) {
+  float c;
+  float square;
+  c = min(max(x, -1.0), 1.0);
+  square = ((1.0 - c) * (1.0 + c));
+  return k_atan2_32(sqrt(square), c);
+}
+
 float k_exp32(float x) {
   float clamped;
   float k;
@@ -192,12 +216,12 @@ float k_exp32(float x) {
   p = (0.166665189 + (r * (0.041666206 + (r * p))));
   p = (1.0 + (r * (1.0 + (r * (0.5 + (r * p))))));
   scale = intBitsToFloat(int(((k + 127.0) * 8388608.0)));
-  return ((x < -87.3) ? 0.0 : (p * scale));
+  return mix((p * scale), 0.0, (x < -87.3));
 }
 
 float k_overlap(float cos_half) {
   float half_;
-  half_ = acos_of(cos_half);
+  half_ = k_acos32(cos_half);
   return k_exp32((((-published_precision) * half_) * half_));
 }
 
@@ -228,10 +252,10 @@ SetPair k_along_set(int thread_set, float ix, float iy, float iz, float ox, floa
   float cos_half;
   float u;
   warp = (thread_set == 1);
-  a_i = (warp ? iy : ix);
-  b_i = (warp ? (-ix) : iy);
-  a_o = (warp ? oy : ox);
-  b_o = (warp ? (-ox) : oy);
+  a_i = mix(ix, iy, warp);
+  b_i = mix(iy, (-ix), warp);
+  a_o = mix(ox, oy, warp);
+  b_o = mix(oy, (-ox), warp);
   scale_i = (1.0 / sqrt(((a_i * a_i) + (iz * iz))));
   scale_o = (1.0 / sqrt(((a_o * a_o) + (oz * oz))));
   cos_half = k_cos_half_difference((a_i * scale_i), (iz * scale_i), (a_o * scale_o), (oz * scale_o));
@@ -280,7 +304,7 @@ T_ff k_unit_azimuth(float y, float z, float cos_theta) {
   float scale;
   along = (cos_theta <= 1e-30);
   scale = (1.0 / max(cos_theta, 1e-30));
-  return T_ff((along ? 0.0 : (y * scale)), (along ? 1.0 : (z * scale)));
+  return T_ff(mix((y * scale), 0.0, along), mix((z * scale), 1.0, along));
 }
 
 float k_mask(float cos_phi_i, float cos_phi_o, float cos_half) {
@@ -360,8 +384,8 @@ T_ff k_half_inclination_legs(float sin_i, float cos_i, float sin_o, float cos_o)
   s = (sin_i + sin_o);
   c = (cos_i + cos_o);
   opposite = (abs(d) > c);
-  turned = ((d > 0.0) ? (cos_o - cos_i) : (cos_i - cos_o));
-  return T_ff((opposite ? turned : s), (opposite ? abs(d) : c));
+  turned = mix((cos_i - cos_o), (cos_o - cos_i), (d > 0.0));
+  return T_ff(mix(s, turned, opposite), mix(c, abs(d), opposite));
 }
 
 float k_cos2_half_inclination(float sin_i, float cos_i, float sin_o, float cos_o) {
@@ -453,31 +477,6 @@ T_ffffffff k_factors_2(int model, int row, float c, float s, SetPair pair) {
   return T_ffffffff(t_i, cos_i, cos_phi_i, t_o, cos_o, cos_phi_o, (surface * m), (volume * m));
 }
 
-float k_atan2_32(float y, float x) {
-  float a;
-  float b;
-  float low;
-  float high;
-  float t;
-  float z;
-  float p;
-  float angle;
-  a = abs(x);
-  b = abs(y);
-  low = ((a < b) ? a : b);
-  high = ((a < b) ? b : a);
-  t = (low / max(high, 1e-37));
-  z = (t * t);
-  p = (-0.0162828691 + (z * 0.00290351746));
-  p = (-0.0753365739 + (z * (0.0430391445 + (z * p))));
-  p = (-0.142071315 + (z * (0.106546688 + (z * p))));
-  p = (-0.333330939 + (z * (0.199930538 + (z * p))));
-  angle = (t + ((t * z) * p));
-  angle = ((a < b) ? (1.57079633 - angle) : angle);
-  angle = ((x < 0.0) ? (3.14159265 - angle) : angle);
-  return (y < 0.0 ? -abs(angle) : abs(angle));
-}
-
 float k_half_inclination(float sin_i, float cos_i, float sin_o, float cos_o) {
   T_ff t1;
   float y;
@@ -551,7 +550,7 @@ float k_lit_alone(int node, float x, float y, float z) {
 float k_diamond(float x, float y) {
   float part;
   part = (x / max((abs(x) + abs(y)), 1e-30));
-  return ((y >= 0.0) ? (1.0 - part) : (3.0 + part));
+  return mix((3.0 + part), (1.0 - part), (y >= 0.0));
 }
 
 struct T_if { int m0_; float m1_; };
@@ -766,7 +765,7 @@ float k_sine_of_turn(float k, float r) {
   odd = (k - (2.0 * floor((0.5 * k))));
   half_ = floor((0.5 * k));
   turned = (half_ - (2.0 * floor((0.5 * half_))));
-  return ((1.0 - (2.0 * turned)) * ((odd > 0.5) ? c : s));
+  return ((1.0 - (2.0 * turned)) * mix(s, c, (odd > 0.5)));
 }
 
 float k_cos32(float x) {
@@ -838,7 +837,7 @@ T_iiff k_cell(int rows, int columns, float x, float y, float z) {
   float j;
   int row;
   int column;
-  t = (k_asin32((acos_of(z) * 0.6366197723675814)) * 0.6366197723675814);
+  t = (k_asin32((k_acos32(z) * 0.6366197723675814)) * 0.6366197723675814);
   i = (t * float((rows - 1)));
   j = (k_atan2_32(y, x) * (float(columns) / 6.283185307179586));
   if ((j < 0.0)) {
@@ -963,10 +962,10 @@ float k_projected(float x, float y, float z) {
   float along;
   float c;
   float s;
-  side = ((z > 0.0) ? 1.0 : -1.0);
+  side = mix(-1.0, 1.0, (z > 0.0));
   total = 0.0;
   for (int k = 0; k < conserving_nodes_n0; ++k) {
-    along = ((k >= conserving_warp_start) ? y : x);
+    along = mix(x, y, (k >= conserving_warp_start));
     c = F(conserving_nodes_at + (k) * conserving_nodes_n1 + 0);
     s = F(conserving_nodes_at + (k) * conserving_nodes_n1 + 1);
     total = (total + (F(conserving_nodes_at + (k) * conserving_nodes_n1 + 2) * k_facing(side, c, s, along, z)));
@@ -988,8 +987,8 @@ T_fff k_to_thread(int thread_set, float cos_psi0, float sin_psi0, float x, float
   float along;
   float across;
   warp = (thread_set == 1);
-  along = (warp ? y : x);
-  across = (warp ? (-x) : y);
+  along = mix(x, y, warp);
+  across = mix(y, (-x), warp);
   return T_fff(((cos_psi0 * along) - (sin_psi0 * z)), across, ((sin_psi0 * along) + (cos_psi0 * z)));
 }
 
@@ -1047,7 +1046,7 @@ float k_i0e32(float x) {
   p = (0.0276126165 + (t * (0.0402138482 + (t * p))));
   p = (0.398942266 + (t * (0.0498739974 + (t * p))));
   far_ = (p * sqrt(t));
-  return ((x < 6.0) ? near_ : far_);
+  return mix(far_, near_, (x < 6.0));
 }
 
 float k_longitudinal(float inverse_v, float norm, float sin_i, float cos_i, float sin_o, float cos_o) {
@@ -1169,7 +1168,7 @@ T_ff k_facet_terms(int row, int thread_set, float c, float s, float ix, float iy
   va = t2.m0_;
   vb = t2.m1_;
   vn = t2.m2_;
-  seen = (max(0.0, ((iz > 0.0) ? tn : (-tn))) * max(0.0, ((oz > 0.0) ? vn : (-vn))));
+  seen = (max(0.0, mix((-tn), tn, (iz > 0.0))) * max(0.0, mix((-vn), vn, (oz > 0.0))));
   if ((seen == 0.0)) {
     return T_ff(0.0, 0.0);
   }
@@ -1297,7 +1296,7 @@ float k_share_of_gaps(float x, float y, float z) {
   float closed;
   open_to_it = k_gap_towards(x, y, z);
   closed = max(0.0, ((1.0 - conserving_covered) - open_to_it));
-  return ((closed > 0.0) ? (closed / (1.0 - open_to_it)) : 0.0);
+  return mix(0.0, (closed / (1.0 - open_to_it)), (closed > 0.0));
 }
 
 T_fff k_conserving_point_single(Place place, float on_surface, float on_volume, float ix, float iy, float iz, float ox, float oy, float oz) {
@@ -1441,14 +1440,14 @@ T_fff k_lower_run(int i, int j, int top, float over) {
   count = I(cloth_runs_at + (((i) * cloth_runs_n1 + j) * cloth_runs_n2 + slot) * cloth_runs_n3 + 1);
   beyond = float(I(cloth_runs_at + (((i_next) * cloth_runs_n1 + j_next) * cloth_runs_n2 + 0) * cloth_runs_n3 + 1));
   if (((count > 0) && (place == (ahead ? (count - 1) : 0)))) {
-    return T_fff((ahead ? (rim - 1.0) : (beyond + rim)), (beyond + (2.0 * rim)), 1.0);
+    return T_fff(mix((beyond + rim), (rim - 1.0), ahead), (beyond + (2.0 * rim)), 1.0);
   }
   strip = float(place);
   if ((count > 0)) {
-    start = (ahead ? (((2.0 * rim) * strip) - (1.0 - rim)) : (((2.0 * rim) * strip) - rim));
+    start = mix((((2.0 * rim) * strip) - rim), (((2.0 * rim) * strip) - (1.0 - rim)), ahead);
     strips = (count - 1);
   } else {
-    start = (((2.0 * rim) * strip) + (ahead ? ((2.0 * rim) - 1.0) : 0.0));
+    start = (((2.0 * rim) * strip) + mix(0.0, ((2.0 * rim) - 1.0), ahead));
     strips = ((which == 1) ? picks : ends);
   }
   return T_fff(start, max(((2.0 * rim) * float(strips)), cloth_tiny), 0.0);
@@ -1470,18 +1469,18 @@ T_ifff k_place_on(int top, float width, float other, float upper_start, float up
   float w;
   float s;
   warp = (top == 1);
-  over = (warp ? x : y);
-  along = (warp ? y : x);
+  over = mix(y, x, warp);
+  along = mix(x, y, warp);
   offset = (over - 0.5);
   aside = (along - 0.5);
   on_top = ((abs(offset) <= (0.5 * width)) && (width > 0.0));
   beside = ((abs(aside) <= (0.5 * other)) && (other > 0.0));
   hit = (on_top ? top : (1 - top));
-  seen = (on_top ? (upper_start + along) : (lower_start + over));
-  cells = (on_top ? upper_cells : lower_cells);
-  w = ((2.0 * (on_top ? offset : aside)) / max((on_top ? width : other), cloth_tiny));
+  seen = mix((lower_start + over), (upper_start + along), on_top);
+  cells = mix(lower_cells, upper_cells, on_top);
+  w = ((2.0 * mix(aside, offset, on_top)) / max(mix(other, width, on_top), cloth_tiny));
   s = max(0.0, min((seen / cells), cloth_last));
-  w = max(-1.0, min(((hit == 1) ? (-w) : w), 1.0));
+  w = max(-1.0, min(mix(w, (-w), (hit == 1)), 1.0));
   return T_ifff(((on_top || beside) ? hit : 2), s, w, cells);
 }
 
@@ -1535,7 +1534,7 @@ T_iiffff k_thread_at(int i, int j, int end, int pick, float x, float y) {
   t1 = k_upper_run(i, j, top);
   upper_start = t1.m0_;
   upper_cells = t1.m1_;
-  t2 = k_lower_run(i, j, top, ((top == 1) ? x : y));
+  t2 = k_lower_run(i, j, top, mix(y, x, (top == 1)));
   lower_start = t2.m0_;
   lower_cells = t2.m1_;
   rises = t2.m2_;
@@ -1548,7 +1547,7 @@ T_iiffff k_thread_at(int i, int j, int end, int pick, float x, float y) {
     return T_iiffff(2, 0, 0.0, 0.0, 0.0, 0.0);
   }
   thread = I(cloth_sequence_at + (which) * cloth_sequence_n1 + ((which == 1) ? end : pick));
-  return T_iiffff(which, thread, s, w, k_angle_on(thread, s), ((cells * F(cloth_pitch_at + (1 - which))) * ((which == top) ? 1.0 : rises)));
+  return T_iiffff(which, thread, s, w, k_angle_on(thread, s), ((cells * F(cloth_pitch_at + (1 - which))) * mix(rises, 1.0, (which == top))));
 }
 
 struct T_iiiiff { int m0_; int m1_; int m2_; int m3_; float m4_; float m5_; };
@@ -1563,7 +1562,7 @@ T_if k_rows_of_texels(bool on_top, float along, float over, float width, int cou
   int k;
   behind = (over > 0.5);
   strip = max((0.5 * (1.0 - width)), tiny);
-  place = (on_top ? along : ((behind ? (over - (1.0 - strip)) : over) / strip));
+  place = mix((mix(over, (over - (1.0 - strip)), behind) / strip), along, on_top);
   half_ = (count / 2);
   rows = (on_top ? count : half_);
   x = max(0.0, min(((place * float(rows)) - 0.5), float((rows - 1))));
@@ -1611,8 +1610,8 @@ float k_horizon_at(float u, float v, int which, float x, float y) {
   in_u = t2.m0_;
   in_v = t2.m1_;
   top = I(cloth_grid_at + (i) * cloth_grid_n1 + j);
-  along = ((top == 1) ? q : p);
-  over = ((top == 1) ? p : q);
+  along = mix(p, q, (top == 1));
+  over = mix(q, p, (top == 1));
   width = F(cloth_width_at + top);
   on_top = (which == top);
   slot = (on_top ? 0 : (shadow_table_n2 - 1));
@@ -1812,7 +1811,7 @@ float k_erf32(float x) {
   p = (0.633219893 + (b * (0.108418577 + (b * p))));
   p = (-0.000188040226 + (b * (1.12957842 + (b * p))));
   far_ = (1.0 - k_exp32((-p)));
-  return (x < 0.0 ? -abs(((a < 1.0) ? near_ : far_)) : abs(((a < 1.0) ? near_ : far_)));
+  return mix(abs(mix(far_, near_, (a < 1.0))), -abs(mix(far_, near_, (a < 1.0))), x < 0.0);
 }
 
 T_ff k_across(int row, float w, float sin_phi_i, float cos_phi_i, float sin_phi_o, float cos_phi_o) {
@@ -1827,8 +1826,8 @@ T_ff k_across(int row, float w, float sin_phi_i, float cos_phi_i, float sin_phi_
   float d;
   y = (sin_phi_i + sin_phi_o);
   x = (cos_phi_i + cos_phi_o);
-  edge = ((y > 0.0) ? 1.0 : ((y < 0.0) ? -1.0 : 0.0));
-  h = ((x < 0.0) ? edge : (y / max(sqrt(((x * x) + (y * y))), 1e-06)));
+  edge = mix(mix(0.0, -1.0, (y < 0.0)), 1.0, (y > 0.0));
+  h = mix((y / max(sqrt(((x * x) + (y * y))), 1e-06)), edge, (x < 0.0));
   beta = k_across_deviation(F(published_threads_at + (row) * published_threads_n1 + 6));
   scale = (sqrt(0.5) / beta);
   ends = (k_erf32(((1.0 - h) * scale)) + k_erf32(((1.0 + h) * scale)));
@@ -1916,8 +1915,8 @@ T_ff k_across_1(int row, float w, float sin_phi_i, float cos_phi_i, float sin_ph
   float d;
   y = (sin_phi_i + sin_phi_o);
   x = (cos_phi_i + cos_phi_o);
-  edge = ((y > 0.0) ? 1.0 : ((y < 0.0) ? -1.0 : 0.0));
-  h = ((x < 0.0) ? edge : (y / max(sqrt(((x * x) + (y * y))), 1e-06)));
+  edge = mix(mix(0.0, -1.0, (y < 0.0)), 1.0, (y > 0.0));
+  h = mix((y / max(sqrt(((x * x) + (y * y))), 1e-06)), edge, (x < 0.0));
   beta = k_across_deviation(F(conserving_threads_at + (row) * conserving_threads_n1 + 6));
   scale = (sqrt(0.5) / beta);
   ends = (k_erf32(((1.0 - h) * scale)) + k_erf32(((1.0 + h) * scale)));
