@@ -51,8 +51,15 @@ def opened(browser, tmp_path, fabric: Fabric, size: tuple[int, int] = (620, 240)
 
 
 @pytest.fixture(scope="module")
-def linen(browser, tmp_path_factory):
+def linen_page(browser, tmp_path_factory):
     return opened(browser, tmp_path_factory.mktemp("linen"), fabric_of("linen_plain")[0])
+
+
+@pytest.fixture
+def linen(linen_page):
+    """The page of linen, which does not draw on while other tests run."""
+    yield linen_page
+    linen_page.rest()
 
 
 def test_the_package_has_the_translation_of_its_kernels():
@@ -243,7 +250,6 @@ def test_the_back_is_that_of_the_cloth_and_is_live_where_it_is_mirrored(linen):
     assert tab.evaluate(f"fabricusd.viewer.floats[{start}]") == 0.5
     tab.click("#reset")
     assert tab.evaluate("fabricusd.state.side") == "front"
-    linen.rest()
 
 
 def test_differences_on_the_page_are_those_of_delta_e_2000(linen):
@@ -262,7 +268,6 @@ def test_differences_on_the_page_are_those_of_delta_e_2000(linen):
     wanted = delta_e_2000(mine[..., :3], theirs[..., :3])
     assert wanted.mean() > 1.0
     assert np.abs(found[..., 0] - wanted).max() < 0.01
-    linen.rest()
 
 
 @pytest.mark.parametrize("shape", SHAPES)

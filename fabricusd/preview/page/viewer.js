@@ -217,8 +217,7 @@ export class Viewer {
   // One frame more, of the camera's { eye, matrix }.
   draw(camera, lights) {
     const gl = this.gl, { width, height } = this.canvas, k = this.frames;
-    const number = R4.slice(0, 2).map(a => (0.5 + k * a) % 1);
-    const tent = k ? number.map(u => u < 0.5 ? Math.sqrt(2 * u) - 1 : 1 - Math.sqrt(2 - 2 * u)) : [0, 0];
+    const [tent, far] = [2 * k, 2 * k + 1].map(n => (n ? R4.slice(0, 2).map(a => tented((0.5 + n * a) % 1)) : [0, 0]));
     const [sky, other] = [2 * k, 2 * k + 1].map(skyDirection), key = this.keyDirection(), shadows = !this.mesh.convex;
     gl.bindVertexArray(this.mesh.vao);
     gl.enable(gl.DEPTH_TEST);
@@ -240,6 +239,7 @@ export class Viewer {
     gl.uniform3fv(program.at('key'), key);
     gl.uniform3fv(program.at('sky'), sky);
     gl.uniform3fv(program.at('other_sky'), other);
+    gl.uniform2f(program.at('other_place'), far[0] - tent[0], tent[1] - far[1]);
     gl.uniform3f(program.at('zenith'), 0, 1, 0);
     for (const [name, value] of Object.entries(lights)) gl.uniform1f(program.at(name), value);
     gl.uniform4f(program.at('lay'), ...this.fabric.density, ...this.lay);
@@ -363,6 +363,9 @@ function axesAlong(towards) {
   const z = unit(towards), aside = Math.abs(z[1]) < 0.9 ? [0, 1, 0] : [1, 0, 0], x = unit(cross(aside, z));
   return [x, cross(z, x), z];
 }
+
+// A place in a tent filter one pixel in radius, for u in [0, 1).
+const tented = u => (u < 0.5 ? Math.sqrt(2 * u) - 1 : 1 - Math.sqrt(2 - 2 * u));
 
 // Direction number k of the sky: evenly over the sphere, apart from the places in the pixels.
 function skyDirection(k) {
