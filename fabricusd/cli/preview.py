@@ -65,7 +65,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--save",
         metavar="USD",
-        help="with --serve: the one file that the page may write, as variants of the fabric",
+        help="with --serve: the one file that the page may write, as variants of the fabric "
+        "(default: it writes none)",
     )
     parser.add_argument(
         "--port", type=int, default=0, metavar="N",
