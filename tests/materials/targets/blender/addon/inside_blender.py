@@ -159,6 +159,33 @@ def give(name, value):
     return len(mine)
 
 
+def inputs_named(name):
+    """The value of an input, by the names of the materials whose group has it."""
+    found = {}
+    for one in bpy.data.materials:
+        for node in one.node_tree.nodes:
+            if name in node.inputs:
+                found[one.name] = node.inputs[name].default_value
+    return found
+
+
+def pixel(camera, size, percentage=100):
+    """What the drivers make of a camera: the width of a pixel for 1 m of distance, and beside."""
+    scene = bpy.context.scene
+    data = bpy.data.cameras.new("Eye")
+    for name, value in camera.items():
+        setattr(data, name, value)
+    scene.camera = bpy.data.objects.new("Eye", data)
+    scene.collection.objects.link(scene.camera)
+    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_percentage = percentage
+    seen = bpy.context.evaluated_depsgraph_get()
+    seen.update()
+    tree = next(one for one in bpy.data.node_groups if one.get("fabricusd_pixel"))
+    nodes = tree.evaluated_get(seen).nodes
+    return [n.outputs[0].default_value for n in nodes if n.bl_idname == "ShaderNodeValue"]
+
+
 def look(picture, size, spp):
     """Render through the camera that was imported."""
     scene = bpy.context.scene
