@@ -4,11 +4,11 @@
 
 The subject is a flat cloth of even threads, and each frame is twice as wide as the one before: from
 40 pixels a thread to about 100 threads a pixel. The lobes take their threads from a texture of one
-repeat, without its automatic blend (`near`); the same, as the add-on imports it, which blends the
-threads into the cloth from afar by the distance of the camera (`blended`); or from nowhere (`far`). For each frame the script prints delta E 2000 against the
-reference, and how far the frame is from the one before, where both show the same cloth: the means
-of 2 x 2 pixels of the nearer frame against the middle of the wider one. It writes the frames of a
-preset below one another: reference, and the three.
+repeat (`near`, without the automatic blend); the same, blended into the cloth from afar by the
+distance of the camera, as the add-on imports it (`blended`); or from nowhere (`far`). For each
+frame the script prints delta E 2000 against the reference, and how far the frame is from the one
+before, where both show the same cloth: the means of 2 x 2 pixels of the nearer frame against the
+middle of the wider one. It writes the frames of a preset below one another: reference, and modes.
 """
 
 from __future__ import annotations
