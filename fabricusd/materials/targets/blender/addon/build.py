@@ -140,9 +140,10 @@ def _wire(material: Any, look: Look, tree: Any, images: Images) -> None:
                 nodes.set(group.inputs[name], value)
         if look.threads and WIDTH in group.inputs:
             group.inputs[WIDTH].default_value = thread_width(material, look.threads.density)
-        # Cycles would bend the tilted normals of lobes back towards the viewer.
-        if hasattr(material, "cycles"):
-            material.cycles.use_bump_map_correction = False
+    # Cycles would bend tilted normals back towards the viewer, and dim what they face; fits know
+    # nothing of that.
+    if hasattr(material, "cycles"):
+        material.cycles.use_bump_map_correction = False
     for name, title in TITLES.items():
         if name in look.maps and title in group.inputs:
             image = images(look.maps[name], data=name not in COLORS)
