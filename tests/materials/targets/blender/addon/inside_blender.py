@@ -186,6 +186,47 @@ def pixel(camera, size, percentage=100):
     return [n.outputs[0].default_value for n in nodes if n.bl_idname == "ShaderNodeValue"]
 
 
+def texel_levels(path, folder):
+    """The mean of an image where a pixel spans 1, 2, 4 ... texels, with the texture cache on."""
+    clear()
+    scene = bpy.context.scene
+    cached = hasattr(scene.render, "use_texture_cache")
+    if cached:
+        scene.render.use_texture_cache = scene.render.use_auto_generate_texture_cache = True
+    image = bpy.data.images.load(path)
+    image.colorspace_settings.name = "Non-Color"
+    sheet = bpy.data.meshes.new("Sheet")
+    corners = [(-64, -64, 0), (64, -64, 0), (64, 64, 0), (-64, 64, 0)]
+    sheet.from_pydata(corners, [], [(0, 1, 2, 3)])
+    for corner, at in zip(sheet.uv_layers.new(name="st").data, corners, strict=True):
+        corner.uv = at[:2]
+    material = bpy.data.materials.new("Shown")
+    if material.node_tree is None:
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    read, glow = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeEmission")
+    read.image = image
+    links.new(nodes.new("ShaderNodeUVMap").outputs[0], read.inputs[0])
+    links.new(read.outputs[0], glow.inputs[0])
+    links.new(glow.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs[0])
+    sheet.materials.append(material)
+    scene.collection.objects.link(bpy.data.objects.new("Sheet", sheet))
+    camera = bpy.data.cameras.new("Above")
+    camera.type = "ORTHO"
+    scene.camera = bpy.data.objects.new("Above", camera)
+    scene.camera.location = (0.013, 0.017, 5.0)
+    scene.collection.objects.link(scene.camera)
+    found, side = [], 8
+    for level in range(image.size[0].bit_length()):
+        camera.ortho_scale = side * 2.0**level / image.size[0]
+        picture = str(Path(folder) / f"level{level}.exr")
+        render(picture, (side, side), 4)
+        shown = bpy.data.images.load(picture)
+        found.append(sum(list(shown.pixels)[::4]) / side**2)
+    return {"cached": cached, "means": found}
+
+
 def look(picture, size, spp):
     """Render through the camera that was imported."""
     scene = bpy.context.scene
