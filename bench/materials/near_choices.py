@@ -7,7 +7,8 @@ with one choice changed: the weight of the mean over all points (`fit.MEAN`), th
 factors (`fit.RIDGE`), the difference of a lobe's tilt from the mean of its threads, which stays as
 it is from afar, and the width of a lobe, whose square is less by twice the variance that the texel
 lacks. The last two columns are how far the mean over the points is from the far mixture, and the
-mean over texels as wide as a thread, of one repeat.
+mean over texels as wide as a thread, of one repeat. The constant of a lobe is the one between
+variance and the square of its width, by the fit.
 """
 
 from __future__ import annotations
@@ -75,6 +76,16 @@ def at_points(near, points, wi, wo):
     return np.array(found)
 
 
+def constants_of(near):
+    """The least and the largest constant of a lobe, in words: 2 by the variance of slopes alone."""
+    found = []
+    for number, (lobe, _) in enumerate(near.lobes):
+        known = mixture.constants(near, number)
+        if known.own.any() and known.variance > mixture.EPSILON:
+            found.append((lobe.alpha_along**2 - near.own[number] ** 2) / known.variance)
+    return f"constants of lobes: {min(found):.1f} to {max(found):.1f}"
+
+
 def of_texels(near, fabric, wi, wo):
     """(n, 3) mean over texels as wide as a thread, or nearly, times pi."""
     pixels, parts = repeat_layers(fabric)
@@ -109,6 +120,8 @@ def main() -> None:
                 setattr(fit, name, value)
             mixture.placed = fit.placed
             near = fit.fit_near(fabric, far)
+            if words == "decided":
+                print(f"| {preset} | {constants_of(near)} | | | |", flush=True)
             values = at_points(near, points, wi, wo)
             means = (
                 np.einsum("p,pnc->nc", points.weight, values), of_texels(near, fabric, wi, wo)
