@@ -10,6 +10,9 @@ from .nodes import Group
 NARROWEST = 0.1
 """Smallest ratio of alphas in the Principled BSDF: aspect^2 = 1 - 0.9 anisotropic."""
 
+FADED = 0.25
+"""Cosine of the viewer and a tilted normal below which sheen fades."""
+
 WHITE = (1.0, 1.0, 1.0)
 
 INSTEAD = {
@@ -61,9 +64,10 @@ def principled(look: Look, name: str) -> Any:
     if normal is not None:
         give("Normal", normal)
         # Cycles shows full sheen to a viewer below the plane of a tilted normal, which leaning pile
-        # has; in a fit there is none.
+        # has; in a fit there is none. It fades out, since it is strongest where it would end.
         eye = group.add("ShaderNodeNewGeometry").outputs["Incoming"]
-        above = group.math("GREATER_THAN", group.vector("DOT_PRODUCT", normal, eye), 0.0)
+        above = group.math("DIVIDE", group.vector("DOT_PRODUCT", normal, eye), FADED)
+        above = group.math("MINIMUM", group.math("MAXIMUM", above, 0.0), 1.0)
         weight = group.math("MULTIPLY", weight, above)
     give("Sheen Weight", weight)
     give("Sheen Tint", fitted("fuzz_color", "Fuzz Color", color=True))

@@ -227,6 +227,56 @@ def texel_levels(path, folder):
     return {"cached": cached, "means": found}
 
 
+def sheen_by_view(picture, normal, views):
+    """The radiance of a sheet of sheen alone, whose texture says `normal`, in an even sky of 1."""
+    clear()
+    scene = bpy.context.scene
+    known = importlib.import_module("fabricusd_looks.looks")
+    make = importlib.import_module("fabricusd_looks.principled").principled
+    values = {
+        "base_color_scale": (0.0,) * 3, "specular_ior": 1.0, "specular_tint": (0.0,) * 3,
+        "smooth_scale": 1.0, "rough_scale": 1.0, "fuzz_weight": 1.0, "fuzz_color": (1.0,) * 3,
+        "fuzz_roughness": 0.3,
+    }  # fmt: skip
+    code = [0.5 * x + 0.5 for x in normal]
+    one = known.Look(
+        path="", name="Pile", fabric="", values=values, maps={"normal": ""},
+        constants={"normal": code}, transparent=False, mixture=None,
+    )  # fmt: skip
+    material = bpy.data.materials.new("Pile")
+    if material.node_tree is None:
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    group = nodes.new("ShaderNodeGroup")
+    group.node_tree = make(one, "Pile")
+    links.new(group.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs[0])
+    material.cycles.use_bump_map_correction = False
+    sheet = bpy.data.meshes.new("Sheet")
+    corners = [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)]
+    sheet.from_pydata(corners, [], [(0, 1, 2, 3)])
+    for corner, at in zip(sheet.uv_layers.new(name="st").data, corners, strict=True):
+        corner.uv = at[:2]
+    sheet.materials.append(material)
+    scene.collection.objects.link(bpy.data.objects.new("Sheet", sheet))
+    scene.world = bpy.data.worlds.new("Even")
+    if scene.world.node_tree is None:
+        scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs[0].default_value = (1.0, 1.0, 1.0, 1.0)
+    scene.cycles.max_bounces = 0
+    scene.camera = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
+    scene.camera.data.lens = 500.0
+    scene.collection.objects.link(scene.camera)
+    found = []
+    for k, view in enumerate(views):
+        scene.camera.location = Vector(view) * 5.0
+        scene.camera.rotation_euler = Vector(view).to_track_quat("Z", "Y").to_euler()
+        name = picture.replace("*", str(k))
+        render(name, (4, 4), 64)
+        found.append(sum(list(bpy.data.images.load(name).pixels)[1::4]) / 16)
+    return found
+
+
 def look(picture, size, spp):
     """Render through the camera that was imported."""
     scene = bpy.context.scene
