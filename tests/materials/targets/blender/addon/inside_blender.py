@@ -265,7 +265,7 @@ def sheen_by_view(picture, normal, views):
     scene.world.node_tree.nodes["Background"].inputs[0].default_value = (1.0, 1.0, 1.0, 1.0)
     scene.cycles.max_bounces = 0
     scene.camera = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
-    scene.camera.data.lens = 500.0
+    scene.camera.data.lens = 5000.0
     scene.collection.objects.link(scene.camera)
     found = []
     for k, view in enumerate(views):
