@@ -5,23 +5,36 @@ from __future__ import annotations
 import argparse
 
 from fabricusd.cli.arguments.fitting import add_fitting, deliver, fitted, require_outputs, tell
+from fabricusd.cli.arguments.flat import add_flat, refuse_flat_options, run_flat
 from fabricusd.errors import FabricError
 
 EPILOG = """LOBES is a table that 'measure' wrote, or any CSV with the columns theta_i, theta_o and
 phi_d (degrees, inclinations from the thread's normal plane) and f_r, f_g and f_b (1/sr, without the
 cosine). The columns sigma_r, sigma_g and sigma_b are their standard deviations.
 
+--flat fits a whole fabric to photographs of flat cloth: weave, densities, colours, lobes, gap. Each
+number has an interval and a source. See docs/measurement.md.
+
 Printed are chi2 per degree of freedom and 95 % intervals. Parameters that the views do not tell
 apart are said to be, with the product that the views do tell.
 
 example:
   fabricusd fit lobes.csv -o thread.usda
-  fabricusd fit lobes.csv --model all --plots plots --report fit.json"""
+  fabricusd fit lobes.csv --model all --plots plots --report fit.json
+  fabricusd fit --flat front.png behind.png --weave "twill 2/1" --light 0 1 1 \\
+      --back-light 0 0 -1.1 --cloth-width 6 -o cloth.usda --page cloth.html"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The table, how it is fitted, and where to write."""
-    parser.add_argument("table", metavar="LOBES", help="table of lobes, .csv or .npz")
+    parser.add_argument("table", metavar="LOBES", nargs="?", help="table of lobes, .csv or .npz")
+    parser.add_argument(
+        "--flat",
+        nargs="+",
+        metavar="PHOTO",
+        help="fit a fabric to a photograph of flat cloth lit from before, and to a second one lit "
+        "from behind (default: fit a thread to LOBES)",
+    )
     parser.add_argument(
         "-o",
         "--output",
@@ -29,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=".usda, .usdc or .usd file for the fitted thread (default: print only)",
     )
     add_fitting(parser)
+    add_flat(parser)
     parser.add_argument(
         "-n", "--dry-run", action="store_true", help="read the table, but fit and write nothing"
     )
@@ -36,10 +50,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fit a thread, print what is known of it, and write it."""
+    if options.flat is not None:
+        if options.table:
+            raise FabricError("--flat", f"cannot be used with the table '{options.table}'")
+        return run_flat(options)
+    refuse_flat_options(options)
     from fabricusd.measure.lobes import described, gaps, read_lobes
 
     if not options.table:
-        raise FabricError("LOBES", "is empty; it must be the name of a table")
+        raise FabricError("LOBES", "is missing; name a table of lobes, or photographs with --flat")
     lobes = read_lobes(options.table)
     tell(lobes, options)
     if options.dry_run:
