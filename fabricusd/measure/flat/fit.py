@@ -22,11 +22,11 @@ from fabricusd.measure.flat.tones import (
     SPREAD,
     Task,
     Toned,
-    fit_tones,
+    fit_faces,
     light_of,
     through_color,
 )
-from fabricusd.measure.flat.weave import find_weave, stated
+from fabricusd.measure.flat.weave import find_weave, other_face, stated
 from fabricusd.weaves import parse_weave
 
 Floats = NDArray[np.float64]
@@ -147,7 +147,16 @@ def fit_flat(
         behind=light, through=None if light is None else through_color(light), gain=gain,
         density=(1 / (lattice.pitch[0] * pixel), 1 / (lattice.pitch[1] * pixel)),
     )  # fmt: skip
-    toned = fit_tones(task)
+    tasks = [task]
+    if lattice.weave.warp_share != 0.5:
+        tasks.append(replace(task, weave=other_face(lattice.weave)))
+    best, toned = fit_faces(tasks)
+    if best:
+        notes += (
+            f"the light says that the set that floats lies across the picture: {lattice.weave.name}"
+            f" is taken as {tasks[best].weave.name}, the warp being the set that lies upright",
+        )
+        task, lattice = tasks[best], replace(lattice, weave=tasks[best].weave)
     uneven = unevenness_of(front, lattice)
     values = _values(task, toned, lattice, setup, gap, uneven, pixel, behind is not None)
     notes += _notes(task, toned, setup, card is not None)

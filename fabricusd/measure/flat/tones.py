@@ -14,8 +14,8 @@ after a fit is taken as the deviation, of as many squares as are independent (`I
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from scipy.optimize import least_squares
 from fabricusd.fabric import FACETS, Fabric, TangentCurve, Thread, ThreadSet, Weave
 from fabricusd.measure.angles import DEGREE
 from fabricusd.measure.flat import law
-from fabricusd.measure.flat.photograph import Photograph, squares
+from fabricusd.measure.flat.photograph import LUMINANCE, Photograph, squares
 from fabricusd.measure.flat.setup import Setup, turned
 from fabricusd.measure.flat.texture import Texture
 from fabricusd.steps import parts
@@ -247,8 +247,6 @@ class Search:
 
 def contrast_of(picture: Floats) -> tuple[float, Floats]:
     """(contrast of the luminance, (3,) of each channel over it, with sign) of a small picture."""
-    from fabricusd.measure.flat.photograph import LUMINANCE
-
     y = picture @ LUMINANCE
     mean = np.maximum(picture.mean(axis=(0, 1)), 1e-12)
     texture = y / max(float(y.mean()), 1e-12) - 1.0
@@ -257,23 +255,52 @@ def contrast_of(picture: Floats) -> tuple[float, Floats]:
     return math.sqrt(variance), np.asarray(slopes)
 
 
-def fit_tones(task: Task) -> Toned:
-    """Search, balance anew, and search again; see the module."""
-    x, sigma = USUAL.copy(), 0.1
+def fit_faces(tasks: list[Task]) -> tuple[int, Toned]:
+    """(index of the task that the light agrees with best, its fit): a first round for each, and
+    another for the best. Of equals, the first."""
+    tried = []
+    for k in parts("faces", range(len(tasks))):
+        tried.append(_round(tasks[k], *_start(tasks[k])))
+    best = min(range(len(tasks)), key=lambda k: tried[k].cost)
+    return best, fit_tones(tasks[best], tried[best])
+
+
+class Round(NamedTuple):
+    """What a round of the search leaves: its search, parameters, colours, misfit and cost."""
+
+    search: Search
+    x: Floats
+    linear: Floats
+    misfit: float
+    cost: float
+
+
+def _start(task: Task) -> tuple[Floats, Floats, float]:
     linear = np.append(np.zeros(6), math.log(task.gain) if task.gain > 0 else 1.0)
-    for _ in parts("tones", range(ROUNDS)):
-        search = Search(task, x, linear, sigma)
-        inner = 1e-3 * (HIGH - LOW)
-        done = least_squares(
-            search.residuals, np.clip(x, LOW + inner, HIGH - inner), bounds=(LOW, HIGH),
-            x_scale=SPREAD, diff_step=1e-2, max_nfev=STEPS,
-        )  # fmt: skip
-        x, linear = done.x, search.linear
-        made = search.parts(x)
-        squares_left, _ = search.terms(made, linear)
-        misfit = float(np.sqrt(np.mean((squares_left / search.weight) ** 2)))
-        sigma = max(misfit, LEAST)
-    return _toned(search, x, made, misfit)
+    return USUAL.copy(), linear, 0.1
+
+
+def _round(task: Task, x: Floats, linear: Floats, sigma: float) -> Round:
+    """Search about the balance of light of the cloth that x stands for."""
+    search = Search(task, x, linear, sigma)
+    inner = 1e-3 * (HIGH - LOW)
+    done = least_squares(
+        search.residuals, np.clip(x, LOW + inner, HIGH - inner), bounds=(LOW, HIGH),
+        x_scale=SPREAD, diff_step=1e-2, max_nfev=STEPS,
+    )  # fmt: skip
+    made = search.parts(done.x)
+    search.solve(made)
+    left, _ = search.terms(made, search.linear)
+    misfit = float(np.sqrt(np.mean((left / search.weight) ** 2)))
+    return Round(search, done.x, search.linear, misfit, float(done.cost))
+
+
+def fit_tones(task: Task, first: Round | None = None) -> Toned:
+    """Search, balance anew, and search again; see the module. first : a round that was made"""
+    done = first or _round(task, *_start(task))
+    for _ in parts("tones", range(ROUNDS - 1)):
+        done = _round(task, done.x, done.linear, max(done.misfit, LEAST))
+    return _toned(done.search, done.x, done.search.parts(done.x), done.misfit)
 
 
 def _toned(search: Search, x: Floats, made: tuple[Any, ...], misfit: float) -> Toned:
@@ -304,7 +331,7 @@ def _toned(search: Search, x: Floats, made: tuple[Any, ...], misfit: float) -> T
     seen, _ = contrast_of(law.patch_radiance(made[1], albedo, shade))
     fabric = law.white_pair(cloth_of(search.task, x), tuple(albedo[0]), tuple(albedo[1]))
     return Toned(
-        fabric=replace(fabric), x=x, deviations=deviations[:6], albedo=albedo,
+        fabric=fabric, x=x, deviations=deviations[:6], albedo=albedo,
         albedo_deviations=deviations[6:12].reshape(2, 3) * albedo * (1 - albedo),
         gain=math.exp(float(z[6])), gain_deviation=float(deviations[12]), misfit=misfit,
         contrast=seen, through=None if made[2] is None else search.through(made, albedo),

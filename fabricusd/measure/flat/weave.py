@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Weave
 from fabricusd.measure.flat.lattice import Lattice, match, peaks, require_lattice, window_of
@@ -76,10 +78,6 @@ def find_weave(photograph: Photograph, text: str | None) -> tuple[Lattice, tuple
             f"has {finest:.2g} pixels a thread; to tell the weave it must have at least "
             f"{ENOUGH:g}: name the weave with --weave, or photograph from nearer",
         )
-    if best.weave.warp_share != 0.5:
-        notes += (
-            "a spectrum does not tell a weave from its other face: the warp is taken to float",
-        )
     return best, notes
 
 
@@ -94,10 +92,20 @@ def _best(made: list[Lattice]) -> tuple[Lattice, tuple[str, ...]]:
     return best, ()
 
 
+def other_face(weave: Weave) -> Weave:
+    """The weave with the other set on top, of which a spectrum knows nothing: the light tells."""
+    words = weave.name.split()
+    name = f"{weave.name}, other face"
+    if words[:1] == ["twill"] and len(words) > 1:
+        runs = words[1].split("/")
+        name = " ".join([words[0], "/".join([*runs[1:], runs[0]]), *words[2:]])
+    elif words[:1] == ["satin"]:
+        name = " ".join(words[:-1]) if words[-1] == "weft" else f"{weave.name} weft"
+    return Weave(~weave.cells, name)
+
+
 def stated(weave: Weave, pitch: tuple[float, float]) -> Lattice:
     """A lattice of pitches that are given, along the picture's axes."""
-    import numpy as np
-
     return Lattice(
         weave=weave, frequencies=np.diag([1 / pitch[0], 1 / pitch[1]]), score=0.0, explained=0.0,
         deviation=0.0,
