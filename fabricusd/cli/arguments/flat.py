@@ -1,4 +1,4 @@
-"""The options of a fit of photographs of cloth, flat or on cylinders, and what is done with them."""
+"""The options of a fit of photographs of flat cloth, and what is done with them."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ VIEW_ANGLE = 53.0
 def add_flat(parser: argparse.ArgumentParser) -> None:
     """How flat cloth was photographed."""
     flat = parser.add_argument_group(
-        "flat cloth, with --flat; lengths are heights of the camera above the cloth, x is right and "
-        "y up in the picture, z towards the camera, 0 in the middle of the cloth"
+        "flat cloth, with --flat; lengths are heights of the camera above the cloth, x is right "
+        "and y up in the picture, z towards the camera, 0 in the middle of the cloth"
     )
     flat.add_argument(
         "--weave",
         metavar="WEAVE",
-        help="the weave, as in 'new'; a twill without S or Z, and a satin without step, leave these "
-        "open (default: found out, which takes 6 pixels a thread)",
+        help="the weave, as in 'new'; a twill without S or Z, and a satin without step, leave "
+        "these open (default: found out, which takes 6 pixels a thread)",
     )
     flat.add_argument(
         "--pitch",
@@ -136,10 +136,17 @@ def _write(flat: Flat, options: argparse.Namespace) -> None:
     from pathlib import Path
 
     from fabricusd.files import write_json
-    from fabricusd.measure.flat.layer import save_flat
+    from fabricusd.measure.estimates_file import save_measured
 
     if options.output is not None:
-        save_flat(flat, options.output, clobber=not options.no_clobber)
+        save_measured(
+            flat.fabric,
+            {v.label: (v.value, v.low, v.high, v.unit, v.source) for v in flat.values},
+            options.output,
+            photograph=", ".join(options.flat),
+            notes=flat.notes,
+            clobber=not options.no_clobber,
+        )
     if options.report is not None:
         write_json(Path(options.report), flat.as_json())
     if options.page is not None:

@@ -6,28 +6,35 @@ light jump when a search changes that width.
 
 from __future__ import annotations
 
-
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.laws import law_of
-from fabricusd.appearance.published.tables import has_cell_lobes, surface_tables
+from fabricusd.appearance.published.tables import has_cell_lobes
+from fabricusd.appearance.scattering.columns import LAW
+from fabricusd.appearance.scattering.model import PUBLISHED
+from fabricusd.appearance.scattering.table import pack_threads
+from fabricusd.appearance.shadow.mean import node_groups
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
 from fabricusd.appearance.surface import far_all
-from fabricusd.appearance.weave.quadrature import CELLS, POINTS, Rule
+from fabricusd.appearance.weave.coverage import coverage as cover
+from fabricusd.appearance.weave.quadrature import CELLS, POINTS, Rule, curve_nodes
 from fabricusd.errors import FabricError
 from fabricusd.fabric import CONSERVING_MODEL, Fabric, TangentCurve, even
 from fabricusd.measure.angles import DEGREE
 
 Floats = NDArray[np.float64]
+Made = TypeVar("Made")
 
 SPACING = 2.5 * DEGREE
 PROBE = 1e-3
 """Albedo of the probes: too dark for the law that divides by what is brighter than white."""
+KEPT = 8
+"""Shadows that are kept: those of a point and of the steps of a derivative."""
 STEEPEST = 1.45
 """Largest tangent angle of a curve that is scaled [rad]."""
 
@@ -130,6 +137,21 @@ def require_template(fabric: Fabric, source: str) -> Fabric:
     return even(replace(fabric, back=None))
 
 
+def _shape(fabric: Fabric) -> Any:
+    """What shadows and a law's own tables depend on."""
+    curves = tuple(t.curve for t in fabric.thread_list)
+    return curves, fabric.warp.coverage, fabric.weft.coverage
+
+
+def _kept(kept: dict[Any, Made], key: Any, make: Callable[[], Made]) -> Made:
+    """The value of `key`, made if it is not kept; the oldest of more than KEPT goes."""
+    if key not in kept:
+        if len(kept) >= KEPT:
+            kept.pop(next(iter(kept)))
+        kept[key] = make()
+    return kept[key]
+
+
 class Model:
     """Columns of a template for pairs of directions. wi, wo : (n, 3) in the cloth's frame"""
 
@@ -138,17 +160,27 @@ class Model:
         self.wi, self.wo = (np.ascontiguousarray(w.T) for w in (wi, wo))
         form = CELLS if has_cell_lobes(template) else POINTS
         self.rule = Rule(form, SPACING if form == CELLS else 0.5)
-        self.shadowed = law_of(template).absolute
-        self._shadow: tuple[Any, Shadow] | None = None
+        self.law = law_of(template)
+        self.held: Shadow | None = None
+        self._shadows: dict[Any, Shadow] = {}
+        self._shapes: dict[Any, dict[str, Any]] = {}
+
+    def hold(self, fabric: Fabric | None) -> None:
+        """Keep the shadow of one cloth for all others, whose curves differ little; None: of each
+        its own, which takes a third of a second."""
+        self.held = None if fabric is None else self._shadow_of(fabric)
 
     def _shadow_of(self, fabric: Fabric) -> Shadow | None:
-        """The shadow of a cloth, which its curves and coverage make."""
-        if not self.shadowed:
+        """The shadow of a cloth, which its curves and coverage make; None under a law that masks
+        instead."""
+        if not self.law.absolute:
             return None
-        key = tuple(t.curve for t in fabric.thread_list), fabric.warp.coverage, fabric.weft.coverage
-        if self._shadow is None or self._shadow[0] != key:
-            self._shadow = key, compile_shadow(fabric, "horizon", precision=np.float64)
-        return self._shadow[1]
+        if self.held is not None:
+            return self.held
+        return _kept(
+            self._shadows, _shape(fabric),
+            lambda: compile_shadow(fabric, "horizon", precision=np.float64),
+        )  # fmt: skip
 
     def columns(self, names: Sequence[Number], x: Floats) -> tuple[Floats, Floats]:
         """((n,) surface, (n, k) volume per unit of A of the k threads that are worn)."""
@@ -158,7 +190,7 @@ class Model:
         # Three channels tell the surface and two threads at a time.
         for first in range(0, len(which), 2):
             two = which[first : first + 2]
-            albedo: dict[int, tuple[float, ...]] = {k: (0.0, 0.0, 0.0) for k in which}
+            albedo: dict[int, tuple[float, ...]] = dict.fromkeys(which, (0.0, 0.0, 0.0))
             albedo |= {k: (0.0, *(PROBE * (k == j) for j in (two[0], two[-1]))) for k in two}
             fabric = fabric_of(self.template, names, x, albedo)
             out = self._far(fabric)
@@ -168,12 +200,29 @@ class Model:
         return surface, volume
 
     def _far(self, fabric: Fabric) -> Floats:
-        tables = surface_tables(
-            fabric, precision=np.float64, rule=self.rule, shadow=self._shadow_of(fabric)
-        )
+        """(3, n) of the law at level `far`, but for what keeps it from being brighter than white:
+        that takes seconds, and begins at views that are left out."""
+        precision = np.float64
+        q = curve_nodes(fabric, self.rule)
+        threads = pack_threads(fabric, precision)
+
+        def shape() -> dict[str, Any]:
+            shadow = self._shadow_of(fabric)
+            groups = None if shadow is None else node_groups(shadow, q, fabric)
+            held = None if shadow is None or groups is None else (groups, float(shadow.softness))
+            return dict(self.law.make(fabric, held, precision))
+
+        # What a law makes of the shape does not depend on the threads' lobes, if its nodes do not.
+        key = _shape(fabric), id(self.held), self.rule, q.psi0.tobytes()
+        made = _kept(self._shapes, key, shape)
+        nodes = np.stack((np.cos(q.psi0), np.sin(q.psi0), q.weight, q.half), axis=1)
+        tables = self.law.tables(
+            threads=threads, nodes=np.ascontiguousarray(nodes), node_thread=q.thread,
+            published=(threads[q.thread, LAW] == PUBLISHED).astype(np.uint8),
+            warp_start=q.warp_start, gap=precision(cover(fabric).gap),
+            **made,
+        )  # fmt: skip
         out = np.zeros_like(self.wi)
-        real: Any = np.float64
+        real: Any = precision
         far_all(real, tables, self.wi, self.wo, out)
         return out
-
-

@@ -82,7 +82,9 @@ def profile(
     pixels = stand.project(at.reshape(-1, 3), picture.shape[:2])
     h, w = picture.shape[:2]
     if pixels.min() < 0.5 or pixels[:, 0].max() > w - 0.5 or pixels[:, 1].max() > h - 0.5:
-        raise FabricError(f"'{path}'", f"does not show all of '{cylinder.name}': is it the setup's?")
+        raise FabricError(
+            f"'{path}'", f"does not show all of '{cylinder.name}': is it the setup's?"
+        )
     rows = np.stack([
         map_coordinates(picture[..., c], [pixels[:, 1] - 0.5, pixels[:, 0] - 0.5], order=1)
         for c in range(3)
@@ -91,7 +93,9 @@ def profile(
     noise = rows.std(axis=0) / math.sqrt(LINES)
     # The spread of few lines is itself noisy: smoothed along the wrap it is not.
     kernel = np.ones(9) / 9
-    noise = np.stack([np.convolve(np.pad(noise[:, c], 4, "edge"), kernel, "valid") for c in range(3)], axis=1)
+    noise = np.stack(
+        [np.convolve(np.pad(noise[:, c], 4, "edge"), kernel, "valid") for c in range(3)], axis=1
+    )
     sigma = np.sqrt(noise**2 + (RELATIVE * mean) ** 2 + (FLOOR * mean.max()) ** 2)
     good = (wi[:, 2] > LOWEST_LIGHT) & (wo[:, 2] > LOWEST_VIEW)
     if np.count_nonzero(good) < 12:

@@ -1,4 +1,4 @@
-"""Where cylinders of cloth, camera and light stand: a JSON file, checked before a photograph is read.
+"""Where cylinders of cloth, camera and light stand: a JSON file, checked before anything is done.
 
 World space is right-handed with y up. Cylinders stand upright. Lengths have one unit, whichever.
 """
@@ -114,7 +114,9 @@ def read_stand(path: str | os.PathLike[str], photographs: int) -> Stand:
     stand = Stand(
         eye=_vector(camera.get("position"), "camera position", where),
         target=_vector(camera.get("target"), "camera target", where),
-        view_angle=math.radians(_number(camera.get("view_angle"), "camera view_angle", where, 1, 150)),
+        view_angle=math.radians(
+            _number(camera.get("view_angle"), "camera view_angle", where, 1, 150)
+        ),
         lights=tuple(_unit(v, where) for v in (lights * photographs)[:photographs]),
         cylinders=tuple(cylinders),
         irradiance=_number(light.get("irradiance", 0.0), "light irradiance", where, 0, 1e12),
@@ -143,7 +145,8 @@ def _cylinder(entry: Any, k: int, where: str) -> Cylinder:
     if use not in (FIT, PREDICT):
         raise FabricError(where, f"cylinder {k} use is {use!r}; it must be '{FIT}' or '{PREDICT}'")
     made = Cylinder(
-        name=str(entry.get("name", f"cylinder {k}")), x=get("x", -1e9, 1e9), z=get("z", -1e9, 1e9, 0.0),
+        name=str(entry.get("name", f"cylinder {k}")), x=get("x", -1e9, 1e9),
+        z=get("z", -1e9, 1e9, 0.0),
         radius=get("radius", 1e-9, 1e9), bottom=get("bottom", -1e9, 1e9), top=get("top", -1e9, 1e9),
         angle=math.radians(get("angle", -360, 360)), use=use,
     )  # fmt: skip
@@ -157,7 +160,9 @@ def _cylinder(entry: Any, k: int, where: str) -> Cylinder:
 def _number(value: Any, what: str, where: str, low: float, high: float) -> float:
     good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     if not (good and low <= value <= high):
-        raise FabricError(where, f"{what} is {value!r}; it must be a number from {low:g} to {high:g}")
+        raise FabricError(
+            where, f"{what} is {value!r}; it must be a number from {low:g} to {high:g}"
+        )
     return float(value)
 
 

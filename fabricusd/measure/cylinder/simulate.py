@@ -15,6 +15,7 @@ from fabricusd.scene.scene import (
     Camera,
     FabricSurface,
     Light,
+    Material,
     Mesh,
     PreviewSurface,
     Scene,
@@ -40,7 +41,7 @@ def three_wraps(distance: float = 0.3) -> Stand:
     wraps = (("Upright", -1, 0.0, FIT), ("Round", 0, 90.0, FIT), ("Bias", 1, 45.0, PREDICT))
     return Stand(
         eye=(0.0, 0.15, 2.1), target=(0.0, 0.15, 0.0),
-        view_angle=2 * math.atan(max(0.25714, 0.9 * distance / 2.1 + 0.02)), lights=(light,), irradiance=math.pi,
+        view_angle=2 * math.atan((distance + 0.24) / 2.1), lights=(light,), irradiance=math.pi,
         cylinders=tuple(
             Cylinder(name=name, x=k * distance, z=0.0, radius=0.11, bottom=0.1, top=0.2,
                      angle=math.radians(angle), use=use)
@@ -51,7 +52,8 @@ def three_wraps(distance: float = 0.3) -> Stand:
 
 def scene_of(fabric: Fabric, stand: Stand, aspect: float, photograph: int = 0) -> Scene:
     """The cylinders wear `fabric`; aspect : width over height of the picture."""
-    meshes, materials = [], []
+    meshes: list[Mesh] = []
+    materials: list[Material] = []
     for k, cylinder in enumerate(stand.cylinders):
         binding = Binding(fabric=fabric, metres_per_uv=1.0, rotation=cylinder.angle)
         materials.append(FabricSurface(name=cylinder.name, binding=binding))
@@ -65,8 +67,9 @@ def scene_of(fabric: Fabric, stand: Stand, aspect: float, photograph: int = 0) -
         frame=looking(towards, np.zeros(3), up),
     )  # fmt: skip
     aperture = 0.036
+    eye, target = np.asarray(stand.eye), np.asarray(stand.target)
     camera = Camera(
-        path="/Cylinders/Camera", frame=looking(np.asarray(stand.eye), np.asarray(stand.target), up),
+        path="/Cylinders/Camera", frame=looking(eye, target, up),
         focal_length=0.5 * aperture / math.tan(0.5 * stand.view_angle),
         aperture=(aperture, aperture / aspect),
     )  # fmt: skip

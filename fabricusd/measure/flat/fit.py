@@ -59,7 +59,8 @@ class Value:
 
     def __str__(self) -> str:
         unit = f" {self.unit}" if self.unit else ""
-        return f"{self.label} {self.value:.4g}{unit} ({self.low:.4g} to {self.high:.4g}, {self.source})"
+        interval = f"{self.low:.4g} to {self.high:.4g}"
+        return f"{self.label} {self.value:.4g}{unit} ({interval}, {self.source})"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -174,7 +175,8 @@ def _dressed(made: Flat, uneven: tuple[Unevenness, Unevenness], pixel: float) ->
         own = [str(v) for v in made.values if v.label.startswith(name.lower())]
         shade = min(found.shade, 1.0) if found.low > 0 else 0.0
         threads[name] = replace(
-            thread, unevenness_shade=shade, unevenness_length=found.length * pixel if shade else 0.0,
+            thread, unevenness_shade=shade,
+            unevenness_length=found.length * pixel if shade else 0.0,
             documentation="\n".join(own),
         )  # fmt: skip
     sources = f"'{made.front.name}'" + (f" and '{made.behind.name}'" if made.behind else "")
@@ -189,13 +191,14 @@ def _values(
     """Every number of the fabric, and of the lamp."""
     found = []
     source = "spectrum" if lattice.score else "stated"
-    for name, p in zip(("warp", "weft"), lattice.pitch, strict=True):
+    for name, pitch in zip(("warp", "weft"), lattice.pitch, strict=True):
         half = SIGMAS * lattice.deviation
         found.append(
-            Value(label=f"{name} pitch", value=p, low=p * (1 - half), high=p * (1 + half),
+            Value(label=f"{name} pitch", value=pitch, low=pitch * (1 - half),
+                  high=pitch * (1 + half),
                   unit="pixels", source=source)
         )  # fmt: skip
-        density = 0.01 / (p * pixel)
+        density = 0.01 / (pitch * pixel)
         found.append(
             Value(label=f"{name} density", value=density, low=density * (1 - half),
                   high=density * (1 + half), unit="per cm",
@@ -216,9 +219,7 @@ def _values(
                 Value(label=f"{name} A {channel}", value=at, low=max(at - half, 0.0),
                       high=min(at + half, 1.0))
             )  # fmt: skip
-        found.append(
-            Value(label=f"{name} eta", value=IOR, low=1.46, high=1.6, source="assumed")
-        )
+        found.append(Value(label=f"{name} eta", value=IOR, low=1.46, high=1.6, source="assumed"))
         u = uneven[j]
         found.append(
             Value(label=f"{name} unevenness of shade", value=u.shade, low=u.low, high=u.high,

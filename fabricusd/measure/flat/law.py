@@ -11,6 +11,7 @@ neighbours in a search, which then runs again with tables of its own.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -70,10 +71,10 @@ class Shades:
         return np.asarray(alpha**2 * p / (1.0 - alpha * (1.0 - p)))
 
 
-def white_pair(fabric: Fabric, warp: tuple[float, ...], weft: tuple[float, ...]) -> Fabric:
+def white_pair(fabric: Fabric, warp: Sequence[float], weft: Sequence[float]) -> Fabric:
     """`fabric` with other albedos of its threads "Warp" and "Weft"."""
     threads = {
-        name: replace(fabric.threads[name], albedo=albedo)
+        name: replace(fabric.threads[name], albedo=(albedo[0], albedo[1], albedo[2]))
         for name, albedo in zip(NAMES, (warp, weft), strict=True)
     }
     return replace(fabric, threads=threads)
@@ -197,7 +198,7 @@ def patch(
         smooth = gaussian_filter(
             values.reshape(PATCH * FINE, PATCH * FINE), BLUR * FINE, mode="wrap"
         )
-        return smooth.reshape(PATCH, FINE, PATCH, FINE).mean(axis=(1, 3))
+        return np.asarray(smooth.reshape(PATCH, FINE, PATCH, FINE).mean(axis=(1, 3)))
 
     once, rest = found
     return Patch(
