@@ -44,8 +44,9 @@ def carded(
     photograph: Photograph, card: Photograph, setup: Setup, reflectance: float, gain: float
 ) -> Photograph:
     """The photograph as a white lamp of `gain` at its stated place would have lit it."""
+    # Both are smoothed alike, so that their gradients cancel, at the border too.
     seen = np.stack([gaussian_filter(card.linear[..., c], SMOOTH) for c in range(3)], axis=-1)
-    wanted = gain * _expected(card, setup, reflectance)
+    wanted = gaussian_filter(gain * _expected(card, setup, reflectance), SMOOTH)
     return Photograph(
         name=photograph.name,
         linear=photograph.linear * wanted[..., None] / np.maximum(seen, 1e-4),

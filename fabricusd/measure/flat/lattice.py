@@ -34,6 +34,8 @@ FINEST = 1.05
 """Pixels a thread below which no match is tried."""
 NEAR = 1.3
 """Distance, in the window's frequency steps, within which a peak is explained."""
+REACH = 2
+"""Cycles per thread up to which a peak may be an edge's."""
 RATIO = 3.2
 """Most that one pitch is over the other."""
 
@@ -210,10 +212,13 @@ def _crooked(made: Floats) -> float:
 
 
 def lattice_points(waves: Floats) -> Floats:
-    """(k, 2) all sums of two of the waves and their opposites, without repeats."""
-    signed = np.concatenate((waves, -waves, np.zeros((1, 2))))
-    sums = (signed[:, None] + signed[None]).reshape(-1, 2)
-    return np.unique(np.round(sums, 9), axis=0)
+    """(k, 2) the waves and their opposites, and all that differ from them by whole cycles per
+    thread, which the edges of threads make."""
+    signed = np.concatenate((waves, -waves))
+    base = np.unique(np.round(signed - np.floor(np.round(signed, 9)), 9), axis=0)
+    whole = np.arange(-REACH - 1, REACH + 1)
+    shifts = np.stack(np.meshgrid(whole, whole), axis=-1).reshape(-1, 2)
+    return np.unique(np.round((base[:, None] + shifts[None]).reshape(-1, 2), 9), axis=0)
 
 
 def _score(

@@ -99,8 +99,8 @@ def texture_of(photograph: Photograph, lattice: Lattice) -> Texture:
 def unevenness_of(photograph: Photograph, lattice: Lattice) -> tuple[Unevenness, Unevenness]:
     """(warp, weft): what is left without the weave, by its autocorrelation along the threads.
 
-    Grain of the camera correlates with no neighbour; blotches correlate alike in all directions,
-    which the autocorrelation at 45 degrees tells.
+    From one thread to the next on, grain of the camera correlates with no neighbour; blotches
+    correlate alike in all directions, which the autocorrelation aslant tells.
     """
     planes = _middle(photograph)
     n = planes.shape[-1]
@@ -108,13 +108,13 @@ def unevenness_of(photograph: Photograph, lattice: Lattice) -> tuple[Unevenness,
     waves[near_lattice(lattice, n)] = 0.0
     waves[0, 0] = 0.0
     covariance = np.fft.ifft2(np.abs(waves) ** 2).real / n**2
-    lag = np.arange(2, n // 8)
-    slant = np.round(lag / np.sqrt(2)).astype(int)
-    around = 0.5 * (covariance[slant, slant] + covariance[slant, -slant])
+    nearest = max(int(np.ceil(max(lattice.pitch))), 2)
+    lag = np.arange(nearest, max(n // 8, nearest + 4))
+    around = 0.5 * (covariance[lag, lag] + covariance[lag, -lag])
     found = []
     for along in (covariance[lag, 0], covariance[0, lag]):
         own = along - around
-        at = max(float(own[:2].mean()), 0.0)
+        at = max(float(own[0]), 0.0)
         fallen = np.flatnonzero(own < at / np.e)
         length = float(lag[fallen[0]]) if fallen.size and at > 0 else float(lag[-1])
         # Bartlett: independent pieces of the picture number as many as its area over the length.
