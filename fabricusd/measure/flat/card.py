@@ -14,8 +14,8 @@ from fabricusd.measure.flat.setup import Setup
 
 Floats = NDArray[np.float64]
 
-SMOOTH = 24
-"""Pixels over which grain of the card is smoothed."""
+SMOOTH = 1 / 64
+"""Share of a picture's side over which grain of the card is smoothed."""
 
 
 def _expected(card: Photograph, setup: Setup, reflectance: float) -> Floats:
@@ -44,9 +44,10 @@ def carded(
     photograph: Photograph, card: Photograph, setup: Setup, reflectance: float, gain: float
 ) -> Photograph:
     """The photograph as a white lamp of `gain` at its stated place would have lit it."""
+    reach = SMOOTH * min(card.shape)
     # Both are smoothed alike, so that their gradients cancel, at the border too.
-    seen = np.stack([gaussian_filter(card.linear[..., c], SMOOTH) for c in range(3)], axis=-1)
-    wanted = gaussian_filter(gain * _expected(card, setup, reflectance), SMOOTH)
+    seen = np.stack([gaussian_filter(card.linear[..., c], reach) for c in range(3)], axis=-1)
+    wanted = gaussian_filter(gain * _expected(card, setup, reflectance), reach)
     return Photograph(
         name=photograph.name,
         linear=photograph.linear * wanted[..., None] / np.maximum(seen, 1e-4),

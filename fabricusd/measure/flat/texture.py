@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 REACH = 0.016
 """Distance from a point of the lattice, in cycles per pixel, that is still the weave's: cloth is
 never quite regular."""
+SEEN = 0.05
+"""Share of the cloth below which a pair of places along threads tells nothing of them."""
 DARK = 0.004
 """Mean of a channel below which its texture is rounding."""
 
@@ -46,35 +48,38 @@ class Unevenness:
     length: float
 
 
-def _middle(photograph: Photograph) -> Floats:
-    """(3 + 1, n, n) relative texture of the channels and of the luminance, row 0 at negative y."""
+def _middle(photograph: Photograph, share: int) -> Floats:
+    """(3 + 1, n, n) relative texture of the channels and of the luminance, row 0 at negative y.
+
+    share : of the side of this square, over which light is taken to be even
+    """
     n = window_of(photograph)
     rows, columns = photograph.shape
     top, left = (rows - n) // 2, (columns - n) // 2
     planes = [photograph.linear[..., c] for c in range(3)] + [photograph.linear @ LUMINANCE]
     found = [
-        (p / np.maximum(gaussian_filter(p, n / 32), 1e-5) - 1.0)[top : top + n, left : left + n]
+        (p / np.maximum(gaussian_filter(p, n / share), 1e-5) - 1.0)[top : top + n, left : left + n]
         for p in planes
     ]
     return np.stack(found)[:, ::-1]
 
 
-def near_lattice(lattice: Lattice, n: int) -> NDArray[np.bool_]:
-    """(n, n) which frequencies of an FFT are the weave's."""
+def near_lattice(lattice: Lattice, n: int, reach: float = REACH) -> NDArray[np.bool_]:
+    """(n, n) which frequencies of an FFT are the weave's, up to `reach` beside the lattice."""
     f = np.fft.fftfreq(n)
     u, v = np.meshgrid(f, f)
     points = lattice_points(waves_of(lattice.weave)[0]) @ lattice.frequencies.T
-    points = points[(np.abs(points).max(axis=1) < 0.5 + REACH) & (np.abs(points).max(axis=1) > 0)]
+    points = points[(np.abs(points).max(axis=1) < 0.5 + reach) & (np.abs(points).max(axis=1) > 0)]
     found = np.zeros((n, n), bool)
     for x, y in points:
-        found |= (u - x) ** 2 + (v - y) ** 2 < REACH**2
+        found |= (u - x) ** 2 + (v - y) ** 2 < reach**2
     found[np.hypot(u, v) < 2 / 40] = False
     return found
 
 
 def texture_of(photograph: Photograph, lattice: Lattice) -> Texture:
     """How strong the weave is."""
-    planes = _middle(photograph)
+    planes = _middle(photograph, 32)
     n = planes.shape[-1]
     mask = near_lattice(lattice, n)
     w = np.hanning(n + 1)[:n]
@@ -102,23 +107,34 @@ def unevenness_of(photograph: Photograph, lattice: Lattice) -> tuple[Unevenness,
     From one thread to the next on, grain of the camera correlates with no neighbour; blotches
     correlate alike in all directions, which the autocorrelation aslant tells.
     """
-    planes = _middle(photograph)
+    planes = _middle(photograph, 8)
     n = planes.shape[-1]
     waves = np.fft.fft2(planes[3])
-    waves[near_lattice(lattice, n)] = 0.0
+    # Uneven threads have their power beside the lattice: only what repeats is taken out.
+    waves[near_lattice(lattice, n, 2.5 / n)] = 0.0
     waves[0, 0] = 0.0
     covariance = np.fft.ifft2(np.abs(waves) ** 2).real / n**2
     nearest = max(int(np.ceil(max(lattice.pitch))), 2)
     lag = np.arange(nearest, max(n // 8, nearest + 4))
     around = 0.5 * (covariance[lag, lag] + covariance[lag, -lag])
     found = []
-    for along in (covariance[lag, 0], covariance[0, lag]):
-        own = along - around
+    cells = lattice.weave.cells.astype(float)
+    for along, seen, pitch in (
+        (covariance[lag, 0], cells, lattice.pitch[1]),
+        (covariance[0, lag], 1.0 - cells.T, lattice.pitch[0]),
+    ):
+        both = _both_seen(seen, lag / pitch)
+        some = both > SEEN
+        if not some.any():
+            found.append(Unevenness(shade=0.0, low=0.0, high=1.0, length=float(lag[-1])))
+            continue
+        own = (along - around)[some] / both[some]
         at = max(float(own[0]), 0.0)
         fallen = np.flatnonzero(own < at / np.e)
-        length = float(lag[fallen[0]]) if fallen.size and at > 0 else float(lag[-1])
+        length = float(lag[some][fallen[0]]) if fallen.size and at > 0 else float(lag[-1])
         # Bartlett: independent pieces of the picture number as many as its area over the length.
         error = 1.96 * float(covariance[0, 0]) * np.sqrt(2.0 * max(length, 1.0)) / n
+        error /= float(both[some][0])
         found.append(
             Unevenness(
                 shade=float(np.sqrt(at)), low=float(np.sqrt(max(at - error, 0.0))),
@@ -126,6 +142,16 @@ def unevenness_of(photograph: Photograph, lattice: Lattice) -> tuple[Unevenness,
             )
         )  # fmt: skip
     return found[0], found[1]
+
+
+def _both_seen(seen: Floats, steps: Floats) -> Floats:
+    """(n,) share of the cloth where a thread is on top both here and so many cells along it.
+
+    seen : (threads, cells along) 1 where it is on top
+    """
+    count = seen.shape[1]
+    whole = np.array([(seen * np.roll(seen, -k, axis=1)).mean() for k in range(count + 1)])
+    return np.asarray(np.interp(steps % count, np.arange(count + 1), whole))
 
 
 def gap_of(through: Photograph) -> tuple[float, float, float]:
