@@ -20,8 +20,11 @@ Floats = NDArray[np.float64]
 REACH = 0.016
 """Distance from a point of the lattice, in cycles per pixel, that is still the weave's: cloth is
 never quite regular."""
-SEEN = 0.05
+SEEN = 0.15
 """Share of the cloth below which a pair of places along threads tells nothing of them."""
+METHOD = 0.3
+"""What the estimate itself may be off by: drifting weave is not wholly taken out, and part of the
+unevenness is."""
 DARK = 0.004
 """Mean of a channel below which its texture is rounding."""
 
@@ -110,8 +113,12 @@ def unevenness_of(photograph: Photograph, lattice: Lattice) -> tuple[Unevenness,
     planes = _middle(photograph, 8)
     n = planes.shape[-1]
     waves = np.fft.fft2(planes[3])
-    # Uneven threads have their power beside the lattice: only what repeats is taken out.
-    waves[near_lattice(lattice, n, 2.5 / n)] = 0.0
+    # Uneven threads have their power beside the lattice too: where its points are close, less of
+    # what drifts is taken out.
+    points = lattice_points(waves_of(lattice.weave)[0]) @ lattice.frequencies.T
+    lengths = np.linalg.norm(points, axis=1)
+    closest = float(lengths[lengths > 1e-6].min())
+    waves[near_lattice(lattice, n, min(REACH, closest / 8))] = 0.0
     waves[0, 0] = 0.0
     covariance = np.fft.ifft2(np.abs(waves) ** 2).real / n**2
     nearest = max(int(np.ceil(max(lattice.pitch))), 2)
@@ -137,8 +144,8 @@ def unevenness_of(photograph: Photograph, lattice: Lattice) -> tuple[Unevenness,
         error /= float(both[some][0])
         found.append(
             Unevenness(
-                shade=float(np.sqrt(at)), low=float(np.sqrt(max(at - error, 0.0))),
-                high=float(np.sqrt(at + error)), length=length,
+                shade=float(np.sqrt(at)), low=(1 - METHOD) * float(np.sqrt(max(at - error, 0.0))),
+                high=(1 + METHOD) * float(np.sqrt(at + error)), length=length,
             )
         )  # fmt: skip
     return found[0], found[1]
