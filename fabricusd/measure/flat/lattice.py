@@ -21,6 +21,8 @@ from fabricusd.measure.flat.photograph import Photograph, relative
 Floats = NDArray[np.float64]
 
 PEAKS = 10
+LEADING = 3
+"""Brightest peaks of which one must be the weave's; a fold may be brighter."""
 CLEAR = 8.0
 """Power over the mean at its distance from 0 from which a peak counts."""
 COARSEST = 1 / 40
@@ -164,28 +166,27 @@ def match(weave: Weave, found: list[Peak], window: int) -> Lattice | None:
     weight = weight * np.array([peak.amplitude for peak in found]) / found[0].amplitude
     best: Lattice | None = None
     signed = np.concatenate((waves, -waves))
-    strength = np.concatenate((power, power)) / power.max()
-    for b in range(1, len(found)):
-        k = np.stack((frequency[0], frequency[b]), axis=1)
+    strength = np.log(np.concatenate((power, power)) / power.max())
+    first = range(min(LEADING, len(found)))
+    for a, b in [(a, b) for a in first for b in range(a + 1, len(found))]:
+        k = np.stack((frequency[a], frequency[b]), axis=1)
         if abs(np.linalg.det(k)) < 4 / window**2:
             continue
-        for h in range(len(signed)):
-            for g in range(len(signed)):
-                basis = np.stack((signed[h], signed[g]), axis=1)
-                if abs(np.linalg.det(basis)) < 1e-9:
-                    continue
-                made = k @ np.linalg.inv(basis)
-                if not _upright(made):
-                    continue
-                score, explained = _score(made, waves, frequency, weight, window)
-                # The brightest wave of the picture is likely a bright one of the weave.
-                score += 0.5 * math.log(strength[h]) + 0.1 * math.log(strength[g])
-                score -= _crooked(made)
-                if best is None or score > best.score:
-                    best = Lattice(
-                        weave=weave, frequencies=made, score=score, explained=explained,
-                        deviation=0.25 / window / float(np.linalg.norm(made, axis=0).min()),
-                    )  # fmt: skip
+        for h, g in np.ndindex(len(signed), len(signed)):
+            basis = np.stack((signed[h], signed[g]), axis=1)
+            if abs(np.linalg.det(basis)) < 1e-9:
+                continue
+            made = k @ np.linalg.inv(basis)
+            if not _upright(made):
+                continue
+            score, explained = _score(made, waves, frequency, weight, window)
+            # The brightest wave of the picture is likely a bright one of the weave.
+            score += float(0.5 * strength[h] + 0.1 * strength[g]) - a - _crooked(made)
+            if best is None or score > best.score:
+                best = Lattice(
+                    weave=weave, frequencies=made, score=score, explained=explained,
+                    deviation=0.25 / window / float(np.linalg.norm(made, axis=0).min()),
+                )  # fmt: skip
     return None if best is None else refined(best, found, window)
 
 
