@@ -168,7 +168,7 @@ def match(weave: Weave, found: list[Peak], window: int) -> Lattice | None:
     signed = np.concatenate((waves, -waves))
     strength = np.log(np.concatenate((power, power)) / power.max())
     first = range(min(LEADING, len(found)))
-    for a, b in [(a, b) for a in first for b in range(a + 1, len(found))]:
+    for a, b in [(i, j) for i in first for j in range(i + 1, len(found))]:
         k = np.stack((frequency[a], frequency[b]), axis=1)
         if abs(np.linalg.det(k)) < 4 / window**2:
             continue
