@@ -4,9 +4,9 @@
 
 The path tracer photographs wraps of warp upright, warp around and bias under one distant light,
 without light from cylinder to cylinder; noise of 1 % and .3 % of the brightest is put on the
-profiles that are fitted. Lobes, colours and the scales of the curves are fitted to the first two; weave, coverage
-and light are known. `--neighbours` instead photographs a white-ish cloth on near cylinders with
-light between them, and prints what the fit says of it.
+profiles that are fitted. Lobes, colours and the scales of the curves are fitted to the first two;
+weave, coverage and light are known. `--neighbours` instead photographs a pale cloth on near
+cylinders with light between them, and prints what the fit says of it.
 """
 
 from __future__ import annotations

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from fabricusd.errors import FabricError
 from fabricusd.fabric import FACETS, Fabric, TangentCurve, Thread, ThreadSet, Weave
 from fabricusd.measure.angles import DEGREE
 from fabricusd.measure.flat import law
@@ -38,6 +39,8 @@ WIDER = 2.0
 """The volume lobe's width over the surface lobe's, [Sadeghi2013] Table II."""
 SQUARES = 24
 """Squares along the shorter side of a picture."""
+FEWEST = 60
+"""Squares below which the light across a picture says too little."""
 INDEPENDENT = 60
 SLACK = 0.01
 """Added to light, over its mean, before cube roots: a phone's blacks are clipped."""
@@ -134,13 +137,22 @@ class Toned:
 
 
 def light_of(photograph: Photograph, setup: Setup, turn: float, *, behind: bool = False) -> Light:
-    """The squares of a photograph; those in which the lamp itself may be seen are left out."""
+    """The squares of a photograph; those in which the lamp itself may be seen are left out.
+
+    Raises FabricError where too few squares are not saturated.
+    """
     step = max(min(photograph.shape) // SQUARES, 1)
     light, _, good = squares(photograph, step)
     places = setup.places(photograph.shape, step)
     wi, wo, square = setup.pairs(places, behind=behind)
     if behind:
         good = good & ((wi * wo).sum(axis=1) > -math.cos(8 * DEGREE))
+    if np.count_nonzero(good) < FEWEST:
+        raise FabricError(
+            f"'{photograph.name}'",
+            f"has {np.count_nonzero(good)} of {good.size} squares without saturated pixels; there "
+            f"must be at least {FEWEST}: expose for the cloth",
+        )
     return Light(
         pairs=(turned(wi, turn)[good], turned(wo, turn)[good]), square=square[good],
         light=light[good],

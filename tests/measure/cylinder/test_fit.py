@@ -51,7 +51,9 @@ def wraps(template, noise=1.0, stray=0.0):
     return made
 
 
-@pytest.mark.parametrize("law", SURFACE_LAWS[:3])
+@pytest.mark.parametrize(
+    "law", [MASKED, *(pytest.param(law, marks=pytest.mark.slow) for law in SURFACE_LAWS[1:3])]
+)
 def test_columns_add_up_to_the_law(law):
     template = template_of("silk_shot", law)
     names = numbers(template, coverage=False)

@@ -20,6 +20,7 @@ from fabricusd.measure.flat.page import page_text
 from fabricusd.measure.flat.photograph import Photograph, read_photograph
 from fabricusd.measure.flat.scene import photograph_of, scene_of
 from fabricusd.measure.flat.setup import Setup
+from fabricusd.measure.flat.tones import light_of, through_color
 from fabricusd.weaves import parse_weave
 
 SETUP = Setup(light=(0.0, 1.0, 1.0), back_light=(0.0, 0.0, -1.125), view_angle=53.0)
@@ -120,6 +121,22 @@ def test_a_second_photograph_needs_its_lamp():
     one = Photograph(name="a.png", linear=np.full((128, 128, 3), 0.3))
     with pytest.raises(FabricError, match=r"--back-light is missing"):
         fit_flat(one, one, replace(SETUP, back_light=None), weave="plain")
+
+
+def test_a_photograph_that_is_saturated_nearly_everywhere_is_refused():
+    linear = np.full((240, 240, 3), 0.3)
+    linear[::4, ::4] = 1.0
+    with pytest.raises(FabricError, match=r"0 of 576 squares without saturated pixels"):
+        light_of(Photograph(name="hot.png", linear=linear), SETUP, 0.0)
+
+
+def test_the_colour_that_comes_through_leaves_out_clipped_channels():
+    linear = np.full((240, 240, 3), 0.3) * [1.0, 0.5, 0.0]
+    light = light_of(Photograph(name="red.png", linear=linear), SETUP, 0.0, behind=True)
+    red, green, blue = through_color(light)
+    assert red == pytest.approx(np.log(2.0))
+    assert green == pytest.approx(0.0)
+    assert np.isnan(blue)
 
 
 def test_pitches_belong_to_a_weave():
