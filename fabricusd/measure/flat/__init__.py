@@ -1,0 +1,1 @@
+"""From photographs of flat cloth to the fabric that looks like them."""
