@@ -56,10 +56,10 @@ class Made(Sequence[Any]):
     """A sequence of `count` things, each of which `make` makes when it is asked for."""
 
     def __init__(self, count: int, make: Callable[[int], Any]) -> None:
-        self.count, self.make = count, make
+        self.size, self.make = count, make
 
     def __len__(self) -> int:
-        return self.count
+        return self.size
 
     def __getitem__(self, k: Any) -> Any:
         return self.make(k)
