@@ -90,8 +90,8 @@ def open_cluster(scheduler: str) -> Iterator[Cluster]:
                 count = worker_count(None) if local[1] is None else int(local[1])
                 RANGES["workers"].require("--scheduler local:", count)
                 own = LocalCluster(
-                    n_workers=count, threads_per_worker=1, dashboard_address=None, memory_limit=0,
-                    silence_logs=50,
+                    n_workers=count, threads_per_worker=1, memory_limit=0, silence_logs=50,
+                    host="127.0.0.1", dashboard_address="127.0.0.1:0",
                 )  # fmt: skip
             client = Client(own or scheduler, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError, TypeError, ImportError, KeyError, AttributeError) as error:

@@ -24,9 +24,7 @@ from fabricusd.scene.staging import Staging
 from fabricusd.schema import load
 from fabricusd.stop import Stop
 from tests.reference.scenes import above, grid
-from tests.run.clusters import cluster, kill_a_worker
-
-__all__ = ["cluster"]
+from tests.run.clusters import kill_a_worker
 
 
 def cloth() -> Scene:

@@ -1,22 +1,11 @@
-"""A Dask cluster of two processes of this machine, for all tests that need one."""
+"""Jobs for the cluster of the tests, and the loss of one of its workers."""
 
 from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
 
-import pytest
-
-from fabricusd.run.cluster import Cluster, Kept, open_cluster
-
-
-@pytest.fixture(scope="session")
-def cluster() -> Iterator[Cluster]:
-    """Two worker processes of one thread each."""
-    pytest.importorskip("distributed")
-    with open_cluster("local:2") as found:
-        yield found
+from fabricusd.run.cluster import Cluster, Kept
 
 
 def kill_a_worker(cluster: Cluster) -> int:

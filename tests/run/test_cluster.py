@@ -10,9 +10,7 @@ from fabricusd.errors import FabricError
 from fabricusd.run import cluster as module
 from fabricusd.run.cluster import cluster_or_threads, identity, open_cluster
 from fabricusd.stop import Stop
-from tests.run.clusters import build_once, cluster, double, kill_a_worker
-
-__all__ = ["cluster"]
+from tests.run.clusters import build_once, double, kill_a_worker
 
 
 def test_every_job_is_done_once(cluster):

@@ -14,9 +14,6 @@ from fabricusd.bake.job import Settings
 from fabricusd.fabric import Binding
 from fabricusd.schema import load
 from tests.bake.meshes import write_quad
-from tests.run.clusters import cluster
-
-__all__ = ["cluster"]
 
 SMALL = Settings(
     resolution=512, maps=("base_color", "normal", "thread_id", "height"), file_format="png"
