@@ -110,8 +110,9 @@ def main() -> None:
             per_job = (watched.sent + watched.came) / max(len(watched.jobs), 1)
             print(
                 f"  shared once a worker: {watched.shared / 1e6:.2f} MB; a job moves "
-                f"{per_job / 1e3:.0f} kB and takes {job:.3f} s; an empty job takes {1e3 * trip:.1f} "
-                f"ms: a thousand busy workers would move {1000 * per_job / job / 1e6:.0f} MB/s"
+                f"{per_job / 1e3:.0f} kB and takes {job:.3f} s; an empty job takes "
+                f"{1e3 * trip:.1f} ms: a thousand busy workers would move "
+                f"{1000 * per_job / job / 1e6:.0f} MB/s"
             )
 
 
