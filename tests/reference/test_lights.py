@@ -82,7 +82,8 @@ def test_chances_stay_where_nothing_is_learnt(value):
 
 def test_a_light_behind_a_wall_is_seldom_chosen():
     """Its power would give it nearly all samples; it brings nothing to what the camera sees."""
-    wall = replace(grid(size=4.0), points=grid(size=4.0).points + (0.0, 3.0, 0.0))
+    floor = grid(size=4.0)
+    wall = replace(floor, points=floor.points + np.array([0.0, 3.0, 0.0]))
     lamp = Light(path="hidden", kind=DISTANT, radiance=(100.0,) * 3, frame=looking((0, 5, 0.1)))
     sky = Light(path="sky", kind=RECT, radiance=(5.0,) * 3, frame=looking((1.0, 1.0, 0.0)))
     scene = Scene(

@@ -76,10 +76,12 @@ def share_by_noise(lights: Lights, found: NDArray[np.float32]) -> None:
     """
     seen = np.asarray(found, np.float64)
     mean = seen.mean(axis=2).sum(axis=0)
-    lit = mean > 0.01 * mean.mean()
+    lit = mean > 0
     if not lit.any() or not np.isfinite(seen).all():
         return
-    square = (seen[:, lit] ** 2).mean(axis=2) / mean[lit] ** 2
+    # Of nearly black pixels, noise relative to their own light would count most.
+    floor = 0.01 * float(np.median(mean[lit]))
+    square = (seen[:, lit] ** 2).mean(axis=2) / np.maximum(mean[lit], floor) ** 2
     noise = np.sqrt(square.mean(axis=1))
     # A few paths see little: every light keeps a chance.
     lights.table[:, CHANCE] = 0.8 * noise / noise.sum() + 0.2 / len(noise)
