@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
-from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.weave.footprint import DEFAULT, Limits
 from fabricusd.errors import FabricError
-from fabricusd.reference.lights.row import CHANCE, LUMINANCE
-from fabricusd.reference.lights.table import Lights, build_lights, share_by_noise, share_out
+from fabricusd.reference.lights.table import build_lights, share_out
 from fabricusd.reference.rays.camera import Lens, camera_rays
 from fabricusd.reference.rays.embree import (
     DX,
@@ -32,9 +30,7 @@ from fabricusd.reference.rays.embree import (
 from fabricusd.reference.rays.sobol import new_numbers
 from fabricusd.reference.rays.triangles import Triangles, build_tables
 from fabricusd.reference.rays.wave import (
-    ALPHA,
     BEAUTY_ROWS,
-    DIRECT,
     FAR_LEVEL,
     LANE_BETA,
     LANE_PDF,
@@ -75,13 +71,7 @@ ESTIMATORS = {
     "uniform": arrivals.UNIFORM,
 }
 AIMED = 16
-"""Number of pixels along each side of the picture that find the chances of the lights."""
-TRIED = 8
-"""Paths of each of these pixels, for each light."""
-ELSEWHERE = 1 << 20
-"""Number of the first of those samples: above what pictures use."""
-MOST_TRIED = 64
-"""Most lights that are tried by paths, a few milliseconds each."""
+"""Number of rays along each side of the picture that find the places to be lit."""
 _PLAIN = {
     (False, False): shade_preview, (False, True): shade_mapped,
     (True, False): shade_thin, (True, True): shade_thin_mapped,
@@ -184,40 +174,11 @@ class Tracer:
         self.see_through = bool((self.opacity < 1).any())
 
     def aim(self, lens: Lens, width: int, height: int) -> None:
-        """Set the chance of choosing each light by what it brings to the picture.
-
-        A few paths of its direct light alone are traced for each light, so that shadows and the
-        law's peaks count. Many lights are judged by how brightly they light what the camera sees.
-        """
-        count = len(self.lights.table)
-        if count < 2:
+        """Set the chance of choosing each light by how brightly it lights what the camera sees."""
+        if len(self.lights.table) < 2:
             return
         x, y = (np.arange(AIMED) * size // AIMED for size in (width, height))
-        pixels = np.unique(y[:, None] * width + x).astype(np.int32)
-        if count > MOST_TRIED:
-            share_out(self.lights, self._places(lens, width, pixels))
-            return
-        found = np.stack([self._brings(j, lens, width, pixels) for j in range(count)])
-        share_by_noise(self.lights, found)
-
-    def _brings(
-        self, light: int, lens: Lens, width: int, pixels: NDArray[np.int32]
-    ) -> NDArray[np.float32]:
-        """(pixels, TRIED) luminance of the direct light of one light alone, of each path."""
-        alone = copy(self)
-        table = self.lights.table[light : light + 1].copy()
-        table[:, CHANCE] = 1.0
-        alone.lights = Lights(table, self.lights.dome)
-        alone.settings = self.settings._replace(max_depth=0, max_through=0)
-        wave = Wave(len(pixels) * TRIED, aovs=False)
-        # Samples that the picture does not use: chances that depend on its own would be a bias.
-        alone.trace(wave, lens, width, pixels, ELSEWHERE, TRIED, np.zeros(3, np.int64), np.zeros(1))
-        direct = wave.film[DIRECT : DIRECT + 3, : len(pixels) * TRIED] * wave.film[ALPHA, :
-            len(pixels) * TRIED]  # fmt: skip
-        return np.asarray(LUMINANCE @ direct, np.float32).reshape(len(pixels), TRIED)
-
-    def _places(self, lens: Lens, width: int, pixels: NDArray[np.int32]) -> NDArray[np.float32]:
-        """(n, 3) what the camera sees at `pixels` [m], relative to the scene's centre."""
+        pixels = (y[:, None] * width + x).ravel().astype(np.int32)
         wave = Wave(len(pixels), aovs=False)
         rays = wave.lanes.rays
         camera_rays(
@@ -228,7 +189,7 @@ class Tracer:
         rows = rays.transpose(1, 0, 2).reshape(ROWS, -1)
         ends = rows[OX : OZ + 1] + rows[DX : DZ + 1] * rows[TFAR]
         met = rows.view(np.uint32)[GEOMETRY] != MISS
-        return np.asarray(ends[:, met].T)
+        share_out(self.lights, ends[:, met].T)
 
     def trace(
         self,

@@ -66,27 +66,6 @@ def share_out(lights: Lights, places: NDArray[np.float32]) -> None:
         table[:, CHANCE] = 0.8 * power / power.sum() + 0.2 / len(table)
 
 
-def share_by_noise(lights: Lights, found: NDArray[np.float32]) -> None:
-    """Choose lights with the chances that make relative noise least, if one is chosen at a hit.
-
-    found : (lights, pixels, samples) luminance that each light alone brings to a pixel's samples
-
-    A light that is chosen with chance p brings 1 / p times its light, so the noise of all lights is
-    the sum of their mean squares over p, which is least for p in proportion to the root of these.
-    """
-    seen = np.asarray(found, np.float64)
-    mean = seen.mean(axis=2).sum(axis=0)
-    lit = mean > 0
-    if not lit.any() or not np.isfinite(seen).all():
-        return
-    # Of nearly black pixels, noise relative to their own light would count most.
-    floor = 0.01 * float(np.median(mean[lit]))
-    square = (seen[:, lit] ** 2).mean(axis=2) / np.maximum(mean[lit], floor) ** 2
-    noise = np.sqrt(square.mean(axis=1))
-    # A few paths see little: every light keeps a chance.
-    lights.table[:, CHANCE] = 0.8 * noise / noise.sum() + 0.2 / len(noise)
-
-
 def _row(light: Light, centre: NDArray[np.float64]) -> NDArray[np.float64]:
     row = np.zeros(COLUMNS)
     row[KIND], row[RED : RED + 3] = light.kind, light.radiance
