@@ -68,7 +68,7 @@ def drawn(shown: Shown, shape: str, level: str, size: int, frames: int) -> Pictu
         "document.getElementById('shape').onchange(),"
         f"viewer.resize({size}, {size}), viewer.level = {LEVELS.index(level)}, viewer.frames = 0,"
         f"[...Array({frames})].forEach("
-        "() => viewer.draw(fabricusd.placed(), fabricusd.data.light)),"
+        "() => viewer.draw(fabricusd.placed(), fabricusd.lights())),"
         "viewer.read())"
     ).reshape(size, size, 4)
     shown.rest()

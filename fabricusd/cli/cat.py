@@ -9,7 +9,9 @@ import shutil
 import sys
 from collections.abc import Sequence
 
+from fabricusd.cli.arguments.picture import add_picture, leave_picture, require_picture_name
 from fabricusd.cli.terminal.stdout import can_show, write_utf8
+from fabricusd.errors import FabricError
 
 EPILOG = """FILE is a USD file, FILE:/PRIM, a WIF draft, an image of a weave, or a preset.
 
@@ -29,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     form.add_argument("--flatten", action="store_true", help="print the composed stage as USD text")
     form.add_argument("--wif", action="store_true", help="print the draft as a WIF file")
+    add_picture(parser)
     parser.add_argument("--no-draft", action="store_true", help="do not draw the draft")
     parser.add_argument(
         "--color",
@@ -43,13 +46,17 @@ def run(options: argparse.Namespace) -> int:
     from fabricusd.schema.anysource import load_any
 
     source = f"{options.file}:/{options.prim.lstrip('/')}" if options.prim else options.file
+    require_picture_name(options)
     if options.flatten:
+        if options.picture:
+            raise FabricError("--picture", "is of one fabric; give it without --flatten")
         from fabricusd.schema.source import flattened
 
         write_utf8(flattened(source))
         return 0
     fabric, notes = load_any(source)
     _tell(source, notes, options)
+    leave_picture(fabric, options)
     if options.wif:
         from fabricusd.weaves import from_fabric, wif_text
 

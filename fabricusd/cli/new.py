@@ -13,6 +13,7 @@ from fabricusd.cli.arguments.draft import (
     add_sources,
     given_draft,
 )
+from fabricusd.cli.arguments.picture import add_picture, leave_picture, require_picture_name
 from fabricusd.cli.arguments.thread import named_thread
 from fabricusd.cli.arguments.yarn import add_yarns, settle_densities, spun
 from fabricusd.cli.terminal.stdout import write_utf8
@@ -78,6 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_yarns(parser)
     add_figure(parser)
+    add_picture(parser)
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
     parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
 
@@ -97,11 +99,14 @@ def run(options: argparse.Namespace) -> int:
         )
     if options.output == "-":
         options.output = None
+    require_picture_name(options)
     settle_densities(options)
     fabric, notes, wanted = _fabric(options)
     fabric, spinning = spun(_changed(fabric, options), options)
     fabric, dyeing = _dyed(fabric, wanted, options)
     _write(fabric, options)
+    if not options.dry_run:
+        leave_picture(fabric, options)
     for note in (*notes, *spinning, *dyeing):
         if not options.quiet:
             print(f"fabricusd: {note}", file=sys.stderr)

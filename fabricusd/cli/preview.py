@@ -32,6 +32,8 @@ example:
   fabricusd preview tartan.wif -o tartan.png --shape swatch
   fabricusd preview coat.usda -o coat.png --light -60 20
   fabricusd preview towel.obj --fabric wool_flannel -o towel.png
+  fabricusd preview silk_shot --page silk.html --reference
+  fabricusd preview denim.usda --serve --save denim.usda
   fabricusd preview --sheet linen_plain denim velvet -o sheet.png
   fabricusd preview --presets -o presets.png"""
 
@@ -49,6 +51,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--page", metavar="HTML",
         help="write one .html file that shows the cloth with WebGL2: turn it, move the light, "
         "change its threads (default: a picture)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--reference",
+        action="store_true",
+        help="with --page: put the path tracer's picture of the first view in, to wipe against",
+    )
+    parser.add_argument(
+        "--serve", action="store_true",
+        help="serve the page on this machine alone until Ctrl-C: it opens files, changes any "
+        "thread and the weave, and path-traces what it shows",
+    )  # fmt: skip
+    parser.add_argument(
+        "--save",
+        metavar="USD",
+        help="with --serve: the one file that the page may write, as variants of the fabric "
+        "(default: it writes none)",
+    )
+    parser.add_argument(
+        "--port", type=int, default=0, metavar="N",
+        help="with --serve: port of the server (default: a free one)",
     )  # fmt: skip
     parser.add_argument(
         "--shape", choices=SHAPES,
@@ -112,16 +134,50 @@ def run(options: argparse.Namespace) -> int:
     RANGES["azimuth"].require("--light AZIMUTH", azimuth)
     RANGES["elevation"].require("--light ELEVATION", elevation)
     lights = Lights(azimuth=math.radians(azimuth), elevation=math.radians(elevation))
+    _require_together(options)
     if options.sheet or options.presets or options.variants:
-        if options.page:
-            raise FabricError("--page", "shows one SOURCE; it must stand without a sheet")
         return _sheet(options, lights, begun)
     if len(options.sources) != 1:
         given = "is missing" if not options.sources else f"is {len(options.sources)} names"
         raise FabricError("SOURCE", f"{given}; give one, or several with --sheet")
+    if options.serve:
+        return _serve(options, options.sources[0], lights)
     if options.page:
         return _page(options, options.sources[0], lights, begun)
     return _one(options, options.sources[0], lights, begun)
+
+
+def _require_together(options: argparse.Namespace) -> None:
+    """Refuse options that cannot be together, and those that would be ignored."""
+    many = options.sheet or options.presets or options.variants
+    for option, given in (("--page", options.page), ("--serve", options.serve)):
+        if given and many:
+            raise FabricError(option, "shows one SOURCE; it must stand without a sheet")
+        if given and options.output:
+            raise FabricError(
+                "-o", f"names a picture, '{options.output}'; give it without {option}"
+            )
+    if options.page and options.serve:
+        raise FabricError("--page", "writes a file; it must stand without --serve")
+    for option, given, needed in (
+        ("--reference", options.reference, "--page"), ("--save", options.save, "--serve"),
+        ("--port", options.port, "--serve"),
+    ):  # fmt: skip
+        if given and not getattr(options, needed[2:]):
+            raise FabricError(option, f"needs {needed}")
+
+
+def _cloth(options: argparse.Namespace, source: str) -> tuple[Fabric, Any]:
+    """(the fabric of SOURCE, the triangles that wear it if SOURCE is a scene, else None)."""
+    if (options.shape or _shape_of(source)) != "scene":
+        return _fabric(source, options), None
+    from fabricusd.preview.scenes import shape_of_scene
+
+    dressed = _fabric(options.fabric, options) if options.fabric else None
+    found = shape_of_scene(source, dressed, options.camera, 1.0, options.units)
+    for note in found.notes:
+        _say(options, note)
+    return found.cloth(source)
 
 
 def _page(options: argparse.Namespace, source: str, lights: Lights, begun: float) -> int:
@@ -130,24 +186,44 @@ def _page(options: argparse.Namespace, source: str, lights: Lights, begun: float
 
     if Path(options.page).suffix.lower() != ".html":
         raise FabricError(options.page, "is not a name for the page; it must end in .html")
-    if options.output:
-        raise FabricError("-o", f"names a picture, '{options.output}'; give it without --page")
     _require_new(Path(options.page), options.no_clobber)
-    mesh = None
-    if (options.shape or _shape_of(source)) == "scene":
-        from fabricusd.preview.scenes import shape_of_scene
+    fabric, mesh = _cloth(options, source)
+    reference = None
+    if options.reference:
+        from fabricusd.preview.serve.traced import first_reference
 
-        dressed = _fabric(options.fabric, options) if options.fabric else None
-        found = shape_of_scene(source, dressed, options.camera, 1.0, options.units)
-        for note in found.notes:
-            _say(options, note)
-        fabric, mesh = found.cloth(source)
-    else:
-        fabric = _fabric(source, options)
-    text = page(fabric, lights=lights, mesh=mesh).encode()
+        reference = first_reference(fabric, mesh, lights, options.samples)
+    text = page(fabric, lights=lights, mesh=mesh, reference=reference).encode()
     _write(options.page, text)
     seconds = time.perf_counter() - begun
     _say(options, f"{options.page}: {len(text) / 1e6:.2g} MB in {seconds:.2g} s")
+    return 0
+
+
+def _serve(options: argparse.Namespace, source: str, lights: Lights) -> int:
+    """Serve the page until the user stops it."""
+    from fabricusd.preview.serve.server import PORTS, Server
+    from fabricusd.preview.serve.session import Session, require_file
+
+    fabric, mesh = _cloth(options, source)
+    save = Path(options.save) if options.save else None
+    if save is not None:
+        require_file(save, source, mesh is not None)
+    PORTS.require("--port", options.port)
+    session = Session(fabric, lights=lights, mesh=mesh, save=save)
+    try:
+        server = Server(session, options.port)
+    except OSError as error:
+        said = error.strerror or error
+        raise FabricError("--port", f"is {options.port}, which cannot be used: {said}") from error
+    # The address is what was asked for, so it goes to stdout.
+    print(server.url, flush=True)
+    _say(options, "open this address in a browser on this machine; Ctrl-C stops the server")
+    try:
+        server.serve_forever(poll_interval=0.2)
+    finally:
+        session.end()
+        server.server_close()
     return 0
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
+from fabricusd.cli.arguments.picture import add_picture, leave_picture, require_picture_name
+
 EPILOG = """NAME is an attribute of the schema, whole or its last word (thread:ior, ior), in the
 unit of the schema, or a word of the trade:
 
@@ -39,15 +41,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="set it in this variant of the fabric, V or SET=V, and select that (default: set it "
         "over all variants; SET: fabricVariant)",
     )
+    add_picture(parser)
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
 
 
 def run(options: argparse.Namespace) -> int:
     """Set the values, and say on how many prims."""
     from fabricusd.schema.edit import parse_change, set_values
+    from fabricusd.schema.read import load
 
+    require_picture_name(options)
+    if options.picture:
+        # Of what cannot be shown, such as a thread, nothing is set either.
+        load(options.file)
     changes = [parse_change(text) for text in options.changes]
     told = set_values(options.file, changes, variant=options.variant, write=not options.dry_run)
+    if options.picture and not options.dry_run:
+        leave_picture(load(options.file), options)
     if not options.quiet:
         for line in told:
             print(f"fabricusd: {options.file}: {line}", file=sys.stderr)

@@ -10,7 +10,7 @@ from fabricusd.fabric import Binding, Fabric
 from fabricusd.preview.lights import Lights, scene_lights
 from fabricusd.preview.shapes import SHAPES, Shape
 from fabricusd.reference.render import render_scene
-from fabricusd.scene.scene import FabricSurface, Mesh, PreviewSurface, Scene
+from fabricusd.scene.scene import Camera, FabricSurface, Mesh, PreviewSurface, Scene
 
 LINING = 1e-3
 """Distance of the lining from the cloth, in radii of the shape."""
@@ -19,15 +19,21 @@ LINING = 1e-3
 def scene_of(fabric: Fabric, shape: str, lights: Lights) -> Scene:
     """Cloth on one of `shapes.SHAPES`, over a black lining, before the camera of the preview."""
     made = SHAPES[shape](fabric)
+    binding = Binding(fabric=fabric, metres_per_uv=1.0)
+    return scene_of_shape(binding, made, lights, made.camera())
+
+
+def scene_of_shape(binding: Binding, made: Shape, lights: Lights, camera: Camera) -> Scene:
+    """Cloth on any shape, over a black lining."""
     below = made.points - made.normals * (LINING * made.subject.radius)
     return Scene(
         meshes=[_mesh("/cloth", made, made.points, 0), _mesh("/lining", made, below, 1)],
         materials=[
-            FabricSurface(binding=Binding(fabric=fabric, metres_per_uv=1.0)),
+            FabricSurface(binding=binding),
             PreviewSurface(name="lining", diffuse=(0.0, 0.0, 0.0), ior=1.0),
         ],
         lights=scene_lights(lights, made.subject.axes),
-        camera=made.camera(),
+        camera=camera,
     )
 
 

@@ -118,6 +118,29 @@ def open_stage(source: str | os.PathLike[str]) -> tuple[Usd.Stage, str]:
     return stage, str(path)
 
 
+@reads("USD")
+def refuse_other_layers(path: str | os.PathLike[str]) -> None:
+    """Raise FabricError for USD text that names other layers, or clips, and so would read them."""
+    file = os.fspath(path)
+    readable_file(file)
+    with usd_errors(file), no_warnings():
+        layer = Sdf.Layer.CreateAnonymous(".usda")
+        layer.ImportFromString(Path(file).read_text("utf-8"))
+        named = [*layer.subLayerPaths, *layer.GetCompositionAssetDependencies()]
+
+        def look(at: Sdf.Path) -> None:
+            spec = layer.GetObjectAtPath(at)
+            if isinstance(spec, Sdf.PrimSpec) and spec.HasInfo("clips"):
+                named.append("its clips")
+
+        layer.Traverse(Sdf.Path.absoluteRootPath, look)
+    # An empty name is that of the layer itself.
+    if named := [name for name in named if name]:
+        raise FabricError(
+            file, f"refers to '{one_line(str(named[0]), 80)}'; it must hold all of the fabric"
+        )
+
+
 def variant_sources(source: str | os.PathLike[str]) -> list[str]:
     """`source` with each variant of the fabric's sets chosen in turn; FabricError without any.
 

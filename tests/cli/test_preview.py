@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import re
+import signal
+import socket
+import subprocess
+import sys
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
 
 from fabricusd.cli import preview as command
+from fabricusd.preview.serve import traced
 from fabricusd.preview.shapes import SHAPES
 from tests.cli.commands import run
+from tests.preview.page_arrays import decoded
 
 
 def size_of(path) -> tuple[int, int]:
@@ -157,6 +164,65 @@ def test_slips_are_refused_in_one_line(arguments, said, capsys, tmp_path, monkey
     assert said in err
     assert len(err.splitlines()) == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["a", "--serve", "-o", "b.png"], "give it without --serve"),
+        (["a", "--serve", "--page", "b.html"], "it must stand without --serve"),
+        (["--presets", "--serve"], "--serve shows one SOURCE"),
+        (["a", "--save", "b.usda"], "--save needs --serve"),
+        (["a", "--port", "80"], "--port needs --serve"),
+        (["a", "--reference"], "--reference needs --page"),
+        (["denim", "--serve", "--save", "b.txt"], "b.txt is no name to save to"),
+        (["denim", "--serve", "--port", "70000"], "--port is 70000; it must be a whole"),
+        (["nothing", "--serve"], "nothing is neither a file nor a preset"),
+    ],
+)  # fmt: skip
+def test_slips_of_a_server_are_refused_in_one_line(arguments, said, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, printed, err = run(capsys, "preview", *arguments)
+    assert (status, printed) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_port_that_is_taken_is_said(capsys):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        status, _, err = run(capsys, "preview", "linen_plain", "--serve", "--port", str(port))
+    assert status == 2
+    assert f"--port is {port}, which cannot be used" in err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT")
+def test_a_server_is_stopped_by_ctrl_c():
+    command = [sys.executable, "-m", "fabricusd", "preview", "linen_plain", "--serve"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as one:
+        url = one.stdout.readline().strip()
+        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#token=[\w-]{43}", url)
+        port = int(url.split(":")[2].partition("/")[0])
+        socket.create_connection(("127.0.0.1", port)).close()
+        one.send_signal(signal.SIGINT)
+        _, err = one.communicate(timeout=60)
+    assert one.returncode == 130
+    assert err.splitlines()[-1] == "fabricusd: interrupted"
+    assert "Traceback" not in err
+
+
+@pytest.mark.slow
+def test_a_page_has_the_reference_that_is_asked_for(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(traced, "FIRST", (16, 1))
+    out = tmp_path / "a.html"
+    assert run(capsys, "preview", "linen_plain", "--page", str(out), "--reference")[0] == 0
+    held = json.loads(re.search(r'id="data">(.*?)</script>', out.read_text(), re.S)[1])
+    reference = held["reference"]
+    assert (reference["size"], reference["samples"], reference["level"]) == (16, 1, "far")
+    assert decoded(reference["pixels"]).reshape(16, 16, 4)[8, 8, 3] == 1.0
 
 
 def test_no_clobber_keeps_what_is_there(capsys, tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -44,18 +45,24 @@ class Shown:
     said : messages of the console and errors of scripts; asked : addresses that it requested
     """
 
-    def __init__(self, browser: Any, path: Path, size: tuple[int, int] = (900, 400)) -> None:
+    def __init__(self, browser: Any, at: Path | str, size: tuple[int, int] = (900, 400)) -> None:
         self.said: list[str] = []
         self.asked: list[str] = []
         self.tab = browser.new_page(viewport={"width": size[0], "height": size[1]})
         self.tab.on("console", lambda m: self.said.append(m.text))
         self.tab.on("pageerror", lambda e: self.said.append(str(e)))
         self.tab.on("request", lambda r: self.asked.append(r.url))
-        self.tab.goto(path.as_uri())
-        self.tab.wait_for_function(
-            "window.fabricusd && fabricusd.viewer.frames >= 1", timeout=180_000
-        )
+        self.tab.goto(at if isinstance(at, str) else at.as_uri())
+        self.until("!!window.fabricusd && fabricusd.viewer.frames >= 1", 180.0)
         self.rest()
+
+    def until(self, code: str, patience: float = 60.0) -> None:
+        """Wait until JavaScript is true; Playwright's own way is forbidden by the page's policy."""
+        end = time.monotonic() + patience
+        while not self.tab.evaluate(code):
+            if time.monotonic() > end:
+                raise TimeoutError(f"{code}: {self.tab.inner_text('#trouble')} {self.said}")
+            time.sleep(0.05)
 
     def rest(self) -> None:
         """Let the page draw no more: software takes its time from what is tested."""

@@ -115,7 +115,7 @@ def test_a_branch_that_is_not_known_stays():
 def test_tuples_are_structs():
     text = translated(ordered_twice, "R f f")
     assert "struct T_ff { float m0_; float m1_; };" in text
-    assert "((x < y) ? x : y)" in text
+    assert "mix(y, x, (x < y))" in text
     assert "t1 = k_ordered(x, y); a = t1.m0_; b = t1.m1_;" in text
 
 
@@ -143,5 +143,24 @@ def test_the_shader_declares_all_tables_and_has_all_kernels():
         assert f"LAW == {law.upper()}" in text
     # All horizons of groups are read by fours, the only way in which their texture can be read.
     assert text.count("published_horizons_at") == text.count("shadow_mean_at") == 2
-    # The error functions of means over cells would take a compiler half a minute.
-    assert "erf" not in text
+    # Nodes are points: the error functions are those of the profile across a thread.
+    assert len(re.findall(r"k_erf32\(", text)) == 5
+
+
+def larger(R, x, y):
+    return x if x > y else y
+
+
+def entry_or(R, tables, k, x):
+    return tables.rows[k, 0] if x > R(0) else x
+
+
+def test_a_choice_of_numbers_is_no_branch():
+    # A compiler in software took minutes for the branches of level `thread`.
+    text = translated(larger, "R f f")
+    assert "mix(y, x, (x > y))" in text
+    assert "?" not in text
+
+
+def test_a_table_is_read_only_where_its_value_is_needed():
+    assert "? F(tables_rows_at" in translated(entry_or, "R T i f")

@@ -16,7 +16,7 @@ from fabricusd.preview.glsl.kernels import SHADER, shader
 from fabricusd.preview.page import make
 from fabricusd.preview.page.arrays import mesh_arrays
 from fabricusd.preview.page.make import FOLDER, page
-from fabricusd.preview.page.tables import thread_controls
+from fabricusd.preview.page.threads import thread_controls
 from fabricusd.preview.picture import Picture, preview
 from fabricusd.preview.shapes import SHAPES
 from fabricusd.quality.colors import delta_e_2000
@@ -51,8 +51,15 @@ def opened(browser, tmp_path, fabric: Fabric, size: tuple[int, int] = (620, 240)
 
 
 @pytest.fixture(scope="module")
-def linen(browser, tmp_path_factory):
+def linen_page(browser, tmp_path_factory):
     return opened(browser, tmp_path_factory.mktemp("linen"), fabric_of("linen_plain")[0])
+
+
+@pytest.fixture
+def linen(linen_page):
+    """The page of linen, which does not draw on while other tests run."""
+    yield linen_page
+    linen_page.rest()
 
 
 def test_the_package_has_the_translation_of_its_kernels():
@@ -71,7 +78,7 @@ def test_the_page_s_values_are_those_of_the_surface_laws(browser, tmp_path, name
         w[:, 2] = np.abs(w[:, 2])
         w /= np.linalg.norm(w, axis=1, keepdims=True)
     wi, wo, uv = (x.astype(np.float32) for x in (wi, wo, rng.uniform(0, 30, (n, 2))))
-    for number, level, bound in ((0, "far", 1e-5), (1, "weave", 1e-4)):
+    for number, level, bound in ((0, "far", 1e-5), (1, "weave", 1e-4), (2, "thread", 1e-4)):
         found = shown.floats(
             f"(viewer.level = {number}, viewer.evaluate(a.i, a.o, {WIDTH}, {HEIGHT}))",
             i=np.concatenate((wi, uv[:, :1]), axis=1), o=np.concatenate((wo, uv[:, 1:]), axis=1),
@@ -94,7 +101,7 @@ def test_the_page_draws_what_the_preview_draws(linen):
     size = 64
     radiance = linen.floats(
         f"(viewer.resize({size}, {size}), viewer.level = 0, viewer.frames = 0,"
-        "[...Array(48)].forEach(() => viewer.draw(fabricusd.placed(), fabricusd.data.light)),"
+        "[...Array(48)].forEach(() => viewer.draw(fabricusd.placed(), fabricusd.lights())),"
         "viewer.read())"
     ).reshape(size, size, 4)
     shown = Picture(radiance=radiance[..., :3], cover=radiance[..., 3])
@@ -116,7 +123,7 @@ def test_a_number_is_typed_undone_and_reset(linen):
     field.fill("0.5")
     field.press("Enter")
     assert tab.evaluate("fabricusd.state.threads[0][0]") == 0.5
-    start = tab.evaluate("fabricusd.data.rows.start")
+    start = tab.evaluate("fabricusd.cloth.rows.start")
     assert tab.evaluate(f"fabricusd.viewer.floats[{start}]") == 0.5
     tab.click("#undo")
     assert tab.evaluate("fabricusd.state.threads[0][0]") == before
@@ -215,11 +222,52 @@ def test_a_page_that_would_be_too_large_is_refused(monkeypatch):
         page(Fabric())
 
 
-def test_threads_whose_tables_the_page_cannot_make_have_no_controls():
-    assert thread_controls(fabric_of("linen_plain")[0])[1] != []
-    said, controls = thread_controls(fabric_of("denim")[0])
-    assert controls == []
-    assert "fabricusd set" in said
+def test_only_threads_whose_tables_the_page_can_make_have_controls_that_work():
+    for name, some in (("linen_plain", True), ("denim", False), ("velvet", True)):
+        threads = thread_controls(fabric_of(name)[0])
+        assert any(c["live"] for thread in threads for c in thread["controls"]) == some
+
+
+def test_what_a_file_cannot_do_is_off_and_says_why(linen):
+    tab = linen.tab
+    off = "[...document.querySelectorAll('input:disabled, button:disabled')]"
+    reasons = "[...document.querySelectorAll('.why')].map(e => e.textContent).join(' ')"
+    assert tab.evaluate(f"{off}.map(e => e.id || e.title)").count("trace") == 1
+    labels = tab.evaluate(f"{off}.map(e => e.getAttribute('aria-label') || e.id)")
+    assert {"Warp covers", "Hairiness, H", "open", "saveVariant", "trace"} <= set(labels)
+    assert "Red" not in labels
+    for what in ("The weave", "file", "To save a variant", "The path tracer", "What is grey"):
+        assert re.search(rf"{what}[^.]*needs the server", tab.evaluate(reasons)), what
+
+
+def test_the_back_is_that_of_the_cloth_and_is_live_where_it_is_mirrored(linen):
+    tab = linen.tab
+    tab.select_option("#side", "back")
+    assert "(back)" in tab.evaluate("fabricusd.cloth.about")
+    tab.locator("#thread0 input[type=number]").first.fill("0.5")
+    tab.locator("#thread0 input[type=number]").first.press("Enter")
+    start = tab.evaluate("fabricusd.cloth.rows.start")
+    assert tab.evaluate(f"fabricusd.viewer.floats[{start}]") == 0.5
+    tab.click("#reset")
+    assert tab.evaluate("fabricusd.state.side") == "front"
+
+
+def test_differences_on_the_page_are_those_of_delta_e_2000(linen):
+    size, rng = 32, np.random.default_rng(3)
+    mine = np.concatenate((rng.uniform(0, 0.7, (size, size, 3)), np.ones((size, size, 1))), -1)
+    theirs = np.clip(mine + rng.normal(0, 0.05, mine.shape), 0, 0.7)
+    theirs[0, 0, :3] = mine[0, 0, :3] = 0.0
+    theirs[..., 3] = 1.0
+    found = linen.floats(
+        f"(viewer.resize({size}, {size}), viewer.sum = {{ texture: viewer.newTexture() }},"
+        f"(gl => gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, {size}, {size}, 0, gl.RGBA, gl.FLOAT,"
+        f" a.mine))(viewer.gl), viewer.frames = 1, viewer.setTraced(a.theirs, {size}),"
+        "viewer.differences())",
+        mine=mine[::-1], theirs=theirs,
+    ).reshape(size, size, 4)[::-1]  # fmt: skip
+    wanted = delta_e_2000(mine[..., :3], theirs[..., :3])
+    assert wanted.mean() > 1.0
+    assert np.abs(found[..., 0] - wanted).max() < 0.01
 
 
 @pytest.mark.parametrize("shape", SHAPES)

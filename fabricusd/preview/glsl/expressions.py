@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,9 @@ COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
 MATH = {math.sqrt: "sqrt", math.exp: "exp", math.tan: "tan", np.floor: "floor"}
 INTS = (int, np.int32, np.int64, np.uintp, np.uint32)
 FLOATS = (float, np.float32)
+
+_CALL = re.compile(r"\b(?:[FIB]|k_\w+|law_\w+)\(")
+"""Reading a table, or calling a kernel."""
 
 
 class Expressions:
@@ -189,8 +193,12 @@ class Expressions:
     def chosen(self, test: Value, a: Value, b: Value) -> Value:
         """`test ? a : b`."""
         kind = a.type if a.type == b.type else FLOAT
-        code = f"({as_type(test, BOOL)} ? {as_type(a, kind)} : {as_type(b, kind)})"
-        return Value(code, kind)
+        condition, yes, no = as_type(test, BOOL), as_type(a, kind), as_type(b, kind)
+        # Without a branch, which a compiler of shaders would make of `? :`; but tables are read,
+        # and functions called, only where their values are needed.
+        if kind == FLOAT and not _CALL.search(yes + no):
+            return Value(f"mix({no}, {yes}, {condition})", kind)
+        return Value(f"({condition} ? {yes} : {no})", kind)
 
     def of_Tuple(self, node: ast.Tuple) -> Value:
         """Several values, as a struct."""
@@ -237,7 +245,7 @@ class Expressions:
             return self._of_glsl(function, values)
         if function is math.copysign:
             a, b = (as_type(v, FLOAT) for v in values)
-            return Value(f"({b} < 0.0 ? -abs({a}) : abs({a}))", FLOAT)
+            return Value(f"mix(abs({a}), -abs({a}), {b} < 0.0)", FLOAT)
         if function is index:
             return Value(f"({as_type(values[0], INT)} + {as_type(values[1], INT)})", INT)
         if function is whole:

@@ -43,6 +43,8 @@ ROOTS: tuple[tuple[Any, str], ...] = (
     (thread_at, "R cloth i i i i f f"),
     (shade, "R cloth shadow f f hit f f f"),
     (fuzz_over, "R fuzz i f f f f f f f f f"),
+    (point_value, "R published true place f f f f f f"),
+    (conserving_level_value, "R conserving true place f f f f f f"),
 )
 """Kernels, and the types of their arguments: R, a group of tables, f(loat), i(nt), a struct."""
 
@@ -62,7 +64,8 @@ def shader() -> str:
     made.struct(Place, (INT, INT, FLOAT, FLOAT, FLOAT))
     made.struct(Hit, (INT, INT, FLOAT, FLOAT, FLOAT))
     kinds = {
-        "f": Value("", FLOAT), "i": Value("", INT), "R": Value("", REAL), "false": constant(False),
+        "f": Value("", FLOAT), "i": Value("", INT), "R": Value("", REAL),
+        "false": constant(False), "true": constant(True),
         "place": Value("", Place), "hit": Value("", Hit),
     }  # fmt: skip
     for kernel, types in ROOTS:

@@ -1,5 +1,12 @@
 // The surface of the cloth: what it sends of one light, by the kernels above this text.
-// Macros: LAW; LEVEL 0 far, 1 weave; PUBLISHED, FACETS, FUZZ: which kernels the fabric needs.
+// Macros: LAW; LEVEL 0 far, 1 weave, 2 thread; PUBLISHED, FACETS, FUZZ: which kernels the fabric needs.
+#if LEVEL == 2
+# define POINT k_point_value_1
+# define FACET k_conserving_level_value_1
+#else
+# define POINT k_point_value
+# define FACET k_conserving_level_value
+#endif
 uniform ivec4 repeats;  // ends and picks after which the sequences of threads repeat, threads
 Place place_here; Hit hit_here; int fuzz_row;
 
@@ -10,7 +17,7 @@ int wrapped_in(float x, int period) {
 
 void look_up(vec2 threads) {
   fuzz_row = repeats.z;
-#if LEVEL == 1
+#if LEVEL >= 1
   vec2 whole = floor(threads);
   split_place = threads - whole;
   split_cell = ivec4(
@@ -40,7 +47,7 @@ vec3 cloth(vec3 wi, vec3 wo) {
   f += vec3(a.m0_, a.m1_, a.m2_);
 # else
   if (place_here.thread_set_ < 2) {
-    T_fff a = k_point_value(place_here, wi.x, wi.y, wi.z, wo.x, wo.y, wo.z);
+    T_fff a = POINT(place_here, wi.x, wi.y, wi.z, wo.x, wo.y, wo.z);
     f += vec3(a.m0_, a.m1_, a.m2_);
   }
 # endif
@@ -49,11 +56,11 @@ vec3 cloth(vec3 wi, vec3 wo) {
 # if LEVEL == 0
   T_fff b = k_conserving_value(wi.x, wi.y, wi.z, wo.x, wo.y, wo.z);
 # else
-  T_fff b = k_conserving_level_value(place_here, wi.x, wi.y, wi.z, wo.x, wo.y, wo.z);
+  T_fff b = FACET(place_here, wi.x, wi.y, wi.z, wo.x, wo.y, wo.z);
 # endif
   f += vec3(b.m0_, b.m1_, b.m2_);
 #endif
-#if LEVEL == 1
+#if LEVEL >= 1
   f *= k_shade(split_place.x, split_place.y, hit_here, wi.x, wi.y, wi.z);
 #endif
 #if FUZZ

@@ -180,8 +180,8 @@ float k_atan2_32(float y, float x) {
   float angle;
   a = abs(x);
   b = abs(y);
-  low = ((a < b) ? a : b);
-  high = ((a < b) ? b : a);
+  low = mix(b, a, (a < b));
+  high = mix(a, b, (a < b));
   t = (low / max(high, 1e-37));
   z = (t * t);
   p = (-0.0162828691 + (z * 0.00290351746));
@@ -189,9 +189,9 @@ float k_atan2_32(float y, float x) {
   p = (-0.142071315 + (z * (0.106546688 + (z * p))));
   p = (-0.333330939 + (z * (0.199930538 + (z * p))));
   angle = (t + ((t * z) * p));
-  angle = ((a < b) ? (1.57079633 - angle) : angle);
-  angle = ((x < 0.0) ? (3.14159265 - angle) : angle);
-  return (y < 0.0 ? -abs(angle) : abs(angle));
+  angle = mix(angle, (1.57079633 - angle), (a < b));
+  angle = mix(angle, (3.14159265 - angle), (x < 0.0));
+  return mix(abs(angle), -abs(angle), y < 0.0);
 }
 
 float k_acos32(float x) {
@@ -216,7 +216,7 @@ float k_exp32(float x) {
   p = (0.166665189 + (r * (0.041666206 + (r * p))));
   p = (1.0 + (r * (1.0 + (r * (0.5 + (r * p))))));
   scale = intBitsToFloat(int(((k + 127.0) * 8388608.0)));
-  return ((x < -87.3) ? 0.0 : (p * scale));
+  return mix((p * scale), 0.0, (x < -87.3));
 }
 
 float k_overlap(float cos_half) {
@@ -252,10 +252,10 @@ SetPair k_along_set(int thread_set, float ix, float iy, float iz, float ox, floa
   float cos_half;
   float u;
   warp = (thread_set == 1);
-  a_i = (warp ? iy : ix);
-  b_i = (warp ? (-ix) : iy);
-  a_o = (warp ? oy : ox);
-  b_o = (warp ? (-ox) : oy);
+  a_i = mix(ix, iy, warp);
+  b_i = mix(iy, (-ix), warp);
+  a_o = mix(ox, oy, warp);
+  b_o = mix(oy, (-ox), warp);
   scale_i = (1.0 / sqrt(((a_i * a_i) + (iz * iz))));
   scale_o = (1.0 / sqrt(((a_o * a_o) + (oz * oz))));
   cos_half = k_cos_half_difference((a_i * scale_i), (iz * scale_i), (a_o * scale_o), (oz * scale_o));
@@ -304,7 +304,7 @@ T_ff k_unit_azimuth(float y, float z, float cos_theta) {
   float scale;
   along = (cos_theta <= 1e-30);
   scale = (1.0 / max(cos_theta, 1e-30));
-  return T_ff((along ? 0.0 : (y * scale)), (along ? 1.0 : (z * scale)));
+  return T_ff(mix((y * scale), 0.0, along), mix((z * scale), 1.0, along));
 }
 
 float k_mask(float cos_phi_i, float cos_phi_o, float cos_half) {
@@ -384,8 +384,8 @@ T_ff k_half_inclination_legs(float sin_i, float cos_i, float sin_o, float cos_o)
   s = (sin_i + sin_o);
   c = (cos_i + cos_o);
   opposite = (abs(d) > c);
-  turned = ((d > 0.0) ? (cos_o - cos_i) : (cos_i - cos_o));
-  return T_ff((opposite ? turned : s), (opposite ? abs(d) : c));
+  turned = mix((cos_i - cos_o), (cos_o - cos_i), (d > 0.0));
+  return T_ff(mix(s, turned, opposite), mix(c, abs(d), opposite));
 }
 
 float k_cos2_half_inclination(float sin_i, float cos_i, float sin_o, float cos_o) {
@@ -550,7 +550,7 @@ float k_lit_alone(int node, float x, float y, float z) {
 float k_diamond(float x, float y) {
   float part;
   part = (x / max((abs(x) + abs(y)), 1e-30));
-  return ((y >= 0.0) ? (1.0 - part) : (3.0 + part));
+  return mix((3.0 + part), (1.0 - part), (y >= 0.0));
 }
 
 struct T_if { int m0_; float m1_; };
@@ -765,7 +765,7 @@ float k_sine_of_turn(float k, float r) {
   odd = (k - (2.0 * floor((0.5 * k))));
   half_ = floor((0.5 * k));
   turned = (half_ - (2.0 * floor((0.5 * half_))));
-  return ((1.0 - (2.0 * turned)) * ((odd > 0.5) ? c : s));
+  return ((1.0 - (2.0 * turned)) * mix(s, c, (odd > 0.5)));
 }
 
 float k_cos32(float x) {
@@ -962,10 +962,10 @@ float k_projected(float x, float y, float z) {
   float along;
   float c;
   float s;
-  side = ((z > 0.0) ? 1.0 : -1.0);
+  side = mix(-1.0, 1.0, (z > 0.0));
   total = 0.0;
   for (int k = 0; k < conserving_nodes_n0; ++k) {
-    along = ((k >= conserving_warp_start) ? y : x);
+    along = mix(x, y, (k >= conserving_warp_start));
     c = F(conserving_nodes_at + (k) * conserving_nodes_n1 + 0);
     s = F(conserving_nodes_at + (k) * conserving_nodes_n1 + 1);
     total = (total + (F(conserving_nodes_at + (k) * conserving_nodes_n1 + 2) * k_facing(side, c, s, along, z)));
@@ -987,8 +987,8 @@ T_fff k_to_thread(int thread_set, float cos_psi0, float sin_psi0, float x, float
   float along;
   float across;
   warp = (thread_set == 1);
-  along = (warp ? y : x);
-  across = (warp ? (-x) : y);
+  along = mix(x, y, warp);
+  across = mix(y, (-x), warp);
   return T_fff(((cos_psi0 * along) - (sin_psi0 * z)), across, ((sin_psi0 * along) + (cos_psi0 * z)));
 }
 
@@ -1046,7 +1046,7 @@ float k_i0e32(float x) {
   p = (0.0276126165 + (t * (0.0402138482 + (t * p))));
   p = (0.398942266 + (t * (0.0498739974 + (t * p))));
   far_ = (p * sqrt(t));
-  return ((x < 6.0) ? near_ : far_);
+  return mix(far_, near_, (x < 6.0));
 }
 
 float k_longitudinal(float inverse_v, float norm, float sin_i, float cos_i, float sin_o, float cos_o) {
@@ -1168,7 +1168,7 @@ T_ff k_facet_terms(int row, int thread_set, float c, float s, float ix, float iy
   va = t2.m0_;
   vb = t2.m1_;
   vn = t2.m2_;
-  seen = (max(0.0, ((iz > 0.0) ? tn : (-tn))) * max(0.0, ((oz > 0.0) ? vn : (-vn))));
+  seen = (max(0.0, mix((-tn), tn, (iz > 0.0))) * max(0.0, mix((-vn), vn, (oz > 0.0))));
   if ((seen == 0.0)) {
     return T_ff(0.0, 0.0);
   }
@@ -1296,7 +1296,7 @@ float k_share_of_gaps(float x, float y, float z) {
   float closed;
   open_to_it = k_gap_towards(x, y, z);
   closed = max(0.0, ((1.0 - conserving_covered) - open_to_it));
-  return ((closed > 0.0) ? (closed / (1.0 - open_to_it)) : 0.0);
+  return mix(0.0, (closed / (1.0 - open_to_it)), (closed > 0.0));
 }
 
 T_fff k_conserving_point_single(Place place, float on_surface, float on_volume, float ix, float iy, float iz, float ox, float oy, float oz) {
@@ -1440,14 +1440,14 @@ T_fff k_lower_run(int i, int j, int top, float over) {
   count = I(cloth_runs_at + (((i) * cloth_runs_n1 + j) * cloth_runs_n2 + slot) * cloth_runs_n3 + 1);
   beyond = float(I(cloth_runs_at + (((i_next) * cloth_runs_n1 + j_next) * cloth_runs_n2 + 0) * cloth_runs_n3 + 1));
   if (((count > 0) && (place == (ahead ? (count - 1) : 0)))) {
-    return T_fff((ahead ? (rim - 1.0) : (beyond + rim)), (beyond + (2.0 * rim)), 1.0);
+    return T_fff(mix((beyond + rim), (rim - 1.0), ahead), (beyond + (2.0 * rim)), 1.0);
   }
   strip = float(place);
   if ((count > 0)) {
-    start = (ahead ? (((2.0 * rim) * strip) - (1.0 - rim)) : (((2.0 * rim) * strip) - rim));
+    start = mix((((2.0 * rim) * strip) - rim), (((2.0 * rim) * strip) - (1.0 - rim)), ahead);
     strips = (count - 1);
   } else {
-    start = (((2.0 * rim) * strip) + (ahead ? ((2.0 * rim) - 1.0) : 0.0));
+    start = (((2.0 * rim) * strip) + mix(0.0, ((2.0 * rim) - 1.0), ahead));
     strips = ((which == 1) ? picks : ends);
   }
   return T_fff(start, max(((2.0 * rim) * float(strips)), cloth_tiny), 0.0);
@@ -1469,18 +1469,18 @@ T_ifff k_place_on(int top, float width, float other, float upper_start, float up
   float w;
   float s;
   warp = (top == 1);
-  over = (warp ? x : y);
-  along = (warp ? y : x);
+  over = mix(y, x, warp);
+  along = mix(x, y, warp);
   offset = (over - 0.5);
   aside = (along - 0.5);
   on_top = ((abs(offset) <= (0.5 * width)) && (width > 0.0));
   beside = ((abs(aside) <= (0.5 * other)) && (other > 0.0));
   hit = (on_top ? top : (1 - top));
-  seen = (on_top ? (upper_start + along) : (lower_start + over));
-  cells = (on_top ? upper_cells : lower_cells);
-  w = ((2.0 * (on_top ? offset : aside)) / max((on_top ? width : other), cloth_tiny));
+  seen = mix((lower_start + over), (upper_start + along), on_top);
+  cells = mix(lower_cells, upper_cells, on_top);
+  w = ((2.0 * mix(aside, offset, on_top)) / max(mix(other, width, on_top), cloth_tiny));
   s = max(0.0, min((seen / cells), cloth_last));
-  w = max(-1.0, min(((hit == 1) ? (-w) : w), 1.0));
+  w = max(-1.0, min(mix(w, (-w), (hit == 1)), 1.0));
   return T_ifff(((on_top || beside) ? hit : 2), s, w, cells);
 }
 
@@ -1534,7 +1534,7 @@ T_iiffff k_thread_at(int i, int j, int end, int pick, float x, float y) {
   t1 = k_upper_run(i, j, top);
   upper_start = t1.m0_;
   upper_cells = t1.m1_;
-  t2 = k_lower_run(i, j, top, ((top == 1) ? x : y));
+  t2 = k_lower_run(i, j, top, mix(y, x, (top == 1)));
   lower_start = t2.m0_;
   lower_cells = t2.m1_;
   rises = t2.m2_;
@@ -1547,7 +1547,7 @@ T_iiffff k_thread_at(int i, int j, int end, int pick, float x, float y) {
     return T_iiffff(2, 0, 0.0, 0.0, 0.0, 0.0);
   }
   thread = I(cloth_sequence_at + (which) * cloth_sequence_n1 + ((which == 1) ? end : pick));
-  return T_iiffff(which, thread, s, w, k_angle_on(thread, s), ((cells * F(cloth_pitch_at + (1 - which))) * ((which == top) ? 1.0 : rises)));
+  return T_iiffff(which, thread, s, w, k_angle_on(thread, s), ((cells * F(cloth_pitch_at + (1 - which))) * mix(rises, 1.0, (which == top))));
 }
 
 struct T_iiiiff { int m0_; int m1_; int m2_; int m3_; float m4_; float m5_; };
@@ -1562,7 +1562,7 @@ T_if k_rows_of_texels(bool on_top, float along, float over, float width, int cou
   int k;
   behind = (over > 0.5);
   strip = max((0.5 * (1.0 - width)), tiny);
-  place = (on_top ? along : ((behind ? (over - (1.0 - strip)) : over) / strip));
+  place = mix((mix(over, (over - (1.0 - strip)), behind) / strip), along, on_top);
   half_ = (count / 2);
   rows = (on_top ? count : half_);
   x = max(0.0, min(((place * float(rows)) - 0.5), float((rows - 1))));
@@ -1610,8 +1610,8 @@ float k_horizon_at(float u, float v, int which, float x, float y) {
   in_u = t2.m0_;
   in_v = t2.m1_;
   top = I(cloth_grid_at + (i) * cloth_grid_n1 + j);
-  along = ((top == 1) ? q : p);
-  over = ((top == 1) ? p : q);
+  along = mix(p, q, (top == 1));
+  over = mix(q, p, (top == 1));
   width = F(cloth_width_at + top);
   on_top = (which == top);
   slot = (on_top ? 0 : (shadow_table_n2 - 1));
@@ -1786,4 +1786,253 @@ T_fff k_fuzz_over(int row, float ix, float iy, float iz, float ox, float oy, flo
   g = k_channel(1, way, row, m, x, n, y, met_i, met_o, above, k, a, e, g);
   b = k_channel(2, way, row, m, x, n, y, met_i, met_o, above, k, a, e, b);
   return T_fff(r, g, b);
+}
+
+float k_across_deviation(float gamma_surface) {
+  return max(gamma_surface, 0.1);
+}
+
+float k_erf32(float x) {
+  float a;
+  float z;
+  float p;
+  float near_;
+  float b;
+  float far_;
+  a = abs(x);
+  z = (a * a);
+  p = (-0.000802084128 + (z * 7.88911952e-05));
+  p = (-0.0268544446 + (z * (0.00518953534 + (z * p))));
+  p = (-0.376126271 + (z * (0.112836002 + (z * p))));
+  near_ = (a * (1.12837917 + (z * p)));
+  b = min(a, 4.0);
+  p = (-0.000441336377 + (b * 2.16868499e-05));
+  p = (-0.0252082567 + (b * (0.00420456187 + (b * p))));
+  p = (0.633219893 + (b * (0.108418577 + (b * p))));
+  p = (-0.000188040226 + (b * (1.12957842 + (b * p))));
+  far_ = (1.0 - k_exp32((-p)));
+  return mix(abs(mix(far_, near_, (a < 1.0))), -abs(mix(far_, near_, (a < 1.0))), x < 0.0);
+}
+
+T_ff k_across(int row, float w, float sin_phi_i, float cos_phi_i, float sin_phi_o, float cos_phi_o) {
+  float y;
+  float x;
+  float edge;
+  float h;
+  float beta;
+  float scale;
+  float ends;
+  float z;
+  float d;
+  y = (sin_phi_i + sin_phi_o);
+  x = (cos_phi_i + cos_phi_o);
+  edge = mix(mix(0.0, -1.0, (y < 0.0)), 1.0, (y > 0.0));
+  h = mix((y / max(sqrt(((x * x) + (y * y))), 1e-06)), edge, (x < 0.0));
+  beta = k_across_deviation(F(published_threads_at + (row) * published_threads_n1 + 6));
+  scale = (sqrt(0.5) / beta);
+  ends = (k_erf32(((1.0 - h) * scale)) + k_erf32(((1.0 + h) * scale)));
+  z = ((beta * (sqrt(6.283185307179586) / 4.0)) * ends);
+  d = ((w - h) * scale);
+  return T_ff((k_exp32(((-d) * d)) / z), (1.0 + ((0.5 * w) * (sin_phi_i + sin_phi_o))));
+}
+
+T_ff k_across_at(int row, float w, float b_i, float n_i, float b_o, float n_o) {
+  T_ff t1;
+  float sin_i;
+  float cos_i;
+  T_ff t2;
+  float sin_o;
+  float cos_o;
+  t1 = k_unit_azimuth(b_i, n_i, k_cos_inclination(b_i, n_i));
+  sin_i = t1.m0_;
+  cos_i = t1.m1_;
+  t2 = k_unit_azimuth(b_o, n_o, k_cos_inclination(b_o, n_o));
+  sin_o = t2.m0_;
+  cos_o = t2.m1_;
+  return k_across(row, w, sin_i, cos_i, sin_o, cos_o);
+}
+
+T_ff k_segment_at_1(int model, int row, float c, float s, float w, SetPair pair) {
+  T_ff t1;
+  float surface;
+  float volume;
+  float n_i;
+  float n_o;
+  T_ff t2;
+  float on_surface;
+  float on_volume;
+  t1 = k_segment(model, row, c, s, pair);
+  surface = t1.m0_;
+  volume = t1.m1_;
+  n_i = ((s * pair.along_i_) + (c * pair.up_i_));
+  n_o = ((s * pair.along_o_) + (c * pair.up_o_));
+  t2 = k_across_at(row, w, pair.across_i_, n_i, pair.across_o_, n_o);
+  on_surface = t2.m0_;
+  on_volume = t2.m1_;
+  return T_ff((surface * on_surface), (volume * on_volume));
+}
+
+T_fff k_point_value_1(Place place, float ix, float iy, float iz, float ox, float oy, float oz) {
+  int row;
+  float q;
+  SetPair pair;
+  float c;
+  float s;
+  float p;
+  T_ff t1;
+  float surface;
+  float volume;
+  row = place.thread_;
+  if (((iz <= 0.0) || (oz <= 0.0) || (F(published_threads_at + (row) * published_threads_n1 + 13) != 0.0))) {
+    return T_fff(0.0, 0.0, 0.0);
+  }
+  q = k_normalization(ix, iy, iz, ox, oy, oz);
+  if ((q <= 1e-12)) {
+    return T_fff(0.0, 0.0, 0.0);
+  }
+  pair = k_along_set(place.thread_set_, ix, iy, iz, ox, oy, oz);
+  c = k_cos32(place.psi0_);
+  s = k_sin32(place.psi0_);
+  p = k_law_weight(c, s, pair);
+  t1 = k_segment_at_1(int(F(published_threads_at + (row) * published_threads_n1 + 3)), row, c, s, place.w_, pair);
+  surface = t1.m0_;
+  volume = t1.m1_;
+  p = (p / q);
+  surface = (surface * p);
+  volume = (volume * (p * place.shade_));
+  return T_fff((surface + (volume * F(published_threads_at + (row) * published_threads_n1 + 0))), (surface + (volume * F(published_threads_at + (row) * published_threads_n1 + 1))), (surface + (volume * F(published_threads_at + (row) * published_threads_n1 + 2))));
+}
+
+T_ff k_across_1(int row, float w, float sin_phi_i, float cos_phi_i, float sin_phi_o, float cos_phi_o) {
+  float y;
+  float x;
+  float edge;
+  float h;
+  float beta;
+  float scale;
+  float ends;
+  float z;
+  float d;
+  y = (sin_phi_i + sin_phi_o);
+  x = (cos_phi_i + cos_phi_o);
+  edge = mix(mix(0.0, -1.0, (y < 0.0)), 1.0, (y > 0.0));
+  h = mix((y / max(sqrt(((x * x) + (y * y))), 1e-06)), edge, (x < 0.0));
+  beta = k_across_deviation(F(conserving_threads_at + (row) * conserving_threads_n1 + 6));
+  scale = (sqrt(0.5) / beta);
+  ends = (k_erf32(((1.0 - h) * scale)) + k_erf32(((1.0 + h) * scale)));
+  z = ((beta * (sqrt(6.283185307179586) / 4.0)) * ends);
+  d = ((w - h) * scale);
+  return T_ff((k_exp32(((-d) * d)) / z), (1.0 + ((0.5 * w) * (sin_phi_i + sin_phi_o))));
+}
+
+T_ff k_across_at_1(int row, float w, float b_i, float n_i, float b_o, float n_o) {
+  T_ff t1;
+  float sin_i;
+  float cos_i;
+  T_ff t2;
+  float sin_o;
+  float cos_o;
+  t1 = k_unit_azimuth(b_i, n_i, k_cos_inclination(b_i, n_i));
+  sin_i = t1.m0_;
+  cos_i = t1.m1_;
+  t2 = k_unit_azimuth(b_o, n_o, k_cos_inclination(b_o, n_o));
+  sin_o = t2.m0_;
+  cos_o = t2.m1_;
+  return k_across_1(row, w, sin_i, cos_i, sin_o, cos_o);
+}
+
+T_fff k_across_value(Place place, float ix, float iy, float iz, float ox, float oy, float oz) {
+  int row;
+  float scale;
+  float angle;
+  float c;
+  float s;
+  T_ff t1;
+  float surface;
+  float volume;
+  T_fff t2;
+  float b_i;
+  float n_i;
+  T_fff t3;
+  float b_o;
+  float n_o;
+  T_ff t4;
+  float across_surface;
+  float across_volume;
+  T_fff t5;
+  float on_surface;
+  float on_volume;
+  float lost;
+  int side;
+  row = place.thread_;
+  scale = ((k_visible(ix, iy, iz) * k_visible(ox, oy, oz)) * abs(iz));
+  if (((conserving_opaque != 0) && ((iz > 0.0) != (oz > 0.0)))) {
+    scale = 0.0;
+  }
+  angle = min(max(place.psi0_, -1.4835298641951802), 1.4835298641951802);
+  c = k_cos32(angle);
+  s = k_sin32(angle);
+  t1 = k_facet_terms(row, place.thread_set_, c, s, ix, iy, iz, ox, oy, oz);
+  surface = t1.m0_;
+  volume = t1.m1_;
+  t2 = k_to_thread(place.thread_set_, c, s, ix, iy, iz);
+  b_i = t2.m1_;
+  n_i = t2.m2_;
+  t3 = k_to_thread(place.thread_set_, c, s, ox, oy, oz);
+  b_o = t3.m1_;
+  n_o = t3.m2_;
+  t4 = k_across_at_1(row, place.w_, b_i, n_i, b_o, n_o);
+  across_surface = t4.m0_;
+  across_volume = t4.m1_;
+  t5 = k_between_sides(ix, iy, iz, ox, oy, oz);
+  on_surface = t5.m0_;
+  on_volume = t5.m1_;
+  lost = t5.m2_;
+  scale = (scale / c);
+  surface = (surface * ((across_surface * on_surface) * scale));
+  volume = (volume * (((across_volume * on_volume) * scale) * place.shade_));
+  lost = (lost / conserving_covered);
+  side = (((iz > 0.0) == (oz > 0.0)) ? 0 : 1);
+  return T_fff(((surface + (volume * F(conserving_threads_at + (row) * conserving_threads_n1 + 0))) + (lost * F(conserving_strength_at + (side) * conserving_strength_n1 + 0))), ((surface + (volume * F(conserving_threads_at + (row) * conserving_threads_n1 + 1))) + (lost * F(conserving_strength_at + (side) * conserving_strength_n1 + 1))), ((surface + (volume * F(conserving_threads_at + (row) * conserving_threads_n1 + 2))) + (lost * F(conserving_strength_at + (side) * conserving_strength_n1 + 2))));
+}
+
+T_fff k_conserving_level_value_1(Place place, float ix, float iy, float iz, float ox, float oy, float oz) {
+  float in_gaps;
+  float share;
+  T_fff t1;
+  float red;
+  float green;
+  float blue;
+  int row;
+  T_fff t2;
+  T_fff t3;
+  in_gaps = 0.0;
+  if ((conserving_covered < 1.0)) {
+    in_gaps = min(k_share_of_gaps(ix, iy, iz), k_share_of_gaps(ox, oy, oz));
+  }
+  if ((place.thread_set_ > 1)) {
+    if ((in_gaps == 0.0)) {
+      return T_fff(0.0, 0.0, 0.0);
+    }
+    share = (in_gaps / (1.0 - conserving_covered));
+    t1 = k_conserving_value(ix, iy, iz, ox, oy, oz);
+    red = t1.m0_;
+    green = t1.m1_;
+    blue = t1.m2_;
+    return T_fff((share * red), (share * green), (share * blue));
+  }
+  share = (1.0 - in_gaps);
+  row = place.thread_;
+  if (((F(conserving_threads_at + (row) * conserving_threads_n1 + 13) == 1.0))) {
+    t2 = k_across_value(place, ix, iy, iz, ox, oy, oz);
+    red = t2.m0_;
+    green = t2.m1_;
+    blue = t2.m2_;
+  } else {
+    t3 = k_conserving_point_value(place, ix, iy, iz, ox, oy, oz);
+    red = t3.m0_;
+    green = t3.m1_;
+    blue = t3.m2_;
+  }
+  return T_fff((share * red), (share * green), (share * blue));
 }

@@ -1,8 +1,10 @@
-// One frame: the key light, and one direction of the sky.
+// One frame: the key light, and one direction of the sky; two where nothing is in their way. Where
+// threads are looked up, each pixel has two places, since one holds many threads.
 in vec3 place, normal, tangent;
 in float hand;
 in vec2 metres;
-uniform vec3 eye, key, zenith, sky;
+uniform vec3 eye, key, zenith, sky, other_sky;
+uniform vec2 other_place;      // from the first place in a pixel to the second, in pixels
 uniform float key_power, even, slope, lift;
 uniform vec4 lay;              // threads per metre along u and v, cosine and sine of the grain's turn
 uniform bool shadows;
@@ -38,17 +40,29 @@ void main() {
   // To turn the grain is to turn the frame of the cloth as well.
   mat2 turn = mat2(lay.z, -lay.w, lay.w, lay.z);
   wo.xy = turn * wo.xy;
-  look_up(m * lay.xy);
-  vec3 total = vec3(0.0), wi = local * key;
-  wi.xy = turn * wi.xy;
-
-  vec3 at = place + n * lift;
-  float lit = shadows ? reaches(key_map, key_depth, at) : 1.0;
-  if (lit > 0.0) total += cloth(wi, wo) * (key_power * lit);
-  wi = local * sky;
-  wi.xy = turn * wi.xy;
-  lit = shadows ? reaches(sky_map, sky_depth, at) : 1.0;
-  // The sky's directions are even over the sphere: each stands for 4 pi.
-  if (lit > 0.0) total += cloth(wi, wo) * (12.566370614 * (even + slope * dot(zenith, sky)) * lit);
+  vec2 beyond = dFdx(m) * other_place.x + dFdy(m) * other_place.y;
+#if LEVEL == 0
+  const int PLACES = 1, SKIES = 2;
+#else
+  const int PLACES = 2, SKIES = 1;
+#endif
+  int skies = shadows ? 1 : SKIES;
+  // The sky's directions are even over the sphere, and stand for 4 pi. Without shadows, those below
+  // the cloth are turned over, and stand for the half above it.
+  float solid = (shadows ? 12.566370614 : 6.283185307) / float(PLACES * skies);
+  vec3 total = vec3(0.0), at = place + n * lift;
+  // In loops, since a compiler of shaders puts in the kernels once for each call.
+  for (int p = 0; p < PLACES; ++p) {
+    look_up((p == 0 ? m : m + beyond) * lay.xy);
+    for (int k = 0; k <= skies; ++k) {
+      vec3 to = k == 0 ? key : k + p == 1 || shadows ? sky : other_sky;
+      if (!shadows && k > 0 && dot(n, to) < 0.0) to = -to;
+      float lit = k == 0 ? key_power / float(PLACES) : solid * (even + slope * dot(zenith, to));
+      if (shadows) lit *= k == 0 ? reaches(key_map, key_depth, at) : reaches(sky_map, sky_depth, at);
+      vec3 wi = local * to;
+      wi.xy = turn * wi.xy;
+      if (lit > 0.0) total += cloth(wi, wo) * lit;
+    }
+  }
   color = vec4(total, 1.0);
 }

@@ -1,8 +1,7 @@
-"""A fabric's tables as the page's shaders read them, and the numbers that the page may change."""
+"""A fabric's tables as the page's shaders read them."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -19,15 +18,12 @@ from fabricusd.appearance.surface import fuzz_of
 from fabricusd.appearance.weave.compiled import compile_fabric, true_repeat
 from fabricusd.appearance.weave.coverage import WARP, WEFT
 from fabricusd.appearance.weave.quadrature import default_rule
-from fabricusd.fabric import Fabric, Thread
+from fabricusd.fabric import Fabric
 from fabricusd.preview.glsl.tables import BYTE, NUMBERS, QUAD, TABLES
 from fabricusd.preview.glsl.values import FLOAT, INT
 from fabricusd.preview.page.arrays import array
 
 REAL: Any = np.float32
-
-CONTROLS = ("red", "green", "blue", "ior", "isotropic", "surface", "volume")
-"""Numbers of a thread that a page may change, in the order in which it holds them."""
 
 
 def fabric_tables(fabric: Fabric) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -64,7 +60,7 @@ def fabric_tables(fabric: Fabric) -> tuple[dict[str, Any], dict[str, Any]]:
         "repeat": [int(n) for n in true_repeat(fabric)],
     }  # fmt: skip
     rows = {
-        "start": starts["published.threads"], "width": column.COLUMNS, "names": CONTROLS,
+        "start": starts["published.threads"], "width": column.COLUMNS,
         "columns": {
             "albedo": column.ALBEDO_R, "ior": column.IOR_EXCESS, "isotropic": column.ISOTROPIC,
             "gamma": column.GAMMA_SURFACE, "lobes": column.SURFACE_LOBE,
@@ -101,42 +97,3 @@ def _defines(fabric: Fabric) -> dict[str, Any]:
         "LAW": laws[law_of(fabric)].upper(), "PUBLISHED": int(any_published(fabric)),
         "FACETS": int(any_conserving(fabric)), "FUZZ": int(optical_depth(fabric) > 0),
     }  # fmt: skip
-
-
-def thread_controls(fabric: Fabric) -> tuple[str, list[dict[str, Any]]]:
-    """(what the page says of its threads, name, values and controls of each).
-
-    The tables of `conserving` threads, and of fuzz, depend on the threads' numbers in ways that the
-    page does not compute; it offers no controls for those.
-    """
-    said = []
-    if fabric.is_uneven:
-        said.append("Threads are drawn even.")
-    if any_conserving(fabric) or optical_depth(fabric) > 0:
-        said.append("Its threads are changed with 'fabricusd set'.")
-        return " ".join(said), []
-    return " ".join(said), [_controls(name, t) for name, t in fabric.threads.items()]
-
-
-def _controls(name: str, thread: Thread) -> dict[str, Any]:
-    albedo = max(1.0, *(1.5 * a for a in thread.albedo))
-    # Narrower lobes would fall between the nodes that the tables have.
-    surface, volume = (math.degrees(g) for g in (thread.gamma_surface, thread.gamma_volume))
-    rows = [
-        *(
-            {"label": color, "low": 0.0, "high": albedo, "step": 0.005}
-            for color in ("Red", "Green", "Blue")
-        ),
-        {"label": "Index", "low": 1.0, "high": 3.0, "step": 0.01},
-        {"label": "Isotropic", "low": 0.0, "high": 1.0, "step": 0.01},
-        {"label": "Surface", "low": surface, "high": max(60.0, surface), "step": 0.25, "unit": "°"},
-        {
-            "label": "Volume",
-            "low": min(surface, volume),
-            "high": max(90.0, volume),
-            "step": 0.25,
-            "unit": "°",
-        },
-    ]
-    values = [*thread.albedo, thread.ior, thread.isotropic, surface, volume]
-    return {"name": name, "values": values, "controls": rows}

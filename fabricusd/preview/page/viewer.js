@@ -1,6 +1,7 @@
 // WebGL2: the tables of a fabric, a mesh, and the mean of frames that each add a direction of sky.
 const HEAD = '#version 300 es\nprecision highp float;\nprecision highp int;\n';
 const WIDTH = 2048, SHADOW = 1024;
+const R4 = [0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101];  // [Roberts2018]
 const KINDS = { f4: Float32Array, i4: Int32Array, u1: Uint8Array, u2: Uint16Array, i2: Int16Array, u4: Uint32Array };
 
 export const decode = a => {
@@ -17,7 +18,7 @@ export class Viewer {
     if (!gl.getExtension('EXT_color_buffer_float')) throw Error('this graphics card cannot sum float pictures');
     this.programs = new Map();
     this.blank = gl.createVertexArray();
-    this.level = 0; this.frames = 0; this.view = 0; this.exposure = 0;
+    this.level = 0; this.frames = 0; this.view = 0; this.exposure = 0; this.ground = 0;
     this.lay = [1, 0];
     this.light = { azimuth: 0, elevation: 0 };
     this.shadowTargets = [this.depthTarget(), this.depthTarget()];
@@ -216,9 +217,8 @@ export class Viewer {
   // One frame more, of the camera's { eye, matrix }.
   draw(camera, lights) {
     const gl = this.gl, { width, height } = this.canvas, k = this.frames;
-    const number = [0.7548776662466927, 0.5698402909980532].map(a => (0.5 + k * a) % 1);
-    const tent = k ? number.map(u => u < 0.5 ? Math.sqrt(2 * u) - 1 : 1 - Math.sqrt(2 - 2 * u)) : [0, 0];
-    const sky = skyDirection(k), key = this.keyDirection(), shadows = !this.mesh.convex;
+    const [tent, far] = [2 * k, 2 * k + 1].map(n => (n ? R4.slice(0, 2).map(a => tented((0.5 + n * a) % 1)) : [0, 0]));
+    const [sky, other] = [2 * k, 2 * k + 1].map(skyDirection), key = this.keyDirection(), shadows = !this.mesh.convex;
     gl.bindVertexArray(this.mesh.vao);
     gl.enable(gl.DEPTH_TEST);
     let maps = [null, null];
@@ -238,6 +238,8 @@ export class Viewer {
     gl.uniform3fv(program.at('eye'), camera.eye);
     gl.uniform3fv(program.at('key'), key);
     gl.uniform3fv(program.at('sky'), sky);
+    gl.uniform3fv(program.at('other_sky'), other);
+    gl.uniform2f(program.at('other_place'), far[0] - tent[0], tent[1] - far[1]);
     gl.uniform3f(program.at('zenith'), 0, 1, 0);
     for (const [name, value] of Object.entries(lights)) gl.uniform1f(program.at(name), value);
     gl.uniform4f(program.at('lay'), ...this.fabric.density, ...this.lay);
@@ -266,11 +268,55 @@ export class Viewer {
     gl.useProgram(program);
     gl.bindVertexArray(this.blank);
     this.bind(program, 'total', 5, this.sum.texture);
+    this.tone(program);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  tone(program) {
+    const gl = this.gl;
     gl.uniform1f(program.at('scale'), 1 / this.frames);
     gl.uniform1f(program.at('exposure'), this.exposure);
-    gl.uniform1f(program.at('ground'), this.fabric.ground);
+    gl.uniform1f(program.at('ground'), this.ground);
     gl.uniform1i(program.at('view'), this.view);
+  }
+
+  // A picture by the path tracer, (n n 4) floats with rows from the top, to compare with.
+  setTraced(pixels, size) {
+    const gl = this.gl;
+    if (this.traced) gl.deleteTexture(this.traced.texture);
+    this.traced = { size, texture: this.newTexture() };
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, size, size, 0, gl.RGBA, gl.FLOAT, pixels);
+  }
+
+  // Draw a wipe (mode 0) or the differences (1); split : share of the width that the page has.
+  compare(mode, split, target = null) {
+    const gl = this.gl, program = this.program(this.shaders.screen, this.shaders.compare), { width, height } = this.canvas;
+    const side = Math.min(width, height), { size, texture } = this.traced;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
+    gl.viewport(0, 0, target ? size : width, target ? size : height);
+    gl.useProgram(program);
+    gl.bindVertexArray(this.blank);
+    this.bind(program, 'total', 5, this.sum.texture);
+    this.bind(program, 'traced', 6, texture);
+    this.tone(program);
+    gl.uniform1f(program.at('split'), split * width);
+    gl.uniform4f(program.at('square'), (width - side) / 2, (height - side) / 2, side, size);
+    gl.uniform1i(program.at('mode'), mode);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  // Delta E 2000 and the lesser cover of each pixel of the picture, by fours.
+  differences() {
+    const gl = this.gl, { size } = this.traced, frame = gl.createFramebuffer(), texture = this.newTexture();
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, size, size, 0, gl.RGBA, gl.FLOAT, null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+    this.compare(2, 0, frame);
+    const found = new Float32Array(4 * size * size);
+    gl.readPixels(0, 0, size, size, gl.RGBA, gl.FLOAT, found);
+    gl.deleteTexture(texture);
+    gl.deleteFramebuffer(frame);
+    return found;
   }
 
   // Mean radiance and cover of all frames, rows from the top.
@@ -318,9 +364,12 @@ function axesAlong(towards) {
   return [x, cross(z, x), z];
 }
 
-// Direction number k of the sky: evenly over the sphere, in the order of the R1 sequence.
+// A place in a tent filter one pixel in radius, for u in [0, 1).
+const tented = u => (u < 0.5 ? Math.sqrt(2 * u) - 1 : 1 - Math.sqrt(2 - 2 * u));
+
+// Direction number k of the sky: evenly over the sphere, apart from the places in the pixels.
 function skyDirection(k) {
-  const y = 1 - 2 * ((0.5 + k * 0.7548776662466927) % 1), turn = 2 * Math.PI * ((0.5 + k * 0.5698402909980532) % 1);
+  const [y, turn] = [1 - 2 * ((0.5 + k * R4[2]) % 1), 2 * Math.PI * ((0.5 + k * R4[3]) % 1)];
   const flat = Math.sqrt(1 - y * y);
   return [flat * Math.cos(turn), y, flat * Math.sin(turn)];
 }

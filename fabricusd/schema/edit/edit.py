@@ -107,27 +107,27 @@ def set_values(
             told = []
             for change in changes:
                 values = list(_values(prim, change))
-                _author(values, into)
+                author(values, into)
                 prims = len({value[0].GetPath() for value in values})
                 told.append(f"{change.name} = {change.text}, on {prims} prim{'s' * (prims > 1)}")
                 if any(spec.name == ALBEDO for _, spec, _ in values):
-                    _author(list(without_target(values)), into)
+                    author(list(without_target(values)), into)
             if not set(_faults(prim)) - set(before):
                 solved, lines = solved_again(_fabric_of(prim))
-                _author(solved, into)
+                author(solved, into)
                 told += lines
             for (at, name), problem in _faults(prim).items():
                 if before.get((at, name)) != problem:
                     raise FabricError(f"{file}:{at} {name}".strip(), problem)
             if write:
-                export(layer, file, format=_format(path))
+                export(layer, file, format=format_of(path))
     finally:
         # The layer in memory is that of the whole process: it must be what the file is.
         layer.Reload(True)
     return tuple(told)
 
 
-def _format(path: Path) -> str:
+def format_of(path: Path) -> str:
     """The format in which a layer is kept: a .usd may be text."""
     with open(path, "rb") as stream:
         return "usda" if stream.read(5) == b"#usda" else "usdc"
@@ -146,11 +146,11 @@ def _values(prim: Usd.Prim, change: Change) -> Iterator[Value]:
     if name in WORDS:
         yield from _of_word(prim, change)
         return
-    if change.of in ("warp", "weft") and _named(prim, f"fabric:{change.of}:{name}"):
+    if change.of in ("warp", "weft") and named(prim, f"fabric:{change.of}:{name}"):
         # `warp.density` is the warp's, and no thread's.
         change = Change(name=f"fabric:{change.of}:{name}", text=change.text)
         name = change.name
-    found = [(target, spec) for target in _targets(prim, change) for spec in _named(target, name)]
+    found = [(target, spec) for target in _targets(prim, change) for spec in named(target, name)]
     several = {spec.name for target, spec in found if target == found[0][0]}
     if len(several) > 1:
         raise FabricError(name, f"may be {' or '.join(sorted(several))}; write the whole name")
@@ -197,7 +197,7 @@ def _chosen(prim: Usd.Prim, of: str) -> list[int]:
     return [names.index(of)]
 
 
-def _named(prim: Usd.Prim, name: str) -> list[Sdf.AttributeSpec]:
+def named(prim: Usd.Prim, name: str) -> list[Sdf.AttributeSpec]:
     """The attribute of a prim's schema that `name`, whole or its end, means."""
     specs = [
         spec
@@ -242,22 +242,23 @@ def _of_word(prim: Usd.Prim, change: Change) -> Iterator[Value]:
     for name, fields in made.threads.items():
         for field, value in fields.items():
             table = (*attributes.THREAD, attributes.TARGET_BASIS)
-            yield _in_file(prims[names.index(name)], table, field, value, Thread)
+            yield held_in_file(prims[names.index(name)], table, field, value, Thread)
     for which, fields in made.sets.items():
         for field, value in fields.items():
-            yield _in_file(prim, attributes.thread_set(which), field, value, ThreadSet)
+            yield held_in_file(prim, attributes.thread_set(which), field, value, ThreadSet)
 
 
-def _in_file(
+def held_in_file(
     prim: Usd.Prim, table: tuple[Attribute, ...], field: str, value: Any, owner: type
 ) -> Value:
+    """A field of a dataclass as the value of its attribute, in the file's unit."""
     entry = next(each for each in table if each.field == field and each.owner is owner)
-    (spec,) = _named(prim, entry.name)
+    (spec,) = named(prim, entry.name)
     held = from_si(value, entry)
     return prim, spec, type(spec.default)(held) if isinstance(held, tuple) else held
 
 
-def _author(values: Sequence[Value], into: Variant | None) -> None:
+def author(values: Sequence[Value], into: Variant | None) -> None:
     """Author values, and require that the stage then has them."""
     for prim, spec, value in values:
         place: AbstractContextManager[Any] = nullcontext()

@@ -7,7 +7,7 @@ from typing import Any
 
 from pxr import Sdf, Usd
 
-from fabricusd.errors import FabricError
+from fabricusd.errors import FabricError, one_line
 
 VARIANTS = "fabricVariant"
 """The variant set of variants that name no set."""
@@ -23,14 +23,7 @@ class Variant:
     """
 
     def __init__(self, *, prim: Usd.Prim, text: str) -> None:
-        chosen, _, name = text.rpartition("=")
-        self.set_name, self.name = chosen or VARIANTS, name
-        for word in (self.set_name, self.name):
-            # A variant's name may begin with a digit.
-            if not Sdf.Path.IsValidIdentifier(f"_{word}"):
-                raise FabricError(
-                    f"--variant '{text}'", "is not a name; it must be letters, digits and _"
-                )
+        self.set_name, self.name = names_of(text)
         self.prim = prim
         self.variants = prim.GetVariantSets().AddVariantSet(self.set_name)
         if not self.variants.GetVariantNames():
@@ -73,3 +66,17 @@ class Variant:
             Sdf.CreatePrimInLayer(layer, path)
             Sdf.CopySpec(layer, stated.path, layer, path.AppendProperty(name))
         del stated.owner.properties[name]
+
+
+def names_of(text: str) -> tuple[str, str]:
+    """(variant set, variant) of NAME or SET=NAME; FabricError for what is no name."""
+    chosen, _, name = text.rpartition("=")
+    chosen = chosen or VARIANTS
+    for word in (chosen, name):
+        # A variant's name may begin with a digit.
+        if not word or not Sdf.Path.IsValidIdentifier(f"_{word}"):
+            raise FabricError(
+                f"--variant '{one_line(text, 60)}'",
+                "is not a name; it must be letters, digits and _",
+            )
+    return chosen, name
