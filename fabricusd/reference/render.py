@@ -166,10 +166,11 @@ def render(
         paths[number] = write_picture(
             targets[number][1], result.layers, result.metadata, stops[number], shown
         )
-        # Keep only one frame's layers: those of all frames would fill the memory.
-        for other in found:
-            found[other] = replace(found[other], layers={})
+        # Keep only the last frame's layers: those of all frames would fill the memory.
         found[number] = result
+        for other in found:
+            if other != max(found):
+                found[other] = replace(found[other], layers={})
 
     with Stop() as stop, cluster_or_threads(scheduler, workers) as cluster:
         if cluster is not None and len(targets) >= max(cluster.threads, 2):
