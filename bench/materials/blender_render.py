@@ -42,11 +42,11 @@ def render(job):
         )  # fmt: skip
     else:
         bpy.ops.wm.usd_import(filepath=job["layer"], import_cameras=False, import_lights=False)
-    if "afar" in job:
+    for name, value in job.get("give", {}).items():
         for material in bpy.data.materials:
             for node in material.node_tree.nodes if material.node_tree else ():
-                if "Afar" in node.inputs:
-                    node.inputs["Afar"].default_value = job["afar"]
+                if name in node.inputs:
+                    node.inputs[name].default_value = value
     if job["material"] == "osl":
         shade_by_osl(job)
     if job["light"] == "sky":

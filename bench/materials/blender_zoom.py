@@ -4,11 +4,11 @@
 
 The subject is a flat cloth of even threads, and each frame is twice as wide as the one before: from
 40 pixels a thread to about 100 threads a pixel. The lobes take their threads from a texture of one
-repeat (`near`); the same, with the group's input `Afar` driven where a pixel spans threads
-(`blended`); or from nowhere (`far`). For each frame the script prints delta E 2000 against the
-reference, and how far the frame is from the one before, where both show the same cloth: the means
-of 2 x 2 pixels of the nearer frame against the middle of the wider one. It writes the frames of a
-preset below one another: reference, and the three.
+repeat (`near`, without the automatic blend); the same, blended into the cloth from afar by the
+distance of the camera, as the add-on imports it (`blended`); or from nowhere (`far`). For each
+frame the script prints delta E 2000 against the reference, and how far the frame is from the one
+before, where both show the same cloth: the means of 2 x 2 pixels of the nearer frame against the
+middle of the wider one. It writes the frames of a preset below one another: reference, and modes.
 """
 
 from __future__ import annotations
@@ -57,21 +57,12 @@ TOWARDS = np.array([-0.1, 0.62, 0.78])
 ONE, MORE = 0.5, 8
 """Threads from which a pixel takes MORE times the samples: Cycles reads textures at points."""
 
-BLUR, WHOLE = 0.8, 3.2
-"""Threads that a pixel spans where `blended` begins to take the cloth from afar, and where it is
-wholly so."""
-
 MODES = {"near": "repeat", "blended": "repeat", "far": "off"}
 
 
 def spans():
     """Threads that a pixel spans, frame by frame."""
     return [NEAREST * 2.0**k for k in range(FRAMES)]
-
-
-def afar(span):
-    """The group's input `Afar`, as a user would drive it by the distance of the camera."""
-    return float(np.clip(math.log(span / BLUR) / math.log(WHOLE / BLUR), 0.0, 1.0))
 
 
 def eye(span):
@@ -139,7 +130,7 @@ def jobs_of(scene, folder, stem, spp, mode):
             "scene": str(scene), "light": "sun", "picture": str(folder / f"{stem}.{mode}.{k}.exr"),
             "size": (SIDE, SIDE), "spp": spp * (MORE if mode == "near" and span > ONE else 1),
             "bounces": 0, "irradiance": math.pi,
-            **({"afar": afar(span)} if mode == "blended" else {}),
+            **({"give": {"Thread Width": 0.0}} if mode == "near" else {}),
             "towards_light": unit.tolist(), "focal_length": FOCAL, "clip": 1e-4,
             "camera": [list(row) for row in look_at(eye(span), (0.0, 0.0, 0.0))],
         }
@@ -181,25 +172,26 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("build/zoom"))
     parser.add_argument("--presets", nargs="+", default=list(PRESETS))
     parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--modes", nargs="+", choices=MODES, default=list(MODES))
     parser.add_argument("--level", default="auto", help="level of the reference")
     options = parser.parse_args()
     folder = options.out.resolve()
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "addons").mkdir(exist_ok=True)
     write_addon(folder / "addons" / "fabricusd_looks")
-    names = " | ".join(MODES)
+    names = " | ".join(options.modes)
     print(f"| preset | threads a pixel | delta E: {names} | step: reference | {names} |")
-    print("|---" * (3 + 2 * len(MODES)) + "|")
+    print("|---" * (3 + 2 * len(options.modes)) + "|")
     for preset in options.presets:
         scene = make_scene(even(load(preset)), folder, preset)
         truth = [read(p) for p in references(scene, folder, preset, options.level, options.spp)]
         made = {}
-        for mode in MODES:
+        for mode in options.modes:
             jobs = jobs_of(scene, folder, preset, options.spp, mode)
             made[mode] = [read(p) for p in cycles(options.blender, jobs, folder, preset)]
         rows = (truth, *made.values())
         for k, span in enumerate(spans()):
-            off = [float(delta_e_2000(made[mode][k], truth[k]).mean()) for mode in MODES]
+            off = [float(delta_e_2000(made[mode][k], truth[k]).mean()) for mode in options.modes]
             steps = [step(row[k - 1], row[k]) if k else math.nan for row in rows]
             numbers = " | ".join(f"{x:.1f}" for x in (*off, *steps))
             print(f"| {preset} | {span:.3g} | {numbers} |", flush=True)

@@ -107,8 +107,11 @@ def evaluate(kind, surface, wi, wo):
     return values_of(*shaders(*inputs_of(kind, surface)), wi, wo)
 
 
-def values_of(vertex, fragment, wi, wo):
-    """(n, 3) values of a shader on a plane at the origin, x along the tangent."""
+def values_of(vertex, fragment, wi, wo, textures=None):
+    """(n, 3) values of a shader on a plane at the origin, x along the tangent.
+
+    textures : the one texel, up to four numbers, of each sampler whose name starts with the key
+    """
     context = moderngl.create_standalone_context(backend="egl")
     program = context.program(vertex_shader=vertex, fragment_shader=fragment)
     for name in ("u_worldMatrix", "u_viewProjectionMatrix", "u_worldInverseTransposeMatrix"):
@@ -118,15 +121,21 @@ def values_of(vertex, fragment, wi, wo):
         "i_position": [[-1, -1, 0], [3, -1, 0], [-1, 3, 0]],
         "i_normal": [[0, 0, 1]] * 3,
         "i_tangent": [[1, 0, 0]] * 3,
+        "i_texcoord_0": [[0.5, 0.5]] * 3,
     }
     buffers = [
-        (context.buffer(np.array(v, "f4").tobytes()), "3f", k)
+        (context.buffer(np.array(v, "f4").tobytes()), f"{len(v[0])}f", k)
         for k, v in corners.items()
         if k in program
     ]
     triangle = context.vertex_array(program, buffers)
     target = context.simple_framebuffer((1, 1), components=4, dtype="f4")
     target.use()
+    for place, (name, texel) in enumerate((textures or {}).items()):
+        (sampler,) = (one for one in program if one.startswith(f"{name}_file"))
+        held = np.array(texel, "f4")
+        context.texture((1, 1), len(held), held.tobytes(), dtype="f4").use(place)
+        program[sampler] = place
     program["u_numActiveLightSources"] = 1
     program["u_lightData[0].type"] = 1
     program["u_lightData[0].color"] = (1.0, 1.0, 1.0)

@@ -14,7 +14,7 @@ from fabricusd.images.files import read_mip_level, write_png
 from fabricusd.materials.bake_folder import BakedLay, BakeFolder, MapSet
 from fabricusd.materials.fit.fit import Fitted, bounds_met, thread_factors, with_threads
 from fabricusd.materials.fit.keep import kept_fit, kept_fit_threads
-from fabricusd.materials.fit.spanning import level_of, write_spanning_maps
+from fabricusd.materials.fit.spanning import takes_the_mean, write_spanning_maps
 from fabricusd.materials.fit.texels import draw_texels, mean_texel
 from fabricusd.materials.fit.thread_maps import COLUMNS, Factors, write_thread_maps
 from fabricusd.materials.lobes.fit import COUNT
@@ -331,7 +331,7 @@ def _garment_looks(
     looks, seen, factors = [], [], {}
     for number, lay in enumerate(maps.lays):
         shown = maps
-        if level_of(maps, lay) > 0:
+        if takes_the_mean(maps, lay):
             shown, files = write_spanning_maps(maps, number, maps_folder(path))
             made.files += files
         seen.append(shown)

@@ -45,25 +45,31 @@ CHANNELS = {
 
 
 def lobe_level(matrix: Floats, width: int) -> int:
-    """The mip level whose texels span SPANNED threads; 0 where texels resolve threads.
+    """The mip level whose texels span SPANNED threads; 0 where texels resolve threads, and where
+    they span as many by themselves.
 
     matrix : (2, 2) threads per UV; width : texels per side
     """
-    threads = float(np.linalg.norm(matrix, axis=1).min()) / width
-    if threads * RESOLVED <= 1.0 or threads <= 0.0:
+    threads = threads_per_texel(matrix, width)
+    if threads * RESOLVED <= 1.0:
         return 0
     return max(0, math.ceil(math.log2(SPANNED / threads)))
 
 
-def level_of(maps: MapSet, lay: BakedLay) -> int:
-    """The mip level whose mean the look of a lay takes these maps from.
+def threads_per_texel(matrix: Floats, width: int) -> float:
+    """Threads that a texel spans, of the set of which it spans fewer; arguments of lobe_level."""
+    return float(np.linalg.norm(matrix, axis=1).min()) / width
 
-    It is 0, for the bake's own maps, where one of them is missing, and where each thread is fitted
-    by itself, which starts at fewer texels per thread.
+
+def takes_the_mean(maps: MapSet, lay: BakedLay) -> bool:
+    """Whether the look of a lay takes these maps from the mean of the cloth.
+
+    It takes the bake's own maps where texels resolve threads, where one of the maps is missing, and
+    where each thread is fitted by itself, which starts at fewer texels per thread.
     """
     if any(not maps.textures.get(name) for name in CHANNELS) or resolved(maps, lay):
-        return 0
-    return lobe_level(lay.matrix, _width(maps))
+        return False
+    return threads_per_texel(lay.matrix, _width(maps)) * RESOLVED > 1.0
 
 
 def write_spanning_maps(maps: MapSet, number: int, folder: Path) -> tuple[MapSet, list[Path]]:

@@ -44,8 +44,7 @@ ROUNDS, AGAIN = 8, 3
 """Rounds of reweighting, at first and after a change of widths."""
 
 RIDGE = 2e-2
-"""Weight of the likely factors. With a tenth of it, the lobes of shot silk are not told apart near
-by, and the mean over texels of a thread's width is 3.8 off the far mixture, not .7."""
+"""Weight of the likely factors, which decide where lobes cannot be told apart near by."""
 
 MEAN = 1.0
 """Weight of the mean over the points, which is to be the far mixture; the points have 1."""

@@ -9,6 +9,7 @@ cycles:near:through floats[24]         light through, if there is any
 cycles:near:lobes_weft asset ...       the textures
 cycles:near:threads floats[6]          u and v of the threads by row, and their offset, in
 cycles:near:repeat floats[2]           repeats of the textures; absent if they lie on the UVs
+cycles:near:density floats[1]          threads along a UV of 1, the geometric mean of both sets
 """
 
 from __future__ import annotations
@@ -34,11 +35,13 @@ class Laid:
     threads : (2, 3) threads by the UVs, with their offset in the last column; None if the textures
         lie on the UVs
     repeat : ends and picks of a texture
+    density : threads along a UV of 1, the geometric mean of both sets; 0 if it is not known
     """
 
     textures: Mapping[str, Texture]
     threads: Floats | None = None
     repeat: tuple[int, int] = (1, 1)
+    density: float = 0.0
 
 
 def near_inputs(near: NearMixture, laid: Laid, cover: float) -> dict[str, Value | Texture]:
@@ -55,6 +58,8 @@ def near_inputs(near: NearMixture, laid: Laid, cover: float) -> dict[str, Value 
     if laid.threads is not None:
         arrays["threads"] = np.concatenate((laid.threads[:, :2].ravel(), laid.threads[:, 2]))
         arrays["repeat"] = np.array(laid.repeat, np.float64)
+    if laid.density > 0.0:
+        arrays["density"] = np.array([laid.density])
     found: dict[str, Value | Texture] = {
         name: Value("floats", tuple(float(x) for x in one.ravel())) for name, one in arrays.items()
     }

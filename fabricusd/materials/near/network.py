@@ -192,7 +192,8 @@ def _extracted(b: Builder, name: str, vector: Source, index: int) -> Link:
 
 
 def _floor(b: Builder, name: str, number: Source) -> Link:
-    return b.math(name, "max", "float", number, one(1e-12))
+    # MaterialX writes constants into shaders with six decimals: a smaller one would be 0.
+    return b.math(name, "max", "float", number, one(1e-6))
 
 
 def _mixed(b: Builder, name: str, none: Source, whole: Source, share: Source) -> Link:

@@ -70,8 +70,15 @@ def _of_texels(maps: MapSet, made: Files) -> dict[int, Threads]:
         if maps.udim:
             path = path.with_name(path.name.replace(f".{number}.", ".<UDIM>."))
         textures[name] = Texture(path)
-    laid = Laid(textures=textures)
-    return {k: Threads(laid=laid, parts=one) for k, one in enumerate(parts)}
+    return {
+        k: Threads(laid=Laid(textures=textures, density=_density(lay)), parts=one)
+        for k, (lay, one) in enumerate(zip(maps.lays, parts, strict=True))
+    }
+
+
+def _density(lay: BakedLay) -> float:
+    """Threads along a UV of 1, the geometric mean of both sets."""
+    return float(np.sqrt(abs(np.linalg.det(lay.matrix))))
 
 
 def _of_repeat(lay: BakedLay, made: Files) -> Threads:
@@ -85,5 +92,7 @@ def _of_repeat(lay: BakedLay, made: Files) -> Threads:
             made.files.append(path)
         textures[name] = Texture(path)
     threads = np.concatenate((lay.matrix, lay.offset.reshape(2, 1)), axis=1)
-    laid = Laid(textures=textures, threads=threads, repeat=true_repeat(lay.fabric))
+    laid = Laid(
+        textures=textures, threads=threads, repeat=true_repeat(lay.fabric), density=_density(lay)
+    )  # fmt: skip
     return Threads(laid=laid, parts=parts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +13,12 @@ from fabricusd.bake.job import Settings as BakeSettings
 from fabricusd.fabric import Binding
 from fabricusd.images.files import read_mip_level
 from fabricusd.materials.bake_folder import read_bake_folder
-from fabricusd.materials.fit.spanning import CHANNELS, level_of, lobe_level, write_spanning_maps
+from fabricusd.materials.fit.spanning import (
+    CHANNELS,
+    lobe_level,
+    takes_the_mean,
+    write_spanning_maps,
+)
 from fabricusd.materials.fit.texels import draw_texels, mean_texel
 from fabricusd.materials.materials import write_materials
 from fabricusd.materials.recipes import Settings
@@ -46,7 +52,7 @@ def baked(request, tmp_path_factory):
 
 
 def test_the_maps_are_the_mean_of_the_cloth(baked, tmp_path):
-    assert level_of(baked, baked.lays[0]) == 3
+    assert takes_the_mean(baked, baked.lays[0])
     made, files = write_spanning_maps(baked, 0, tmp_path)
     assert sorted(files) == sorted(made.textures[name][1001] for name in CHANNELS)
     for name in baked.textures:
@@ -62,6 +68,12 @@ def test_the_maps_are_the_mean_of_the_cloth(baked, tmp_path):
     assert ratio > np.median(fine["roughness_along"] / fine["roughness_across"])
     whole = read_mip_level(baked.textures["roughness_across"][1001], 6)[0, 0]
     assert found["roughness_across"] == pytest.approx(whole, rel=0.03)
+
+
+@pytest.mark.parametrize(("times", "mean"), [(1 / 8, False), (2 / 3, True), (4, True), (16, True)])
+def test_all_texels_that_do_not_resolve_threads_take_the_mean(baked, times, mean):
+    lay = replace(baked.lays[0], matrix=baked.lays[0].matrix * times)
+    assert takes_the_mean(baked, lay) == mean
 
 
 def test_a_lay_in_two_directions_of_texels_keeps_its_axes(tmp_path, monkeypatch):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from materials.lobes.mixtures import LEVEL, PAIR, mixture
 
-from fabricusd.materials.lobes.mixture import Mixture
+from fabricusd.materials.lobes.mixture import MATERIALX, Mixture
 from fabricusd.materials.near.mixture import NearMixture
 from fabricusd.materials.near.parts import COUNT, Parts, Texels
 
@@ -47,3 +49,11 @@ def mixed(seed: int = 2, gap: float = 0.2) -> Texels:
     lean = sets * rng.uniform(-0.05, 0.05, (1, 2))
     tint = sets[..., None] * rng.uniform(0.7, 1.3, (1, 2, 3))
     return Texels(share=share, lean=lean, spread=sets * 0.006, tint=tint)
+
+
+def far_of_two() -> Mixture:
+    """A mixture of a pair and a level lobe."""
+    return mixture(MATERIALX, PAIR, replace(LEVEL, tilt=0.4))
+
+
+TEXELS = {"weft": point(1), "warp": point(6), "mixed": mixed()}

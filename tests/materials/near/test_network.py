@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from materials.lobes.mixtures import LEVEL, PAIR, directions, mixture
-from materials.near.cloths import mixed, near_mixture, point
+from materials.lobes.mixtures import directions
+from materials.near.cloths import TEXELS, far_of_two, mixed, near_mixture
 
-from fabricusd.materials.lobes.mixture import MATERIALX, of_covered
+from fabricusd.materials.lobes.mixture import of_covered
 from fabricusd.materials.lobes.network import lobes
 from fabricusd.materials.near.inputs import Laid
 from fabricusd.materials.near.maps import TINTS, texel_pixels
 from fabricusd.materials.near.mixture import evaluate
 from fabricusd.materials.near.network import NearTexel
-from fabricusd.materials.networks.graph import Texture, unrolled
+from fabricusd.materials.networks.graph import Texture, Value, unrolled
 from tests.materials.lobes.test_network import MATRIX, OPACITY, document_of, shown, turned
 
-FAR = mixture(MATERIALX, PAIR, replace(LEVEL, tilt=0.4))
-TEXELS = {"weft": point(1), "warp": point(6), "mixed": mixed()}
+FAR = far_of_two()
+RECORDED = json.loads(Path(__file__).with_name("materialx_near.json").read_text())
 
 
 def laid(texel, *, tints=True, repeat=False):
@@ -51,6 +52,25 @@ def test_the_network_computes_the_lobes_of_the_texel(name, monkeypatch):
     wi, wo = directions(40)
     found = rendered(network(near, texel, opaque=True), texel, wi, wo, monkeypatch)
     assert found == pytest.approx(evaluate(near, texel, wi, wo), rel=1e-5, abs=1e-7)
+
+
+@pytest.mark.parametrize("name", TEXELS)
+def test_materialx_renders_the_lobes_of_the_texel(name):
+    """The values that the GLSL of MaterialX gives, by bench/materials/near_values.py."""
+    wi, wo = np.array(RECORDED["wi"]), np.array(RECORDED["wo"])
+    got = np.array(RECORDED["values"][name])
+    ours = evaluate(near_mixture(FAR), TEXELS[name], wi, wo)
+    assert ours == pytest.approx(got, rel=2e-3, abs=1e-6)
+
+
+def test_no_bound_is_below_the_six_decimals_that_materialx_writes():
+    graph = network(near_mixture(FAR), mixed(), opaque=False)
+    bounds = [
+        given.value
+        for node in graph.nodes if node.category == "max"
+        for given in node.inputs.values() if isinstance(given, Value)
+    ]  # fmt: skip
+    assert min(abs(x) for x in bounds if x) >= 1e-6
 
 
 def test_the_opacity_does_not_dim_the_lobes_twice(monkeypatch):

@@ -11,6 +11,7 @@ and nothing of fabricusd outside this folder.
     lobes        the group of a sum of tilted lobes
     threads      what a look says of single threads, without Blender
     near         the lobes of the texel under a point
+    distance     how many threads a pixel spans
     build        give Blender's materials the groups of a stage
     world        the dome light
     hook         do so after any USD import
@@ -22,7 +23,7 @@ from __future__ import annotations
 bl_info = {
     "name": "fabricusd looks",
     "author": "fabricusd authors",
-    "version": (1, 2, 0),
+    "version": (1, 3, 0),
     "blender": (4, 2, 0),
     "location": "File > Import > fabricusd look (.usda, .usdz)",
     "category": "Import-Export",

@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 
+from .distance import WIDTH, thread_width
 from .images import Images
 from .lobes import lays, lobes
 from .looks import Look
@@ -43,6 +44,8 @@ def build(
     surface : one of SURFACES; a look that has not the one gets the other
     """
     made, images = Made(), Images()
+    # So that objects which were just imported are where they belong.
+    bpy.context.view_layer.update()
     shared: dict[Any, Any] = {}
     replaced: set[Any] = set()
     others = []
@@ -135,9 +138,12 @@ def _wire(material: Any, look: Look, tree: Any, images: Images) -> None:
         for name, value in lays(look).items():
             if name in group.inputs:
                 nodes.set(group.inputs[name], value)
-        # Cycles would bend the tilted normals of lobes back towards the viewer.
-        if hasattr(material, "cycles"):
-            material.cycles.use_bump_map_correction = False
+        if look.threads and WIDTH in group.inputs:
+            group.inputs[WIDTH].default_value = thread_width(material, look.threads.density)
+    # Cycles would bend tilted normals back towards the viewer, and dim what they face; fits know
+    # nothing of that.
+    if hasattr(material, "cycles"):
+        material.cycles.use_bump_map_correction = False
     for name, title in TITLES.items():
         if name in look.maps and title in group.inputs:
             image = images(look.maps[name], data=name not in COLORS)

@@ -13,6 +13,7 @@ from typing import Any
 
 import bpy
 
+from .distance import afar
 from .looks import Lobe, Look, Mixture
 from .near import Texel
 from .nodes import Group
@@ -119,16 +120,14 @@ def _near(group: Group, summed: Any, texel: Texel, transparent: bool) -> Any:
         color = group.joined(gap, gap, gap)
         near.append(group.add("ShaderNodeBsdfTransparent", Color=color).outputs[0])
         far = group.seen_through(far, sum(threads.share))
-    afar = [far]
+    whole_cloth = [far]
     if threads.through:
         color = texel.color(threads.through)
         near.append(group.add("ShaderNodeBsdfTranslucent", Color=color).outputs[0])
         whole = threads.whole(threads.through)
-        afar.append(group.add("ShaderNodeBsdfTranslucent", Color=whole).outputs[0])
+        whole_cloth.append(group.add("ShaderNodeBsdfTranslucent", Color=whole).outputs[0])
     # Cycles does not evaluate what a factor of 0 or 1 leaves out.
-    return group.mixed(
-        group.sum(near), group.sum(afar), group.input("Afar", 0.0, low=0.0, high=1.0)
-    )
+    return group.mixed(group.sum(near), group.sum(whole_cloth), afar(group))
 
 
 def _frame(group: Group) -> tuple[Any, Any]:

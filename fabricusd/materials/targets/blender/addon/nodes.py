@@ -110,7 +110,7 @@ class Nodes:
 
 
 class Group(Nodes):
-    """A node group with one shader as its output."""
+    """A node group with one output."""
 
     def __init__(self, name: str) -> None:
         super().__init__(bpy.data.node_groups.new(name, "ShaderNodeTree"))
@@ -138,8 +138,15 @@ class Group(Nodes):
 
     def end(self, shader: Any) -> Any:
         """Make `shader` the group's output; return the group's tree."""
-        self.tree.interface.new_socket("Surface", in_out="OUTPUT", socket_type="NodeSocketShader")
+        return self._ended("Surface", "Shader", shader)
+
+    def end_number(self, name: str, number: Any) -> Any:
+        """Make a number the group's output; return the group's tree."""
+        return self._ended(name, "Float", number)
+
+    def _ended(self, name: str, kind: str, value: Any) -> Any:
+        self.tree.interface.new_socket(name, in_out="OUTPUT", socket_type=f"NodeSocket{kind}")
         output = self.add("NodeGroupOutput")
-        self.tree.links.new(shader, output.inputs["Surface"])
+        self.tree.links.new(value, output.inputs[name])
         self.arrange()
         return self.tree

@@ -10,6 +10,9 @@ from .nodes import Group
 NARROWEST = 0.1
 """Smallest ratio of alphas in the Principled BSDF: aspect^2 = 1 - 0.9 anisotropic."""
 
+FADED = 0.25
+"""Cosine of the viewer and a tilted normal below which sheen fades."""
+
 WHITE = (1.0, 1.0, 1.0)
 
 INSTEAD = {
@@ -56,14 +59,22 @@ def principled(look: Look, name: str) -> Any:
     color = group.vector("MULTIPLY", given("base_color"), scale)
     give("Base Color", group.vector("MINIMUM", color, WHITE))
     _reflection(group, given, fitted, give)
-    give("Sheen Weight", fitted("fuzz_weight", "Fuzz Weight", low=0.0, high=1.0))
+    weight = fitted("fuzz_weight", "Fuzz Weight", low=0.0, high=1.0)
+    normal = group.world(given("normal")) if "normal" in look.maps else None
+    if normal is not None:
+        give("Normal", normal)
+        # Cycles shows full sheen to a viewer below the plane of a tilted normal, which leaning pile
+        # has; in a fit there is none. It fades out, since it is strongest where it would end.
+        eye = group.add("ShaderNodeNewGeometry").outputs["Incoming"]
+        above = group.math("DIVIDE", group.vector("DOT_PRODUCT", normal, eye), FADED)
+        above = group.math("MINIMUM", group.math("MAXIMUM", above, 0.0), 1.0)
+        weight = group.math("MULTIPLY", weight, above)
+    give("Sheen Weight", weight)
     give("Sheen Tint", fitted("fuzz_color", "Fuzz Color", color=True))
     give("Sheen Roughness", fitted("fuzz_roughness", "Fuzz Roughness", low=0.0, high=1.0))
     opacity = given("opacity") if look.transparent else None
     if opacity is not None:
         give("Alpha", opacity)
-    if "normal" in look.maps:
-        give("Normal", group.world(given("normal")))
     shaders = [surface.outputs[0]]
     if look.lit_through:
         # The Principled BSDF has no light through a thin sheet.

@@ -31,6 +31,7 @@ class Threads:
     files : textures by the names in TEXTURES
     matrix : the threads from the UVs, with the offset; empty if the textures lie on the UVs
     repeat : ends and picks of a texture
+    density : threads along a UV of 1, the geometric mean of both sets; 0 if it is not known
     """
 
     share: tuple[float, ...]
@@ -43,6 +44,7 @@ class Threads:
     files: tuple[tuple[str, str], ...]
     matrix: tuple[float, ...]
     repeat: tuple[float, ...]
+    density: float = 0.0
 
     def whole(self, rows: Rows) -> tuple[float, float, float]:
         """Return the sum of rows over the parts of the whole cloth."""
@@ -83,7 +85,7 @@ def read(
         share=share, angle=value("angle"), spread=value("spread"), tinted=value("tinted"), own=own,
         factors=tuple(factors[k : k + PARTS] for k in range(0, len(factors), PARTS)),
         through=_rows(value("through")), files=files, matrix=value("threads"),
-        repeat=value("repeat"),
+        repeat=value("repeat"), density=float(next(iter(value("density")), 0.0)),
     )  # fmt: skip
 
 

@@ -159,6 +159,124 @@ def give(name, value):
     return len(mine)
 
 
+def inputs_named(name):
+    """The value of an input, by the names of the materials whose group has it."""
+    found = {}
+    for one in bpy.data.materials:
+        for node in one.node_tree.nodes:
+            if name in node.inputs:
+                found[one.name] = node.inputs[name].default_value
+    return found
+
+
+def pixel(camera, size, percentage=100):
+    """What the drivers make of a camera: the width of a pixel for 1 m of distance, and beside."""
+    scene = bpy.context.scene
+    data = bpy.data.cameras.new("Eye")
+    for name, value in camera.items():
+        setattr(data, name, value)
+    scene.camera = bpy.data.objects.new("Eye", data)
+    scene.collection.objects.link(scene.camera)
+    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_percentage = percentage
+    seen = bpy.context.evaluated_depsgraph_get()
+    seen.update()
+    tree = next(one for one in bpy.data.node_groups if one.get("fabricusd_pixel"))
+    nodes = tree.evaluated_get(seen).nodes
+    return [n.outputs[0].default_value for n in nodes if n.bl_idname == "ShaderNodeValue"]
+
+
+def texel_levels(path, folder):
+    """The mean of an image where a pixel spans 1, 2, 4 ... texels, with the texture cache on."""
+    clear()
+    scene = bpy.context.scene
+    cached = hasattr(scene.render, "use_texture_cache")
+    if cached:
+        scene.render.use_texture_cache = scene.render.use_auto_generate_texture_cache = True
+    image = bpy.data.images.load(path)
+    image.colorspace_settings.name = "Non-Color"
+    sheet = bpy.data.meshes.new("Sheet")
+    corners = [(-64, -64, 0), (64, -64, 0), (64, 64, 0), (-64, 64, 0)]
+    sheet.from_pydata(corners, [], [(0, 1, 2, 3)])
+    for corner, at in zip(sheet.uv_layers.new(name="st").data, corners, strict=True):
+        corner.uv = at[:2]
+    material = bpy.data.materials.new("Shown")
+    if material.node_tree is None:
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    read, glow = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeEmission")
+    read.image = image
+    links.new(nodes.new("ShaderNodeUVMap").outputs[0], read.inputs[0])
+    links.new(read.outputs[0], glow.inputs[0])
+    links.new(glow.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs[0])
+    sheet.materials.append(material)
+    scene.collection.objects.link(bpy.data.objects.new("Sheet", sheet))
+    camera = bpy.data.cameras.new("Above")
+    camera.type = "ORTHO"
+    scene.camera = bpy.data.objects.new("Above", camera)
+    scene.camera.location = (0.013, 0.017, 5.0)
+    scene.collection.objects.link(scene.camera)
+    found, side = [], 8
+    for level in range(image.size[0].bit_length()):
+        camera.ortho_scale = side * 2.0**level / image.size[0]
+        picture = str(Path(folder) / f"level{level}.exr")
+        render(picture, (side, side), 4)
+        shown = bpy.data.images.load(picture)
+        found.append(sum(list(shown.pixels)[::4]) / side**2)
+    return {"cached": cached, "means": found}
+
+
+def sheen_by_view(picture, normal, views):
+    """The radiance of a sheet of sheen alone, whose texture says `normal`, in an even sky of 1."""
+    clear()
+    scene = bpy.context.scene
+    known = importlib.import_module("fabricusd_looks.looks")
+    make = importlib.import_module("fabricusd_looks.principled").principled
+    values = {
+        "base_color_scale": (0.0,) * 3, "specular_ior": 1.0, "specular_tint": (0.0,) * 3,
+        "smooth_scale": 1.0, "rough_scale": 1.0, "fuzz_weight": 1.0, "fuzz_color": (1.0,) * 3,
+        "fuzz_roughness": 0.3,
+    }  # fmt: skip
+    code = [0.5 * x + 0.5 for x in normal]
+    one = known.Look(
+        path="", name="Pile", fabric="", values=values, maps={"normal": ""},
+        constants={"normal": code}, transparent=False, mixture=None,
+    )  # fmt: skip
+    material = bpy.data.materials.new("Pile")
+    if material.node_tree is None:
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    group = nodes.new("ShaderNodeGroup")
+    group.node_tree = make(one, "Pile")
+    links.new(group.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs[0])
+    material.cycles.use_bump_map_correction = False
+    sheet = bpy.data.meshes.new("Sheet")
+    corners = [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)]
+    sheet.from_pydata(corners, [], [(0, 1, 2, 3)])
+    for corner, at in zip(sheet.uv_layers.new(name="st").data, corners, strict=True):
+        corner.uv = at[:2]
+    sheet.materials.append(material)
+    scene.collection.objects.link(bpy.data.objects.new("Sheet", sheet))
+    scene.world = bpy.data.worlds.new("Even")
+    if scene.world.node_tree is None:
+        scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs[0].default_value = (1.0, 1.0, 1.0, 1.0)
+    scene.cycles.max_bounces = 0
+    scene.camera = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
+    scene.camera.data.lens = 5000.0
+    scene.collection.objects.link(scene.camera)
+    found = []
+    for k, view in enumerate(views):
+        scene.camera.location = Vector(view) * 5.0
+        scene.camera.rotation_euler = Vector(view).to_track_quat("Z", "Y").to_euler()
+        name = picture.replace("*", str(k))
+        render(name, (4, 4), 64)
+        found.append(sum(list(bpy.data.images.load(name).pixels)[1::4]) / 16)
+    return found
+
+
 def look(picture, size, spp):
     """Render through the camera that was imported."""
     scene = bpy.context.scene

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from materials.lobes.mixtures import LEVEL, PAIR, mixture
 from materials.near.cloths import mixed, near_mixture, point
-from pxr import Sdf, Usd, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from fabricusd.images.files import read_exr_layers
 from fabricusd.materials.lobes.inputs import inputs
@@ -38,15 +38,18 @@ COVER = 0.9
 CASES = {
     "point of the weft": point(1), "point of the warp": point(6), "mixed": mixed(),
     "half a gap": mixed(gap=0.5), "repeat": mixed(seed=5), "afar": mixed(seed=6),
-    "half afar": mixed(seed=7),
+    "half afar": mixed(seed=7), "by distance": mixed(seed=8),
 }  # fmt: skip
 
 
 AFAR = {"afar": 1.0, "half afar": 0.5}
 """The group's input of that name; 0 in all other cases."""
 
+SPAN = 1.3
+"""Threads that a pixel spans in the case "by distance", where a square faces the camera."""
 
-def laid(folder, name, texel, size=4):
+
+def laid(folder, name, texel, density, size=4):
     """Textures all of whose texels are `texel`, or else, of a repeat, all but one quarter."""
     textures, layers = {}, {}
     for key, row in texel_pixels(texel).items():
@@ -59,17 +62,17 @@ def laid(folder, name, texel, size=4):
         layers[key] = pixels.astype(np.float16).astype(np.float32)[:1, :1]
     # The squares show UVs from .15 to .85: an eighth of a repeat, before its middle.
     turned = np.array(((0.5, 0.0, 0.1), (0.0, 0.5, 0.0)))
-    found = Laid(textures=textures)
+    found = Laid(textures=textures, density=density)
     if name == "repeat":
         found = Laid(textures=textures, threads=turned, repeat=(2, 4))
     return found, texels_of(layers)
 
 
-def write_near_sheet(path, texel, along):
+def write_near_sheet(path, texel, along, density=0.0):
     """The sheet of the far mixture, with inputs for one texel; return the texel as it is stored."""
     near = near_mixture(FAR)
     write_sheet(path, FAR, along, COVER)
-    textures, stored = laid(path.parent, path.stem, texel)
+    textures, stored = laid(path.parent, path.stem, texel, density)
     stage = Usd.Stage.Open(str(path))
     given = inputs(of_covered(FAR, COVER), "cloth", MATRIX) | near_inputs(near, textures, COVER)
     write_material(stage, Sdf.Path("/Sheet/Cloth"), [], given, path.parent)
@@ -88,6 +91,21 @@ def expected(near, texel, along):
     return IRRADIANCE * evaluate(near, texel, frame @ TOWARDS, frame @ (0.0, 0.0, 1.0))
 
 
+def width_of(name):
+    """Metres of a thread, 0 for none; a pixel is a square's side over SIDE."""
+    return 1.0 / SIDE / SPAN if name == "by distance" else 0.0
+
+
+def away_of(name, along):
+    """How much of the cloth from afar each square shows, as a column."""
+    if name != "by distance":
+        return AFAR.get(name, 0.0)
+    span = SPAN / np.sqrt(np.abs(along[:, 2:, 2]))
+    found = np.clip(np.log(span / 0.8) / np.log(4.0), 0.0, 1.0)
+    assert found.min() < 0.4 < 0.8 < found.max()
+    return found
+
+
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory):
     """Radiance that Cycles renders, what is expected, and opacity, by the name of the case."""
@@ -99,6 +117,7 @@ def rendered(tmp_path_factory):
         steps += [
             {"do": "clear"}, {"do": "bring", "path": str(folder / f"{name}.usda")},
             {"do": "give", "name": "Afar", "value": AFAR.get(name, 0.0)},
+            {"do": "give", "name": "Thread Width", "value": width_of(name)},
             {
                 "do": "from_above", "picture": str(folder / f"{name}.exr"), "cells": CELLS,
                 "towards_light": TOWARDS.tolist(), "irradiance": IRRADIANCE,
@@ -110,7 +129,7 @@ def rendered(tmp_path_factory):
         pixels = read_exr_layers(folder / f"{name}.exr")[0]["beauty"][::-1]
         middle = pixels[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE].reshape(CELLS * CELLS, -1)
         cells = pixels.reshape(CELLS, SIDE, CELLS, SIDE, -1)[:, 6:11, :, 6:11, 3]
-        away, whole = AFAR.get(name, 0.0), expected(near, near.parts.texel, along)
+        away, whole = away_of(name, along), expected(near, near.parts.texel, along)
         truth = (1.0 - away) * expected(near, texel, along) + away * whole
         found[name] = middle[:, :3], truth, cells, texel
     return found
@@ -156,3 +175,45 @@ def test_a_look_that_lacks_a_part_of_the_threads_is_the_cloth_from_afar(tmp_path
     (look,) = looks.read(stage)
     assert look.threads is None
     assert look.mixture is not None
+
+
+CAMERAS = {
+    # lens, sensor [mm], size of the picture: width of a pixel for a metre of distance, and beside
+    "wide": ({"lens": 50.0, "sensor_width": 36.0}, (1000, 500), 0.72e-3, 0.0),
+    "tall": ({"lens": 50.0, "sensor_width": 36.0}, (500, 1000), 0.72e-3, 0.0),
+    "tall, by width": (
+        {"lens": 50.0, "sensor_width": 36.0, "sensor_fit": "HORIZONTAL"}, (500, 1000), 1.44e-3, 0.0,
+    ),
+    "wide, by height": (
+        {"lens": 50.0, "sensor_height": 24.0, "sensor_fit": "VERTICAL"}, (1000, 500), 0.96e-3, 0.0,
+    ),
+    "orthographic": ({"type": "ORTHO", "ortho_scale": 2.0}, (1000, 500), 0.0, 2e-3),
+    "panoramic": ({"type": "PANO"}, (1000, 500), 6.2832e-3, 0.0),
+}  # fmt: skip
+
+
+def test_the_width_of_a_pixel_follows_the_camera(tmp_path):
+    write_near_sheet(tmp_path / "mixed.usda", mixed(), frames())
+    steps = [{"do": "bring", "path": str(tmp_path / "mixed.usda")}]
+    steps += [{"do": "pixel", "camera": c, "size": size} for c, size, *_ in CAMERAS.values()]
+    camera, size, *_ = CAMERAS["wide"]
+    steps.append({"do": "pixel", "camera": camera, "size": size, "percentage": 50})
+    told = in_blender(tmp_path, *steps)
+    for (*_, per_metre, alone), found in zip(CAMERAS.values(), told[1:], strict=False):
+        assert found == pytest.approx([per_metre, alone], rel=1e-4)
+    assert told[-1] == pytest.approx([1.44e-3, 0.0], rel=1e-4)
+
+
+def test_the_width_of_a_thread_comes_from_the_mesh(tmp_path):
+    """A UV of 1 is a metre of the sheet; its parent doubles it, and one thread in 12 is a UV."""
+    path = tmp_path / "mixed.usda"
+    write_near_sheet(path, mixed(), frames(), density=12.0)
+    stage = Usd.Stage.Open(str(path))
+    UsdGeom.XformCommonAPI(stage.GetPrimAtPath("/Sheet/Squares")).SetScale((2.0, 2.0, 2.0))
+    stage.GetRootLayer().Save()
+    told = in_blender(
+        tmp_path, {"do": "bring", "path": str(path)},
+        {"do": "inputs_named", "name": "Thread Width"}, {"do": "inputs_named", "name": "Afar"},
+    )  # fmt: skip
+    assert told[1] == {"Cloth": pytest.approx(2.0 / 12.0, rel=1e-4)}
+    assert told[2] == {"Cloth": 0.0}

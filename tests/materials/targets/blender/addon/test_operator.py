@@ -88,7 +88,7 @@ def test_one_step_back_takes_away_all_of_an_import(folder, tmp_path):
     steps += [{"do": "push", "message": "after"}, {"do": "counts"}, {"do": "undo"}, {"do": "redo"}]
     told = in_blender(tmp_path, *steps)
     before, after, undone, redone = told[1], told[4], told[5], told[6]
-    assert (before["node_groups"], after["node_groups"]) == (0, 3)
+    assert (before["node_groups"], after["node_groups"]) == (0, 4)
     assert undone == before
     assert redone == after
 
