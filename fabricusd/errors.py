@@ -47,6 +47,10 @@ class FabricError(ValueError):
         self.problem = problem
         super().__init__(f"{where} {problem}" if where else problem)
 
+    def __reduce__(self) -> tuple[type[FabricError], tuple[str, str]]:
+        # An exception is unpickled from `args`, which here is the one line.
+        return type(self), (self.where, self.problem)
+
     def inside(self, where: str) -> FabricError:
         """The same problem, its place prefixed by `where`."""
         return FabricError(f"{where} {self.where}".strip(), self.problem)

@@ -291,8 +291,11 @@ def make_skirt(folder: Path, *, around: int = 120, down: int = 44, steps: int = 
 
 
 @cache
-def hung_skirt(*, around: int, down: int, steps: int) -> Grid:
-    """The skirt as it hangs, from the hem upwards, so that the outside is the front."""
+def hung_skirt(*, around: int, down: int, steps: int, factor: int = 3, substeps: int = 1) -> Grid:
+    """The skirt as it hangs, from the hem upwards, so that the outside is the front.
+
+    factor : by which the simulated grid is refined; substeps : more of them stretch it less
+    """
     waist, length, sweep = 1.05, 0.58, math.radians(105)
     # Each panel is a sector of a ring; at the waist it is as long as half the girth of the figure.
     t = np.linspace(0, 2 * math.pi, around, endpoint=False)
@@ -326,8 +329,11 @@ def hung_skirt(*, around: int, down: int, steps: int) -> Grid:
     pinned = np.zeros(start.shape[:2], bool)
     pinned[:, 0] = True
     body = turned_body(BODY_HEIGHTS, BODY_RADII, 0.006)
-    hung = simulate(start, flat, body, pinned=pinned, around=True, steps=steps, bending=0.06)
-    fine = finer(hung, 3, around=True)
+    hung = simulate(
+        start, flat, body, pinned=pinned, around=True, steps=steps, bending=0.06,
+        substeps=substeps, passes=12 if substeps == 1 else 1,
+    )  # fmt: skip
+    fine = finer(hung, factor, around=True) if factor > 1 else hung
     uv, cuts = _skirt_uv(fine.shape, inner, length, sweep)
     return Grid(fine[:, ::-1], uv[:, ::-1], True, cuts)
 
@@ -379,10 +385,24 @@ def figure(stage: Usd.Stage) -> None:
     bind(stage, stand, "/World/Looks/Figure")
 
 
+def make_garment(path: Path) -> Path:
+    """The skirt that the package ships, see `fabricusd.samples.garment`: hardly stretched."""
+    grid = hung_skirt(around=120, down=44, steps=420, factor=1, substeps=24)
+    np.savez_compressed(path, points=grid.points.astype(np.float32), uv=grid.uv.astype(np.float32))
+    return path
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description="Make the sample scenes.")
     parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).resolve().parent)
-    folder = parser.parse_args().folder
+    parser.add_argument(
+        "--garment", type=Path, help="make only the garment of the package, as this .npz"
+    )
+    options = parser.parse_args()
+    if options.garment:
+        print(make_garment(options.garment))
+        return
+    folder = options.folder
     folder.mkdir(parents=True, exist_ok=True)
     from lit_from_behind import make_curtain, make_lit_drape, make_lit_skirt
 

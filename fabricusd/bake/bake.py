@@ -46,6 +46,7 @@ from fabricusd.bake.work.scratch import Scratch
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric
 from fabricusd.files import remove_partial_files, write_json
+from fabricusd.run.cluster import Cluster, cluster_or_threads
 from fabricusd.run.workers import worker_count
 from fabricusd.scene.read import as_binding, read_scene
 from fabricusd.scene.scene import Scene
@@ -66,6 +67,7 @@ def bake(
     units: str | None = None,
     resume: bool = False,
     workers: int | None = None,
+    scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Baked:
     """Bake every mesh of `scene` that wears a fabric: write textures and a manifest to `out`.
@@ -74,6 +76,8 @@ def bake(
     mesh : path of a single mesh to bake; None bakes all of them
     units : length unit of an .obj or .ply file, see `read_scene`
     resume : continue an interrupted bake of the same job
+    scheduler : of the Dask cluster that computes the blocks, see `run.cluster.open_cluster`; None
+        for threads of this process
 
     Raises FabricError before anything is written if the scene, the mesh or a setting cannot be
     baked or if another process bakes into `out`. Raises FabricError if the disk fills up; finished
@@ -84,9 +88,9 @@ def bake(
     count = worker_count(workers)
     job = _job(scene, settings, fabric, mesh, units)
     folder = _folder(out)
-    with locked(folder):
+    with cluster_or_threads(scheduler, workers) as cluster, locked(folder):
         remove_partial_files(folder / "report")
-        result = _bake(job, folder, resume=resume, workers=count, progress=progress)
+        result = _bake(job, folder, resume, count, cluster, progress)
         if result.finished:
             result.seconds = time.perf_counter() - began
             write_json(folder / "manifest.json", manifest_of(result, settings, Path(scene)))
@@ -152,7 +156,12 @@ def _job(
 
 
 def _bake(
-    job: _Job, folder: Path, *, resume: bool, workers: int, progress: Progress | None
+    job: _Job,
+    folder: Path,
+    resume: bool,
+    workers: int,
+    cluster: Cluster | None,
+    progress: Progress | None,
 ) -> Baked:
     """Write the textures, meshes and fabrics to `folder` and measure their errors."""
     settings, found = job.settings, job.found
@@ -174,11 +183,19 @@ def _bake(
         tried=tried,
         notes=[*job.notes, *(n for g in found for n in g.notes), *_coarse(found, resolution)],
     )
-    scratch = Scratch(folder, _key(found, settings, resolution, maps), resume=resume)
-    _check_space(folder, job, resolution, maps)
+    values = cluster is not None
+    key = _key(found, settings, resolution, maps, values=values)
+    scratch = Scratch(folder, key, resume=resume)
+    _check_space(folder, job, resolution, maps, values=values)
     files = Files(folder=folder, udim=settings.udim, file_format=settings.file_format)
     work = Work(
-        scratch=scratch, sheets=sheets, maps=maps, files=files, workers=workers, progress=progress
+        scratch=scratch,
+        sheets=sheets,
+        maps=maps,
+        files=files,
+        workers=workers,
+        progress=progress,
+        cluster=cluster,
     )
     result.finished = compute(work) and assemble(work)
     if not result.finished:
@@ -392,20 +409,29 @@ def _recipes(job: _Job) -> dict[Fabric, Recipe]:
 
 
 def _key(
-    found: Sequence[Garment], settings: Settings, resolution: int, maps: Sequence[TextureMap]
+    found: Sequence[Garment],
+    settings: Settings,
+    resolution: int,
+    maps: Sequence[TextureMap],
+    *,
+    values: bool,
 ) -> str:
     words = [__version__, repr(settings), str(resolution), *(t.name for t in maps)]
     words += [one.name + one.fingerprint for one in found]
+    # Blocks of a cluster are stored otherwise.
+    words += ["values"] if values else []
     return hashlib.sha256("\n".join(words).encode()).hexdigest()
 
 
-def _check_space(folder: Path, job: _Job, resolution: int, maps: Sequence[TextureMap]) -> None:
+def _check_space(
+    folder: Path, job: _Job, resolution: int, maps: Sequence[TextureMap], *, values: bool = False
+) -> None:
     """Raise FabricError if the disk has less than the bake's working space.
 
     folder : may be missing
     """
     need = sum(
-        len(places) * space_needed(one, resolution, maps)
+        len(places) * space_needed(one, resolution, maps, values=values)
         for one, places in zip(job.found, job.tiles, strict=True)
     )
     free = shutil.disk_usage(_nearest(folder)).free

@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 from fabricusd.cli.arguments.number import number
+from fabricusd.cli.arguments.scheduler import add_scheduler
 from fabricusd.cli.arguments.units import add_units
 from fabricusd.errors import FabricError
 
@@ -71,6 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=number("workers"), metavar="N", help="CPU threads (default: all)"
     )
+    add_scheduler(parser)
     parser.add_argument("-n", "--dry-run", action="store_true",
         help="check, but write nothing; without -o, the folder is not checked",
     )  # fmt: skip
@@ -163,7 +165,7 @@ def run(options: argparse.Namespace) -> int:
     result = bake(
         options.scene, out, settings, fabric=options.fabric, mesh=options.mesh,
         units=options.units, resume=options.resume, workers=options.workers,
-        progress=_progress(options),
+        scheduler=options.scheduler, progress=_progress(options),
     )  # fmt: skip
     if not options.quiet:
         for note in result.notes:

@@ -49,6 +49,7 @@ COMMANDS = {
     "chart": "measure and plot the speed and accuracy of every method",
     "cache": "list or clear the files that are cached on disk",
     "plugin-path": "print the folder to set PXR_PLUGINPATH_NAME to",
+    "samples": "write a garment, a sky, artwork and drafts to try everything with",
     "demo": "write every preset into a folder, check it and print it",
 }
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fabricusd.cli.arguments.number import number
+from fabricusd.cli.arguments.scheduler import add_scheduler
 from fabricusd.cli.arguments.staging import add_staging, given_staging
 from fabricusd.cli.arguments.units import add_units
 from fabricusd.errors import FabricError, one_line
@@ -63,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=number("workers"), metavar="N", help="CPU threads (default: all)"
     )
+    add_scheduler(parser)
     parser.add_argument(
         "-n",
         "--dry-run",
@@ -238,7 +240,8 @@ def run(options: argparse.Namespace) -> int:
             level=options.level, shadow=options.shadow, limits=options.limits, aovs=layers,
             frames=frames, seed=options.seed, workers=options.workers, exposure=options.exposure,
             view=options.view, staging=staging, denoise=options.denoise,
-            complexity=options.complexity, units=options.units, progress=progress,
+            complexity=options.complexity, units=options.units, scheduler=options.scheduler,
+            progress=progress,
         )  # fmt: skip
     finally:
         bar()

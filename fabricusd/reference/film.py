@@ -6,6 +6,8 @@ pixel's own samples.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -81,6 +83,28 @@ def require_aovs(names: tuple[str, ...]) -> None:
             )
 
 
+class FilmPart(NamedTuple):
+    """The sums of some pixels: n pixels of a film, which need not be neighbours.
+
+    sums : (rows, n) float32; spread : (3, n) float32; samples, groups : (n,) int32
+    """
+
+    sums: NDArray[np.float32]
+    spread: NDArray[np.float32]
+    samples: NDArray[np.int32]
+    groups: NDArray[np.int32]
+
+    def add(self, pixels: NDArray[np.int32], samples: int, rows: NDArray[np.float32]) -> None:
+        """Add `samples` paths for each of `pixels`, laid out as in `Wave.film`."""
+        group = max(1, min(GROUP, samples // GROUP))
+        _add(pixels, samples, group, rows, *self)
+
+    def copy(self) -> FilmPart:
+        """The same sums, in memory of their own."""
+        sums, spread, samples, groups = self
+        return FilmPart(sums.copy(), spread.copy(), samples.copy(), groups.copy())
+
+
 class Film:
     """Sums of a picture of `width` by `height` pixels; `aovs` are the layers asked for."""
 
@@ -100,8 +124,22 @@ class Film:
 
     def add(self, pixels: NDArray[np.int32], samples: int, rows: NDArray[np.float32]) -> None:
         """Add `samples` paths for each of `pixels`, laid out as in `Wave.film`."""
-        group = max(1, min(GROUP, samples // GROUP))
-        _add(pixels, samples, group, rows, self.sums, self.spread, self.samples, self.groups)
+        self.whole.add(pixels, samples, rows)
+
+    @property
+    def whole(self) -> FilmPart:
+        """All pixels, not copied."""
+        return FilmPart(self.sums, self.spread, self.samples, self.groups)
+
+    def take(self, pixels: NDArray[np.int32]) -> FilmPart:
+        """A copy of the sums of `pixels`."""
+        sums, spread, samples, groups = self.whole
+        return FilmPart(sums[:, pixels], spread[:, pixels], samples[pixels], groups[pixels]).copy()
+
+    def put(self, pixels: NDArray[np.int32], part: FilmPart) -> None:
+        """Replace the sums of `pixels`."""
+        for mine, theirs in zip(self.whole, part, strict=True):
+            mine[..., pixels] = theirs
 
     def beauty(self) -> NDArray[np.float32]:
         """(3, pixels) mean radiance."""

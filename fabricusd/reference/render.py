@@ -20,32 +20,25 @@ from fabricusd.images.view import View, parse_view
 from fabricusd.ranges import RANGES, require_picture, require_ranges
 from fabricusd.reference.defaults import default_lights
 from fabricusd.reference.denoise import GUIDES, denoised, require_denoiser
+from fabricusd.reference.farm import Picture, sample_on
 from fabricusd.reference.film import Film, require_aovs
 from fabricusd.reference.integrator import Tracer
+from fabricusd.reference.passes import Progress, Sampling, sample
 from fabricusd.reference.picture_files import DENOISED, picture_targets, write_picture
 from fabricusd.reference.rays.camera import build_lens, default_camera
-from fabricusd.reference.rays.wave import ALPHA, Wave
+from fabricusd.reference.rays.wave import ALPHA
 from fabricusd.reference.start.compile_ahead import EVERY_PICTURE, compile_ahead
 from fabricusd.reference.told import asked_for, note_losses, versions
-from fabricusd.run.workers import Batches, pixels_along_z_curve, worker_count
+from fabricusd.run.cluster import Cluster, Kept, Made, cluster_or_threads
+from fabricusd.run.workers import worker_count
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.scene import Camera, Scene
 from fabricusd.scene.staging import Staging, over_background, put
 from fabricusd.steps import watched
 from fabricusd.stop import Stop
 
-BATCH = 1 << 13
-"""Number of paths in a batch: large enough to amortise the start of a stage, small enough for the
-cache."""
-
-PASS = 16
-"""Samples per pixel in one pass over the picture; no pixel gets more before all have had these."""
-
 MOST_SAMPLES = 4096
 """Most samples per pixel of adaptive sampling if no number is given."""
-
-Progress = Callable[[float, float], None]
-"""A callback that takes the fraction done, 0 to 1, and the seconds since the start."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,6 +104,7 @@ def render(
     estimator: str = "mis",
     complexity: str = "auto",
     units: str | None = None,
+    scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> RenderResult:
     """Path-trace `scene` (a USD, OBJ, GLB or PLY file, or a `Scene`) and write `out`.
@@ -132,6 +126,8 @@ def render(
     complexity : how finely subdivision surfaces are refined: "low" (their cages), "medium", "high"
         or "veryhigh" as in usdrecord and usdview, or "auto" for what the picture can show
     units : of an .obj or .ply, see `read_scene`
+    scheduler : of the Dask cluster that samples the pictures, see `run.cluster.open_cluster`; None
+        for workers of this process
 
     Raises `FabricError` if the scene cannot be rendered at all. Whatever had to be left out is in
     the result's `notes`. On Ctrl-C, the samples taken so far are written, and `complete` is False.
@@ -144,33 +140,85 @@ def render(
     targets = picture_targets(out, _numbers(frames, staging.orbit))
     compile_ahead(EVERY_PICTURE)
     begun = time.perf_counter()
-    frame_results: list[RenderResult] = []
-    paths: tuple[str, ...] = ()
-    with Stop() as stop:
-        for number, (code, target) in enumerate(targets):
-            time_code = None if staging.orbit else code
-            loaded = scene if isinstance(scene, Scene) else read_scene(
-                scene, fabric=fabric, camera=camera, time_code=time_code, complexity=complexity,
-                width=width, units=units,
-            )  # fmt: skip
-            loaded = _staged(loaded, staging, width / height, number)
-            result = render_scene(
-                loaded, width=width, height=height, spp=spp, noise=noise, max_bounces=max_bounces,
-                max_translucent=max_translucent, level=level, shadow=shadow, limits=limits,
-                aovs=layers, seed=seed, workers=workers, pixel_filter=pixel_filter,
-                estimator=estimator, stop=stop,
-                progress=progress and _of_frame(progress, number, len(targets), begun),
-            )  # fmt: skip
-            stops = exposure + (loaded.camera.exposure if loaded.camera else 0.0)
-            _finish(result, staging, denoise)
-            result.metadata.update(asked_for(scene, time_code, stops, shown))
-            paths += write_picture(target, result.layers, result.metadata, stops, shown)
-            # Keep only the last frame's layers: those of all frames would fill the memory.
-            frame_results = [replace(r, layers={}) for r in frame_results] + [result]
-            stop.release()
-            if stop.asked or not result.complete:
-                break
-    return _together(frame_results, paths, complete=len(frame_results) == len(targets))
+    settings: dict[str, Any] = {
+        "width": width, "height": height, "spp": spp, "noise": noise, "max_bounces": max_bounces,
+        "max_translucent": max_translucent, "level": level, "shadow": shadow, "limits": limits,
+        "aovs": layers, "seed": seed, "pixel_filter": pixel_filter, "estimator": estimator,
+    }  # fmt: skip
+    found: dict[int, RenderResult] = {}
+    paths: dict[int, tuple[str, ...]] = {}
+    stops: dict[int, float] = {}
+
+    def scene_of(number: int) -> Scene:
+        time_code = None if staging.orbit else targets[number][0]
+        loaded = scene if isinstance(scene, Scene) else read_scene(
+            scene, fabric=fabric, camera=camera, time_code=time_code, complexity=complexity,
+            width=width, units=units,
+        )  # fmt: skip
+        loaded = _staged(loaded, staging, width / height, number)
+        stops[number] = exposure + (loaded.camera.exposure if loaded.camera else 0.0)
+        return loaded
+
+    def finish(number: int, result: RenderResult) -> None:
+        time_code = None if staging.orbit else targets[number][0]
+        _finish(result, staging, denoise)
+        result.metadata.update(asked_for(scene, time_code, stops[number], shown))
+        paths[number] = write_picture(
+            targets[number][1], result.layers, result.metadata, stops[number], shown
+        )
+        # Keep only the last frame's layers: those of all frames would fill the memory.
+        found[number] = result
+        for other in found:
+            if other != max(found):
+                found[other] = replace(found[other], layers={})
+
+    with Stop() as stop, cluster_or_threads(scheduler, workers) as cluster:
+        if cluster is not None and len(targets) >= max(cluster.threads, 2):
+            _frames_on(cluster, len(targets), settings, scene_of, finish, progress, stop)
+        else:
+            for number in range(len(targets)):
+                result = render_scene(
+                    scene_of(number), **settings, workers=workers, stop=stop, cluster=cluster,
+                    progress=progress and _of_frame(progress, number, len(targets), begun),
+                )  # fmt: skip
+                finish(number, result)
+                stop.release()
+                if stop.asked or not result.complete:
+                    break
+        notes = tuple(cluster.notes) if cluster is not None else ()
+    if not found:
+        raise KeyboardInterrupt
+    order = sorted(found)
+    results, written = [found[k] for k in order], sum((paths[k] for k in order), ())
+    return _together(results, written, notes, complete=len(found) == len(targets))
+
+
+def _frames_on(
+    cluster: Cluster,
+    count: int,
+    settings: dict[str, Any],
+    scene_of: Callable[[int], Scene],
+    finish: Callable[[int, RenderResult], None],
+    progress: Progress | None,
+    stop: Stop,
+) -> None:
+    """Render whole frames as jobs; scenes are read here, shortly before they are handed out."""
+    begun, over = time.perf_counter(), 0
+
+    def done(number: int, result: RenderResult) -> None:
+        nonlocal over
+        finish(number, result)
+        over += 1
+        if progress is not None:
+            progress(over / count, time.perf_counter() - begun)
+
+    stop.hold()
+    cluster.run(_frame_on_worker, settings, Made(count, scene_of), done, stop)
+
+
+def _frame_on_worker(kept: Kept, scene: Scene) -> RenderResult:
+    """A frame, on one thread of a worker."""
+    return render_scene(scene, **kept.thing, workers=1)
 
 
 def _layers(aovs: tuple[str, ...], denoise: bool) -> tuple[str, ...]:
@@ -228,13 +276,13 @@ def _of_frame(progress: Progress, number: int, frames: int, begun: float) -> Pro
 
 
 def _together(
-    results: list[RenderResult], paths: tuple[str, ...], *, complete: bool
+    results: list[RenderResult], paths: tuple[str, ...], notes: tuple[str, ...], *, complete: bool
 ) -> RenderResult:
     """Combine the results of several frames, keeping the last frame's layers."""
     return replace(
         results[-1],
         paths=paths,
-        notes=tuple(dict.fromkeys(note for r in results for note in r.notes)),
+        notes=(*notes, *dict.fromkeys(note for r in results for note in r.notes)),
         rays=sum(r.rays for r in results),
         seconds=sum(r.seconds for r in results),
         processor_seconds=sum(r.processor_seconds for r in results),
@@ -289,9 +337,11 @@ def render_scene(
     sampler: str = "sobol",
     progress: Progress | None = None,
     stop: Stop | None = None,
+    cluster: Cluster | None = None,
 ) -> RenderResult:
     """As `render`, for a `Scene` in memory and without writing files.
 
+    cluster : the workers that sample the picture; None for workers of this process
     stop : the handler that asks rendering to stop; it is installed when sampling starts, and the
         caller must release it
     """
@@ -299,30 +349,39 @@ def render_scene(
     begun = time.perf_counter()
     most = spp or (MOST_SAMPLES if noise else 64)
     camera = _furnished(scene, width, height)
+    settings: dict[str, Any] = {
+        "max_bounces": max_bounces, "max_translucent": max_translucent, "level": level,
+        "shadow": shadow, "limits": limits, "seed": seed, "estimator": estimator,
+        "sampler": sampler,
+    }  # fmt: skip
     with watched(stop=stop):
-        tracer = Tracer(
-            scene, max_bounces=max_bounces, max_translucent=max_translucent, level=level,
-            shadow=shadow, limits=limits, seed=seed, estimator=estimator, sampler=sampler,
-        )  # fmt: skip
+        tracer = Tracer(scene, **settings)
     if not len(tracer.tables.triangles):
         scene.note("the scene", "has no triangles to render; only its lights are seen")
     lens = build_lens(camera, width, height, tracer.tables.centre, pixel_filter)
     tracer.aim(lens, width, height)
     film = Film(width, height, aovs)
-    count = worker_count(workers)
-    counters, lost = np.zeros((count, 3), np.int64), np.zeros((count, 1))
-    built, busy = time.perf_counter(), time.process_time()
+    sampling = Sampling(width=width, height=height, most=most, noise=noise)
+    built = time.perf_counter()
     stop = stop or Stop()
     stop.hold()
-    counts = counters, lost
-    complete = _sample(tracer, lens, film, count, counts, most, noise, progress, built, stop)
+    if cluster is None:
+        count = worker_count(workers)
+        complete, spent = sample(tracer, lens, film, sampling, count, progress, stop)
+    else:
+        count = cluster.threads
+        picture = Picture(
+            scene=scene, camera=camera, settings=settings, sampling=sampling,
+            pixel_filter=pixel_filter, layers=film.extra,
+        )  # fmt: skip
+        complete, spent = sample_on(cluster, picture, film, progress, stop)
     if not complete and not film.samples.any():
         # Interrupted in the tables that the first samples need: there is no picture to keep.
         raise KeyboardInterrupt
-    seconds, busy = time.perf_counter() - built, time.process_time() - busy
-    rays, shadow_rays, not_finite = (int(x) for x in counters.sum(axis=0))
+    seconds = time.perf_counter() - built
+    rays, shadow_rays, not_finite = (int(x) for x in spent.counters)
     begun_at = float(film.sums[ALPHA].sum(dtype=np.float64))
-    met, cut = begun_at > 0 or not complete, float(lost.sum()) / max(begun_at, 1.0)
+    met, cut = begun_at > 0 or not complete, spent.lost / max(begun_at, 1.0)
     note_losses(scene, tracer, lens, not_finite, cut, met, (width, height))
     max_translucent = tracer.max_translucent
     embree, triangles = tracer.accelerator.version, len(tracer.tables.triangles)
@@ -348,7 +407,7 @@ def render_scene(
         notes=tuple(scene.notes),
         rays=rays + shadow_rays,
         seconds=seconds,
-        processor_seconds=busy,
+        processor_seconds=spent.seconds,
         not_finite=not_finite,
         cut=cut,
         samples=float(film.samples.mean()),
@@ -378,67 +437,3 @@ def _typical_worst(error: NDArray[np.float32]) -> float:
     """The relative error that 99 % of the pixels stay below; infinite if no error is known."""
     known = error[np.isfinite(error)]
     return float(np.quantile(known, 0.99)) if known.size else float("inf")
-
-
-def _sample(
-    tracer: Tracer,
-    lens: Any,
-    film: Film,
-    workers: int,
-    counts: tuple[NDArray[np.int64], NDArray[np.float64]],
-    most: int,
-    noise: float | None,
-    progress: Progress | None,
-    begun: float,
-    stop: Stop,
-) -> bool:
-    """Run passes over the picture until every pixel has `most` samples or is below the noise bound.
-
-    counts : for each worker, the last two arguments of `Tracer.trace`
-
-    Returns False if sampling was interrupted.
-    """
-    order = pixels_along_z_curve(film.width, film.height)
-    size = BATCH
-    # Use smaller batches for a small picture, so that many workers have something to do. The batch
-    # size must not depend on the number of workers: rounding depends on a ray's lane in a vector,
-    # and the lane depends on the batch.
-    while size > 1024 and len(order) * min(PASS, most) < 16 * size:
-        size //= 2
-    waves = [Wave(size, aovs=film.extra) for _ in range(workers)]
-    done = 0
-    active = order
-    while done < most and len(active):
-        samples = min(PASS, most - done)
-        per_batch = max(size // samples, 1)
-        starts = range(0, len(active), per_batch)
-
-        def task(
-            worker: int, batch: int, active: Any = active, samples: int = samples, done: int = done,
-            per_batch: int = per_batch,
-        ) -> None:  # fmt: skip
-            pixels = active[batch * per_batch : (batch + 1) * per_batch]
-            wave = waves[worker]
-            mine = counts[0][worker], counts[1][worker]
-            tracer.trace(wave, lens, film.width, pixels, done, samples, *mine)
-            film.add(pixels, samples, wave.film)
-
-        def report(
-            batches: int, total: int = len(starts), samples: int = samples, done: int = done,
-            share: float = len(active) / len(order),
-        ) -> None:  # fmt: skip
-            if progress is not None:
-                part = (done + samples * batches / max(total, 1)) / most
-                progress(
-                    min(part, 1.0) if noise is None else 1 - share, time.perf_counter() - begun
-                )
-
-        if not Batches(workers, task, stop).run(len(starts), report):
-            return False
-        done += samples
-        # A picture of one pass has no halves to compare.
-        if done > samples or done < most:
-            film.compare_halves()
-        if noise is not None:
-            active = order[film.relative_error()[order] > noise]
-    return True

@@ -1,33 +1,19 @@
-"""The command: the quick charts, whole, in time."""
+"""The command: the quick charts, whole."""
 
 from __future__ import annotations
 
 import json
-import time
-from pathlib import Path
 
 import pytest
 
 from fabricusd.chart.panels.registry import PANELS
 from fabricusd.cli.main import main
 
-SECONDS = 60.0
-"""Of the processor: the quick chart stays below, kernels already compiled."""
-
-
-def quick_chart(folder: Path) -> float:
-    """Processor seconds of the command."""
-    start = time.process_time()
-    assert main(["chart", "-o", str(folder), "--quick", "-q"]) == 0
-    return time.process_time() - start
-
 
 @pytest.mark.exhaustive
 @pytest.mark.slow
-def test_the_quick_chart_is_whole_and_takes_less_than_a_minute(capsys, tmp_path):
-    if quick_chart(tmp_path / "charts") > SECONDS:
-        # It compiled kernels, which are on disk now.
-        assert quick_chart(tmp_path / "again") < SECONDS
+def test_the_quick_chart_is_whole(capsys, tmp_path):
+    assert main(["chart", "-o", str(tmp_path / "charts"), "--quick", "-q"]) == 0
     content = json.loads((tmp_path / "charts" / "charts.json").read_text())
     page = (tmp_path / "charts" / "charts.md").read_text()
     assert set(content["panels"]) == {panel.name for panel in PANELS}

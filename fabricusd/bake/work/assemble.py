@@ -19,10 +19,18 @@ from fabricusd.bake.texels.layers import ComputedLayer, Place
 from fabricusd.bake.texels.maps import TextureMap
 from fabricusd.bake.texels.moment_indices import MOMENTS
 from fabricusd.bake.texels.sheet import Sheet
-from fabricusd.bake.work.checkpoint import Checkpoint, checkpoint_of, read_top
+from fabricusd.bake.work.checkpoint import (
+    Checkpoint,
+    block_of_values,
+    checkpoint_of,
+    read_top,
+    write_block,
+)
 from fabricusd.bake.work.scratch import Scratch
 from fabricusd.images.files import write_16_bit, write_mip_exr
+from fabricusd.run.cluster import Cluster, Kept
 from fabricusd.run.workers import Batches
+from fabricusd.stop import Stop
 
 Progress = Callable[[str, int, int], Any]
 """Called with the noun that is counted, the total, and the number done."""
@@ -45,7 +53,10 @@ class Files:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Work:
-    """The sheets and maps of one bake, its scratch folder and output files, and its workers."""
+    """The sheets and maps of one bake, its scratch folder and output files, and its workers.
+
+    cluster : the workers that compute the blocks; None for threads of this process
+    """
 
     scratch: Scratch
     sheets: Sequence[Sheet]
@@ -53,6 +64,12 @@ class Work:
     files: Files
     workers: int
     progress: Progress | None
+    cluster: Cluster | None = None
+
+    def checkpoint(self, sheet: Sheet) -> Checkpoint:
+        """How a sheet's blocks are stored. Blocks of a cluster come as values: looking up every
+        texel here would leave it the smaller part of the work."""
+        return checkpoint_of(sheet, self.maps, values=self.cluster is not None)
 
     def missing(self, sheet: Sheet) -> list[int]:
         """Return the indices of the maps whose texture of this sheet is not finished."""
@@ -71,7 +88,11 @@ def compute(work: Work) -> bool:
     for sheet in work.sheets:
         if work.missing(sheet):
             jobs += [(sheet, x, y) for y in range(sheet.across) for x in range(sheet.across)]
-    checkpoints = {id(sheet): checkpoint_of(sheet, work.maps) for sheet in work.sheets}
+    checkpoints = {id(sheet): work.checkpoint(sheet) for sheet in work.sheets}
+    if work.cluster is not None:
+        paths = [work.scratch.block(sheet, x, y) for sheet, x, y in jobs]
+        todo = [k for k, path in enumerate(paths) if not checkpoints[id(jobs[k][0])].is_sound(path)]
+        return _compute_on(work, work.cluster, [jobs[k] for k in todo], [paths[k] for k in todo])
 
     def one_block(_: int, k: int) -> None:
         sheet, x, y = jobs[k]
@@ -81,6 +102,34 @@ def compute(work: Work) -> bool:
             checkpoint.write(path, x, y)
 
     return work.run(one_block, len(jobs), "blocks")
+
+
+def _compute_on(
+    work: Work, cluster: Cluster, jobs: Sequence[tuple[Sheet, int, int]], paths: Sequence[Path]
+) -> bool:
+    """Compute blocks on a cluster; they are written here."""
+    numbers = {id(sheet): k for k, sheet in enumerate(work.sheets)}
+    count, report = 0, work.progress or (lambda *_: None)
+    report("blocks", len(jobs), 0)
+
+    def done(k: int, data: bytes) -> None:
+        nonlocal count
+        write_block(paths[k], data)
+        count += 1
+        report("blocks", len(jobs), count)
+
+    with Stop() as stop:
+        return cluster.run(
+            _block_on_worker, (work.sheets, work.maps),
+            [(numbers[id(sheet)], x, y) for sheet, x, y in jobs], done, stop,
+        )  # fmt: skip
+
+
+def _block_on_worker(kept: Kept, job: tuple[int, int, int]) -> bytes:
+    """The contents of a block's file, without its checksum."""
+    (sheets, maps), (number, x, y) = kept.thing, job
+    parts = block_of_values(sheets[number], maps, x, y)
+    return b"".join(np.ascontiguousarray(part).tobytes() for part in parts)
 
 
 def assemble(work: Work) -> bool:
@@ -101,7 +150,7 @@ def _write_texture(
 ) -> None:
     """Write one texture from its blocks and from the mip levels coarser than a block."""
     k = todo[job]
-    files, one, checkpoint = work.files, work.maps[k], checkpoint_of(sheet, work.maps)
+    files, one, checkpoint = work.files, work.maps[k], work.checkpoint(sheet)
     path, encoding = files.path(sheet, one), None
     levels: list[Any] = [
         partial(bands, work.scratch, sheet, checkpoint, k, level) for level in range(sheet.levels)

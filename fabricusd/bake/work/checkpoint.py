@@ -48,9 +48,11 @@ class Checkpoint(Protocol):
         """(h, w, channels) values of map `k` in a block."""
 
 
-def space_needed(garment: Garment, resolution: int, maps: Sequence[TextureMap]) -> int:
-    """Upper bound on the size of all blocks of one sheet [bytes]."""
-    if all(raster is not None for raster in rasters_of(garment, resolution)):
+def space_needed(
+    garment: Garment, resolution: int, maps: Sequence[TextureMap], *, values: bool = False
+) -> int:
+    """Upper bound on the size of all blocks of one sheet [bytes]; values : see `checkpoint_of`."""
+    if not values and all(raster is not None for raster in rasters_of(garment, resolution)):
         return 2 * resolution**2
     side = min(BLOCK_SIDE, resolution)
     texels = sum((side >> level) ** 2 for level in range(side.bit_length()))
@@ -58,9 +60,9 @@ def space_needed(garment: Garment, resolution: int, maps: Sequence[TextureMap]) 
     return texels * each * (resolution // side) ** 2
 
 
-def checkpoint_of(sheet: Sheet, maps: Sequence[TextureMap]) -> Checkpoint:
-    """Choose how to store a sheet's blocks."""
-    if all(table is not None for table in sheet.tables):
+def checkpoint_of(sheet: Sheet, maps: Sequence[TextureMap], *, values: bool = False) -> Checkpoint:
+    """Choose how to store a sheet's blocks; values : whether it must be by their values."""
+    if not values and all(table is not None for table in sheet.tables):
         return LayoutCheckpoint(sheet, maps)
     return ValuesCheckpoint(sheet, maps)
 
@@ -82,8 +84,7 @@ class ValuesCheckpoint:
 
     def write(self, path: Path, bx: int, by: int) -> None:
         """Compute a block and store it."""
-        found, moments, share = bake_block(self.sheet, self.maps, bx, by)
-        write_block(path, [*(level for one in found for level in one), moments, share])
+        write_block(path, block_of_values(self.sheet, self.maps, bx, by))
 
     def is_sound(self, path: Path) -> bool:
         """Whether a block's file is whole."""
@@ -105,6 +106,14 @@ class ValuesCheckpoint:
             stream.seek(self.offsets[k, level])
             data = stream.read(self.places[k][level])
         return np.frombuffer(data, one.kind).reshape(side, side, len(one.channels))
+
+
+def block_of_values(
+    sheet: Sheet, maps: Sequence[TextureMap], bx: int, by: int
+) -> list[NDArray[Any]]:
+    """The parts of a block's file as `ValuesCheckpoint` stores it: all levels of all maps."""
+    found, moments, share = bake_block(sheet, maps, bx, by)
+    return [*(level for one in found for level in one), moments, share]
 
 
 class LayoutCheckpoint:
@@ -202,12 +211,15 @@ class LayoutCheckpoint:
         return TableLayer(place, table, owned, *own)
 
 
-def write_block(path: Path, parts: Sequence[NDArray[Any]]) -> None:
-    """Write a block's file atomically, with its checksum at the end."""
+def write_block(path: Path, parts: Sequence[NDArray[Any]] | bytes) -> None:
+    """Write a block's file atomically, with its checksum at the end.
+
+    parts : arrays, or their bytes
+    """
     digest = hashlib.blake2b(digest_size=DIGEST)
     with whole_file(path, durable=False) as temporary, temporary.open("wb") as stream:
-        for part in parts:
-            data = np.ascontiguousarray(part).tobytes()
+        for part in (parts,) if isinstance(parts, bytes) else parts:
+            data = part if isinstance(part, bytes) else np.ascontiguousarray(part).tobytes()
             digest.update(data)
             stream.write(data)
         stream.write(digest.digest())

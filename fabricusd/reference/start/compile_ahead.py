@@ -76,6 +76,7 @@ class CompileAhead:
                 process.wait(_LONGEST)
             except subprocess.TimeoutExpired:
                 process.kill()
+                process.wait()
             if not self._processes:
                 self._claims.cleanup()
 

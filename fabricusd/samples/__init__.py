@@ -1,0 +1,1 @@
+"""A garment, a sky, artwork and drafts to try fabricusd with."""
