@@ -39,6 +39,8 @@ WIDER = 2.0
 """The volume lobe's width over the surface lobe's, [Sadeghi2013] Table II."""
 SQUARES = 24
 """Squares along the shorter side of a picture."""
+CLEARLY = 2.0
+"""Difference of costs, half of chi^2, by which the light must speak for another face."""
 FEWEST = 60
 """Squares below which the light across a picture says too little."""
 INDEPENDENT = 60
@@ -269,11 +271,13 @@ def contrast_of(picture: Floats) -> tuple[float, Floats]:
 
 def fit_faces(tasks: list[Task]) -> tuple[int, Toned]:
     """(index of the task that the light agrees with best, its fit): a first round for each, and
-    another for the best. Of equals, the first."""
+    another for the best. The first is kept unless another is clearly better."""
     tried = []
     for k in parts("faces", range(len(tasks))):
         tried.append(_round(tasks[k], *_start(tasks[k])))
     best = min(range(len(tasks)), key=lambda k: tried[k].cost)
+    if tried[0].cost - tried[best].cost < CLEARLY:
+        best = 0
     return best, fit_tones(tasks[best], tried[best])
 
 
