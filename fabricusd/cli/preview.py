@@ -69,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "(default: it writes none)",
     )
     parser.add_argument(
-        "--port", type=int, default=0, metavar="N",
+        "--port", type=number("port"), default=0, metavar="N",
         help="with --serve: port of the server (default: a free one)",
     )  # fmt: skip
     parser.add_argument(
@@ -202,14 +202,13 @@ def _page(options: argparse.Namespace, source: str, lights: Lights, begun: float
 
 def _serve(options: argparse.Namespace, source: str, lights: Lights) -> int:
     """Serve the page until the user stops it."""
-    from fabricusd.preview.serve.server import PORTS, Server
+    from fabricusd.preview.serve.server import Server
     from fabricusd.preview.serve.session import Session, require_file
 
     fabric, mesh = _cloth(options, source)
     save = Path(options.save) if options.save else None
     if save is not None:
         require_file(save, source, mesh is not None)
-    PORTS.require("--port", options.port)
     session = Session(fabric, lights=lights, mesh=mesh, save=save)
     try:
         server = Server(session, options.port)

@@ -54,7 +54,12 @@ OPTIONS = {
     ("measure", "--seed"): (str(2**63), "1.5"),
     ("measure", "--workers"): ("0", "-1", "1025", "100000"),
     ("fit", "--seed"): (str(2**63), "1.5"),
+    ("fit", "--spp"): ("0", "-1", "65537", "1e3"),
+    ("fit", "--view-angle"): ("0", "151", "-1"),
+    ("fit", "--cloth-width"): ("0", "-1", "100001"),
+    ("fit", "--card-reflectance"): ("0", "1.01", "-1"),
     ("fit", "--workers"): ("0", "-1", "1025", "100000"),
+    ("preview", "--port"): ("-1", "65536", "1.5"),
     ("preview", "--size"): ("0", "15", "4097", "1.5"),
     ("preview", "--samples"): ("0", "-1", "1025", "1.5"),
     ("preview", "--exposure"): ("100000", "-101"),
@@ -159,9 +164,11 @@ OTHERS = {
     *(("bake", option) for option in ("--resolution", "--texels-per-thread", "--max-error")),
     ("render", "--imageWidth"),
     ("preview", "--light"),
+    ("fit", "--light"),
+    ("fit", "--back-light"),
 }
-"""Options with a `type` whose values `tests/bake` judges, another name of one above, and one of two
-numbers, which `test_preview` judges."""
+"""Options with a `type` whose values `tests/bake` judges, another name of one above, and those of
+several numbers, which `test_preview` and `test_fit_photographs` judge."""
 
 
 BOUNDS = {

@@ -47,13 +47,13 @@ def add_flat(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     flat.add_argument(
         "--view-angle",
-        type=float,
+        type=number("view_angle"),
         metavar="DEG",
         help=f"field of view across the picture (default: {VIEW_ANGLE:g})",
     )
     flat.add_argument(
         "--cloth-width",
-        type=float,
+        type=number("cloth_width"),
         metavar="CM",
         help="length of cloth across the picture, for densities (default: 10, and said)",
     )
@@ -65,7 +65,7 @@ def add_flat(parser: argparse.ArgumentParser) -> None:
     )
     flat.add_argument(
         "--card-reflectance",
-        type=float,
+        type=number("card_reflectance"),
         metavar="R",
         help="reflectance of the card, 0 to 1 (default: 0.9)",
     )

@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.errors import FabricError
+from fabricusd.ranges import RANGES
 
 Floats = NDArray[np.float64]
-
-NARROWEST, WIDEST = 1.0, 150.0
-"""Field of view of a camera that a fit takes [degrees]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,11 +39,7 @@ class Setup:
             if not side * lamp[2] > 0:
                 where = "above 0: before the cloth" if side > 0 else "below 0: behind the cloth"
                 raise FabricError(f"--{name}", f"has z {lamp[2]:g}; it must be {where}")
-        if not NARROWEST <= self.view_angle <= WIDEST:
-            raise FabricError(
-                "--view-angle",
-                f"is {self.view_angle:g}; it must be from {NARROWEST:g} to {WIDEST:g} degrees",
-            )
+        RANGES["view_angle"].require("--view-angle", self.view_angle)
         if not (math.isfinite(self.width) and self.width >= 0):
             raise FabricError("--cloth-width", f"is {100 * self.width:g} cm; it must be above 0")
 

@@ -22,12 +22,8 @@ from typing import Any
 from fabricusd.errors import FabricError, debugging, described, one_line
 from fabricusd.preview.page.make import POLICY, script, shell, style
 from fabricusd.preview.serve.session import Session
-from fabricusd.ranges import Range
 
 LOOPBACK = "127.0.0.1"
-
-PORTS = Range(low=0, high=65535, whole=True)
-"""Ports to choose from; 0 is any that is free."""
 
 TOKEN = "X-Fabricusd-Token"
 """Header of the token."""

@@ -158,7 +158,8 @@ def signed(data: bytes) -> bytes:
 def test_a_block_that_cannot_be_is_made_again(job, tmp_path, monkeypatch, way, change):
     if way == "values":
         monkeypatch.setattr(
-            "fabricusd.bake.work.assemble.checkpoint_of", checkpoint.ValuesCheckpoint
+            "fabricusd.bake.work.assemble.checkpoint_of",
+            lambda sheet, maps, **_: checkpoint.ValuesCheckpoint(sheet, maps),
         )
     out = stopped(job, tmp_path)
     for mark in (out / ".bake").glob("*.done"):
