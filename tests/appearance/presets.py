@@ -6,7 +6,7 @@ not published: they are chosen here so that both sets show.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -160,14 +160,18 @@ EVERY_RUN = ("linen_plain", "polyester_satin_charmeuse", "velvet")
 satin without any, pile."""
 
 
-def often(rows: Iterable[Any]) -> list[Any]:
-    """Parameters for `parametrize`: those of a preset that is not in EVERY_RUN are `exhaustive`.
+LINEN = ("linen_plain",)
+"""The preset that `make test` looks at where even three take long."""
 
-    rows : names of presets, or tuples that begin with one
+
+def often(rows: Iterable[Any], keep: Sequence[Any] = EVERY_RUN) -> list[Any]:
+    """Parameters for `parametrize`: those that are not in `keep` are `exhaustive`.
+
+    rows : names of presets or of anything else, or tuples that begin with one
     """
     found = []
     for row in rows:
         values = row if isinstance(row, tuple) else (row,)
-        marks = () if values[0] in EVERY_RUN else pytest.mark.exhaustive
+        marks = () if values[0] in keep else pytest.mark.exhaustive
         found.append(pytest.param(*values, marks=marks))
     return found

@@ -22,6 +22,7 @@ from fabricusd.bake.texels.sheet import sheets_of
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, even
 from fabricusd.schema import load, save_all
+from tests.appearance.presets import LINEN, often
 from tests.bake.meshes import quad_scene, write_quad
 
 THROUGH = ("transmission_color", "back_base_color")
@@ -41,7 +42,9 @@ def share(fabric: Fabric, below: bool) -> np.ndarray:
     return surface.evaluate(fabric, wi, (0.0, 0.0, 1.0)).mean(axis=0) * 2.0 * np.pi
 
 
-@pytest.mark.parametrize("preset", ["linen_plain", "silk_shot", "polyester_satin_charmeuse"])
+@pytest.mark.parametrize(
+    "preset", often(["linen_plain", "silk_shot", "polyester_satin_charmeuse"], LINEN)
+)
 def test_the_mean_texel_has_the_reflectance_and_transmittance_of_the_cloth(preset):
     fabric = conserving(preset)
     mean = recipe(fabric).mean

@@ -197,18 +197,28 @@ def test_a_port_that_is_taken_is_said(capsys):
     assert f"--port is {port}, which cannot be used" in err
 
 
+def hear_ctrl_c():
+    """As in a terminal: what a shell starts in the background ignores it."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT")
 def test_a_server_is_stopped_by_ctrl_c():
     command = [sys.executable, "-m", "fabricusd", "preview", "linen_plain", "--serve"]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as one:
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=hear_ctrl_c,
+    ) as one:  # fmt: skip
         url = one.stdout.readline().strip()
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#token=[\w-]{43}", url)
         port = int(url.split(":")[2].partition("/")[0])
         socket.create_connection(("127.0.0.1", port)).close()
         one.send_signal(signal.SIGINT)
-        _, err = one.communicate(timeout=60)
+        try:
+            _, err = one.communicate(timeout=60)
+        except subprocess.TimeoutExpired:
+            one.kill()
+            raise
     assert one.returncode == 130
     assert err.splitlines()[-1] == "fabricusd: interrupted"
     assert "Traceback" not in err

@@ -17,7 +17,7 @@ from fabricusd.geometry.sides import measure_sides
 from fabricusd.geometry.tables import conserving, table, views
 from fabricusd.schema import load
 from fabricusd.sides import Sides, spread
-from tests.appearance.presets import often
+from tests.appearance.presets import LINEN, often
 
 JUDGED = ["linen_plain", "silk_crepe_de_chine", "silk_shot", "polyester_satin_charmeuse"]
 
@@ -54,7 +54,7 @@ def test_the_medians_of_the_presets_would_not_do() -> None:
     assert np.abs(_shares(fabric, 1, views()) - found.up).max() > 0.06
 
 
-@pytest.mark.parametrize("name", often(JUDGED))
+@pytest.mark.parametrize("name", often(JUDGED, LINEN))
 def test_white_cloth_keeps_nothing_and_gains_nothing(name: str) -> None:
     fabric = conserving(load(name), (1.0, 1.0, 1.0))
     tables = conserving_tables(fabric)

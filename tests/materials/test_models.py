@@ -23,7 +23,7 @@ from fabricusd.materials.fit.texels import KINDS as KINDS_OF_TEXELS
 from fabricusd.materials.fit.texels import NEEDED, _kinds
 from fabricusd.materials.networks.look import Look
 from fabricusd.schema import load, published_names
-from tests.appearance.presets import often
+from tests.appearance.presets import LINEN, often
 from tests.bake.meshes import quad_scene
 
 
@@ -135,7 +135,7 @@ def far_texel(fabric):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", often(published_names()))
+@pytest.mark.parametrize("name", often(published_names(), LINEN))
 def test_a_fit_is_never_worse_than_the_textures_alone(name, kind, monkeypatch):
     # Few steps and directions: it must hold wherever the search ends.
     for constant, few in (

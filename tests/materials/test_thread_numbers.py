@@ -17,6 +17,7 @@ from fabricusd.bake.texels.encoding import FORMATS
 from fabricusd.fabric import Binding, Fabric, Thread, ThreadSet
 from fabricusd.reference import render
 from fabricusd.schema import load, published_names
+from tests.appearance.presets import often
 
 TEXELS, PIXELS = 128, 64
 """Of map and picture. With half as many texels the satin's weft lies between their centres."""
@@ -105,7 +106,7 @@ def inside(ids: NDArray[np.int64]) -> NDArray[np.bool_]:
     return same
 
 
-@pytest.mark.parametrize("name", CLOTHS)
+@pytest.mark.parametrize("name", often(CLOTHS, ("linen_plain", "silk_shot", "one yarn")))
 def test_the_thread_of_a_texel_is_the_thread_of_a_pixel(name, square, tmp_path):
     ids = baked(square, CLOTHS[name], tmp_path)
     threads, uv = seen(square, CLOTHS[name], "/Front")

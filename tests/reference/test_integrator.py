@@ -12,6 +12,7 @@ from fabricusd.scene.light_kinds import CYLINDER, DISK, DISTANT, DOME, RECT, SPH
 from fabricusd.scene.scene import Camera, Light, PreviewSurface
 from fabricusd.schema import load
 from fabricusd.stop import Stop
+from tests.appearance.presets import LINEN, often
 from tests.reference.scenes import (
     above,
     cloth,
@@ -194,7 +195,7 @@ def test_an_opacity_of_a_third_lets_two_thirds_of_the_dome_and_the_sun_through()
 
 
 @pytest.mark.parametrize("level", ["far", "weave", "thread"])
-@pytest.mark.parametrize("preset", ["linen_plain", "polyester_satin_charmeuse"])
+@pytest.mark.parametrize("preset", often(["linen_plain", "polyester_satin_charmeuse"], LINEN))
 def test_white_conserving_cloth_vanishes_in_a_white_dome(preset, level):
     fabric = load(preset)
     threads = {n: replace(t, albedo=(1.0, 1.0, 1.0)) for n, t in fabric.threads.items()}
@@ -217,7 +218,9 @@ FABRICS = {
 }
 
 
-@pytest.mark.parametrize("name", FABRICS)
+@pytest.mark.parametrize(
+    "name", often(FABRICS, ("linen, weave", "satin, far", "conserving linen, weave"))
+)
 def test_estimators_agree_on_cloth_with_bounces_and_gaps(name):
     preset, level = FABRICS[name]
     pictures = {e: _folded_cloth(preset, level, e) for e in ("mis", "light", "surface", "uniform")}

@@ -168,7 +168,7 @@ def test_a_gap_reflects_nothing_and_a_thread_does(level, model):
 
 @pytest.mark.parametrize("level", ["weave", "thread"])
 @pytest.mark.parametrize("shadow", METHODS)
-@pytest.mark.parametrize("law", ["masked", "projected"])
+@pytest.mark.parametrize("law", often(["masked", "projected"], ("projected",)))
 def test_shadowing_multiplies_by_the_light_that_arrives_or_by_that_over_its_mean(
     law, shadow, level
 ):

@@ -19,7 +19,7 @@ from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.fabric import MODELS
 from tests.appearance.chi_squared import threshold
 from tests.appearance.directions import VIEWS, cell_of, direction, random_directions, sphere_cells
-from tests.appearance.presets import PRESETS, often, with_model
+from tests.appearance.presets import LINEN, PRESETS, often, with_model
 
 R = np.float64
 LEVELS = surface.LEVELS
@@ -57,7 +57,7 @@ def chi_squared(fabric, level, wo, samples, density_of=None):
     return stats.chi2.sf(((observed - expected) ** 2 / expected).sum(), len(expected) - 1)
 
 
-@pytest.mark.parametrize(("name", "model", "level", "view"), often(CHI_SQUARED_ROWS))
+@pytest.mark.parametrize(("name", "model", "level", "view"), often(CHI_SQUARED_ROWS, LINEN))
 def test_samples_follow_the_density(name, model, level, view):
     fabric, wo = with_model(PRESETS[name], model), VIEWS[view]
     drawn = surface.sample(fabric, wo, uniform(DRAWN, 7), uv=PLACES[0], level=level)
@@ -154,7 +154,7 @@ def largest_variance(name, model, level):
     return 0.7 if level == "far" else 0.4
 
 
-@pytest.mark.parametrize(("name", "model", "level"), often(ROWS))
+@pytest.mark.parametrize(("name", "model", "level"), often(ROWS, LINEN))
 def test_drawing_by_the_lobes_leaves_less_variance_than_uniform_directions(name, model, level):
     fabric = with_model(PRESETS[name], model)
     views = [*VIEWS.values(), direction(75, 0), direction(25, 300)]

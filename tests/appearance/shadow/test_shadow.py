@@ -28,7 +28,7 @@ from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.appearance.weave.place import Hit
 from fabricusd.errors import FabricError
 from fabricusd.fabric import DEGREE, Fabric, TangentCurve, Thread, ThreadSet, Weave
-from tests.appearance.presets import PLAIN, PRESETS, often
+from tests.appearance.presets import LINEN, PLAIN, PRESETS, often
 from tests.strategies import fabrics
 
 WOVEN = {name: fabric for name, fabric in PRESETS.items() if name != "velvet"}
@@ -72,7 +72,7 @@ def walked(fabric: Fabric, wi: np.ndarray, uv: np.ndarray, steps: int) -> np.nda
     return answer
 
 
-@pytest.mark.parametrize("name", often(WOVEN))
+@pytest.mark.parametrize("name", often(WOVEN, LINEN))
 def test_the_march_finds_what_walking_finely_finds(name: str) -> None:
     fabric = WOVEN[name]
     uv = places(fabric, 400, 1)
@@ -115,7 +115,7 @@ def test_every_method_gives_a_share_on_every_fabric(fabric: Fabric, seed: int) -
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", often(PRESETS, ("linen_plain", "velvet")))
 def test_limits_of_every_method(name: str, method: str) -> None:
     fabric = PRESETS[name]
     uv = places(fabric, 300, 3)
@@ -163,7 +163,7 @@ def across(fabric: Fabric, wi: np.ndarray, uv: np.ndarray) -> np.ndarray:
     return total / len(offset)
 
 
-@pytest.mark.parametrize("name", often(WOVEN))
+@pytest.mark.parametrize("name", often(WOVEN, LINEN))
 def test_a_finer_horizon_table_comes_nearer_to_the_march(name: str) -> None:
     fabric = WOVEN[name]
     cloth = compile_fabric(fabric, precision=np.float64)

@@ -111,6 +111,7 @@ def test_plies_keep_the_mean_across_and_along_a_thread(name):
     assert found == pytest.approx(true, rel=0.01)
 
 
+@pytest.mark.exhaustive
 def test_level_far_has_the_same_bits():
     wi, wo = np.random.default_rng(2).normal(size=(2, 200, 3))
     wi[:, 2], wo[:, 2] = abs(wi[:, 2]), abs(wo[:, 2])
