@@ -15,6 +15,7 @@ from fabricusd.chart.level_errors import LIGHTS, TO_EYE, WIDTHS, Zoom, coarsest,
 from fabricusd.fabric import even
 from fabricusd.reference.choice import choose_limits, read_limits
 from fabricusd.schema import load, published_names
+from tests.appearance.presets import LINEN, often
 
 PIXELS_PER_THREAD = 1.0 / WIDTHS
 NAMES = ("linen_plain", "polyester_satin_charmeuse")
@@ -23,7 +24,7 @@ LIGHT_NOISE = 0.1
 """Variance over mean^2 that the drawing of lights leaves to a sample, whatever the level."""
 
 
-@pytest.fixture(scope="module", params=NAMES)
+@pytest.fixture(scope="module", params=often(NAMES, LINEN))
 def steps(request) -> list[Zoom]:
     return [zoom(FABRICS[request.param], WIDTHS, wi, TO_EYE, "none") for wi in LIGHTS]
 

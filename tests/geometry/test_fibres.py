@@ -34,6 +34,7 @@ def test_white_fibres_on_white_tubes_lose_no_light() -> None:
     assert found.sum(axis=1).mean() == pytest.approx(1.0, abs=0.015)
 
 
+@pytest.mark.exhaustive
 def test_albedo_at_grazing_views_changes_as_that_of_tubes_with_fibres() -> None:
     fabric = hairy(load("cotton_poplin"), 4.0)
     degrees = (0, 75, 83)

@@ -9,6 +9,7 @@ import pytest
 
 from fabricusd.materials.targets.tile import THREADS, baked_tile, even
 from fabricusd.schema import load
+from tests.appearance.presets import often
 
 CLOTHS = ("linen_plain", "polyester_satin_charmeuse", "cotton_poplin", "denim")
 
@@ -23,7 +24,7 @@ def across_border(pixels):
     return max(found)
 
 
-@pytest.mark.parametrize("name", CLOTHS)
+@pytest.mark.parametrize("name", often(CLOTHS, ("denim",)))
 def test_texels_across_the_border_differ_as_neighbours_inside_do(name):
     tile = baked_tile(load(name), resolution=256, level="thread")
     assert tile.ends >= THREADS

@@ -52,7 +52,7 @@ def wraps(template, noise=1.0, stray=0.0):
 
 
 @pytest.mark.parametrize(
-    "law", [MASKED, *(pytest.param(law, marks=pytest.mark.slow) for law in SURFACE_LAWS[1:3])]
+    "law", [MASKED, *(pytest.param(law, marks=pytest.mark.exhaustive) for law in SURFACE_LAWS[1:3])]
 )
 def test_columns_add_up_to_the_law(law):
     template = template_of("silk_shot", law)
