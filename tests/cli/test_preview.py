@@ -176,7 +176,7 @@ def test_slips_are_refused_in_one_line(arguments, said, capsys, tmp_path, monkey
         (["a", "--port", "80"], "--port needs --serve"),
         (["a", "--reference"], "--reference needs --page"),
         (["denim", "--serve", "--save", "b.txt"], "b.txt is no name to save to"),
-        (["denim", "--serve", "--port", "70000"], "--port is 70000; it must be a whole"),
+        (["denim", "--serve", "--port", "70000"], "--port: is '70000'; it must be a whole"),
         (["nothing", "--serve"], "nothing is neither a file nor a preset"),
     ],
 )  # fmt: skip
