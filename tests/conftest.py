@@ -31,9 +31,12 @@ def shared_data() -> Path:
     return folder
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    """A Dask cluster of two processes of this machine, of one thread each."""
+    """A Dask cluster of two processes of this machine, of one thread each.
+
+    It ends with its module: its threads read files, which other tests watch.
+    """
     pytest.importorskip("distributed")
     from fabricusd.run.cluster import open_cluster
 

@@ -149,13 +149,7 @@ class Cluster:
 
         Raises `FabricError` for another version, and for a scheduler without workers.
         """
-        try:
-            self.client.wait_for_workers(1, timeout=CONNECT)
-        except TimeoutError:
-            raise FabricError(
-                f"--scheduler '{self.scheduler}'",
-                "has no workers; start some: dask worker ADDRESS, in the same environment",
-            ) from None
+        self._wait()
         here = identity()
         try:
             found = self.client.run(identity)
@@ -245,7 +239,23 @@ class Cluster:
 
     def _send(self, packed: bytes) -> Any:
         """The shared thing on every worker there is; others fetch it from them."""
-        return self.client.scatter(packed, broadcast=True, hash=False, direct=False)
+        for _ in range(LOSSES):
+            try:
+                return self.client.scatter(packed, broadcast=True, hash=False, direct=False)
+            except (OSError, TimeoutError):
+                # To a worker that has just been lost, which the scheduler had not yet seen.
+                self._wait()
+        raise FabricError(f"--scheduler '{self.scheduler}'", "loses every worker at once")
+
+    def _wait(self) -> None:
+        """Wait until there is a worker."""
+        try:
+            self.client.wait_for_workers(1, timeout=CONNECT)
+        except TimeoutError:
+            raise FabricError(
+                f"--scheduler '{self.scheduler}'",
+                "has no workers; start some: dask worker ADDRESS, in the same environment",
+            ) from None
 
 
 def _packed(thing: Any) -> bytes:

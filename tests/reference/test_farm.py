@@ -146,10 +146,9 @@ def test_ten_killed_workers_change_nothing(cluster):
     def progress(share: float, _: float) -> None:
         nonlocal killed
         if killed < 10 and share > 0 and chance.random() < 0.6:
-            kill_a_worker(cluster)
-            killed += 1
+            killed += kill_a_worker(cluster)
 
-    how = {"width": 96, "height": 96, "spp": 512, "level": "far", "aovs": ("beauty", "variance")}
+    how = {"width": 96, "height": 96, "spp": 4096, "level": "far", "aovs": ("beauty", "variance")}
     one = render_scene(cloth(), **how)
     many = render_scene(cloth(), cluster=cluster, progress=progress, **how)
     assert killed == 10

@@ -8,11 +8,16 @@ import signal
 from fabricusd.run.cluster import Cluster, Kept
 
 
-def kill_a_worker(cluster: Cluster) -> int:
-    """End a worker's process at once, as a farm does; returns its number."""
-    number = next(iter(cluster.client.run(os.getpid).values()))
-    os.kill(number, signal.SIGKILL)
-    return int(number)
+def kill_a_worker(cluster: Cluster) -> bool:
+    """End a worker's process at once, as a farm does; False where none answers just then."""
+    try:
+        numbers = list(cluster.client.run(os.getpid, on_error="ignore").values())
+    except OSError:
+        # The one that was killed last is still counted as a worker.
+        return False
+    for number in numbers[:1]:
+        os.kill(number, signal.SIGKILL)
+    return bool(numbers)
 
 
 def double(kept: Kept, job: int) -> int:

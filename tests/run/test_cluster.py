@@ -39,7 +39,7 @@ def test_jobs_of_a_lost_worker_are_done_by_others(cluster):
 
     def done(k: int, x: int) -> None:
         if not found:
-            kill_a_worker(cluster)
+            assert kill_a_worker(cluster)
         assert k not in found
         found[k] = x
 

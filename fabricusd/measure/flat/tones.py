@@ -48,7 +48,7 @@ SLACK = 0.01
 """Added to light, over its mean, before cube roots: a phone's blacks are clipped."""
 LEAST = 0.02
 CONTRAST_ERROR, CHANNEL_ERROR, THROUGH_ERROR, CARD_ERROR = 0.3, 0.15, 0.2, 0.03
-SAME, SHADE = 0.5, 3.0
+SAME, SHADE = 3.0, 3.0
 """Usual difference between the sets, and usual spread, of logits of albedos."""
 ROUNDS, STEPS = 2, 6
 DARK = 0.004
