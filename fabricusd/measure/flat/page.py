@@ -18,8 +18,10 @@ from fabricusd.srgb import srgb_encode
 
 Floats = NDArray[np.float64]
 
-STYLE = """body{font:15px system-ui,sans-serif;margin:2em;max-width:1700px}
-figure{display:inline-block;margin:0 1em 1em 0}img{width:512px;image-rendering:pixelated}
+STYLE = """body{font:15px system-ui,sans-serif;margin:2em auto;padding:0 1em;max-width:1600px}
+.row{display:grid;grid-template-columns:repeat(3,minmax(0,1fr));gap:1em;margin-bottom:1em}
+figure{margin:0}img{width:100%;display:block}.near img{image-rendering:pixelated}
+@media(max-width:600px){.row{grid-template-columns:1fr}}
 table{border-collapse:collapse}td,th{padding:.15em .8em;text-align:left}
 td+td{font-variant-numeric:tabular-nums}figcaption{color:#555}"""
 
@@ -48,20 +50,23 @@ def page_text(flat: Flat, made: Comparison, through: Floats | None = None) -> st
     middle = slice((h - side) // 2, (h + side) // 2), slice((w - side) // 2, (w + side) // 2)
     photograph, render = shown(flat.front.linear), shown(made.render)
     difference = heat(made.flip)
-    figures = [
+    rows_of_pictures = [
+        '<div class="row">',
         _picture(photograph, "the photograph"),
         _picture(render, "the fabric, by the path tracer under the stated light"),
         _picture(difference, f"FLIP, mean {made.flip.mean():.3f}"),
-        "<br>",
+        '</div><div class="row near">',
         _picture(photograph[middle], "its middle"),
         _picture(render[middle], "its middle"),
         _picture(difference[middle], "its middle"),
+        "</div>",
     ]
     if flat.behind is not None and through is not None:
-        figures += [
-            "<br>",
+        rows_of_pictures += [
+            '<div class="row">',
             _picture(shown(flat.behind.linear), "the photograph, lit from behind"),
             _picture(shown(through), "the fabric, as bright in the mean"),
+            "</div>",
         ]
     rows = "".join(
         f"<tr><td>{html.escape(v.label)}</td><td>{v.value:.4g} {v.unit}</td>"
@@ -75,9 +80,10 @@ def page_text(flat: Flat, made: Comparison, through: Floats | None = None) -> st
     notes = "".join(f"<li>{html.escape(note)}</li>" for note in flat.notes)
     title = html.escape(os.path.basename(flat.front.name))
     return f"""<!doctype html>
-<html lang="en"><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>
+<html lang="en"><meta charset="utf-8">
+<meta name="viewport" content="width=device-width"><title>{title}</title><style>{STYLE}</style>
 <h1>{title}: {html.escape(flat.lattice.weave.name)}</h1>
-<p>{"".join(figures)}</p>
+{"".join(rows_of_pictures)}
 <h2>Difference</h2>
 <p>CIE &Delta;E 2000 of the render, in the mean: {made.delta_e:.2f}</p>
 <table><tr><th>picture</th><th>mean FLIP</th></tr>{others}</table>

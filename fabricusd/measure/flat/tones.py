@@ -39,8 +39,9 @@ WIDER = 2.0
 """The volume lobe's width over the surface lobe's, [Sadeghi2013] Table II."""
 SQUARES = 24
 """Squares along the shorter side of a picture."""
-CLEARLY = 2.0
-"""Difference of costs, half of chi^2, by which the light must speak for another face."""
+CLEARLY = 10.0
+"""Difference of costs, half of chi^2, by which the light must speak for another face than the one
+that was stated: errors of neighbouring squares are alike, so chi^2 says more than it knows."""
 FEWEST = 60
 """Squares below which the light across a picture says too little."""
 INDEPENDENT = 60

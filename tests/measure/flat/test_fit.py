@@ -93,11 +93,13 @@ def test_a_known_cloth_comes_back_from_its_render(fitted):
     assert fitted.lattice.pitch == pytest.approx(PITCH, rel=0.01)
     # Without a card, only the product of the lamp and the colours is held.
     found = np.array([t.albedo for t in fitted.fabric.thread_list]) * fitted.gain / 6.0
-    assert found[0, 2] > 2 * found[0, 0]
+    assert found[0, 2] > 2.5 * found[0, 0]
     # The sets' colours come out nearer to one another than they are: docs, What falls short.
-    assert found[1, 0] > 1.3 * found[0, 0]
+    assert found[1, 0] > 3 * found[0, 0]
+    assert found == pytest.approx(COLORS, abs=0.17)
     figures = compare(fitted, spp=8).figures
-    assert figures["render"] < figures["constant colour"]
+    assert figures["render"] < 0.45 * figures["constant colour"]
+    assert figures["render"] < 0.7 * figures["its own tile, relit"]
 
 
 @pytest.mark.exhaustive
