@@ -96,7 +96,7 @@ def test_a_known_cloth_comes_back_from_its_render(fitted):
     assert found[0, 2] > 2.5 * found[0, 0]
     # The sets' colours come out nearer to one another than they are: docs, What falls short.
     assert found[1, 0] > 3 * found[0, 0]
-    assert found == pytest.approx(COLORS, abs=0.17)
+    assert found == pytest.approx(np.array(COLORS), abs=0.17)
     figures = compare(fitted, spp=8).figures
     assert figures["render"] < 0.45 * figures["constant colour"]
     assert figures["render"] < 0.7 * figures["its own tile, relit"]
