@@ -91,6 +91,7 @@ def bake(
     with cluster_or_threads(scheduler, workers) as cluster, locked(folder):
         remove_partial_files(folder / "report")
         result = _bake(job, folder, resume, count, cluster, progress)
+        result.notes += cluster.notes if cluster is not None else []
         if result.finished:
             result.seconds = time.perf_counter() - began
             write_json(folder / "manifest.json", manifest_of(result, settings, Path(scene)))

@@ -13,9 +13,11 @@ import platform
 import queue
 import re
 import threading
+import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import cache
 from typing import Any, NamedTuple
 
 import numba
@@ -35,6 +37,8 @@ POLL = 0.1
 """Seconds between two looks at whether the user wants to stop."""
 AHEAD = 3
 """Jobs handed out per thread of the cluster: enough that none waits for the client."""
+COUNTED = 1.0
+"""Seconds after which the cluster's threads are counted again."""
 LOSSES = 1000
 """Lost workers after which Dask calls a job the reason for the losses. Farms kill workers."""
 KEPT = 2
@@ -84,7 +88,12 @@ def open_cluster(scheduler: str) -> Iterator[Cluster]:
         ) from None
     own = None
     local = LOCAL.fullmatch(scheduler)
-    with dask.config.set({"distributed.scheduler.allowed-failures": LOSSES}):
+    settings = {
+        "distributed.scheduler.allowed-failures": LOSSES,
+        # A job holds a frame's scene, or the sums of its pixels.
+        "distributed.admin.large-graph-warning-threshold": "4GiB",
+    }
+    with dask.config.set(settings):
         try:
             if local:
                 count = worker_count(None) if local[1] is None else int(local[1])
@@ -95,6 +104,8 @@ def open_cluster(scheduler: str) -> Iterator[Cluster]:
                 )  # fmt: skip
             client = Client(own or scheduler, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError, TypeError, ImportError, KeyError, AttributeError) as error:
+            if own is not None:
+                own.close()
             if isinstance(error, FabricError):
                 raise
             said = one_line(str(error) or type(error).__name__, 160)
@@ -138,6 +149,7 @@ class Cluster:
     def __init__(self, client: Any, scheduler: str) -> None:
         self.client, self.scheduler = client, scheduler
         self.notes: list[str] = []
+        self._shared: _Shared | None = None
 
     @property
     def threads(self) -> int:
@@ -169,10 +181,7 @@ class Cluster:
                         f"{value}); its results may differ in their last bits"
                     )
                     continue
-                raise FabricError(
-                    f"worker {address}",
-                    f"has {name} {theirs.get(name)}; it must have {value}, as this machine has",
-                )
+                raise _another(f"worker {address}", name, theirs.get(name), value)
 
     def run(
         self,
@@ -185,13 +194,13 @@ class Cluster:
         """Call `function(kept, job)` on the workers for all `jobs`, in any order.
 
         function : of a module that the workers have, too
-        shared : for `Kept.thing`; must be the same for all jobs
+        shared : for `Kept.thing`; the same object as in the last call is not sent again
         done : called here with the number of each finished job and its result
 
         Returns False where `stop` was asked; an error of a job is raised here.
         """
         try:
-            return self._run(function, _packed(shared), jobs, done, stop or Stop())
+            return self._run(function, shared, jobs, done, stop or Stop())
         except KeyboardInterrupt:
             if stop is None:
                 raise
@@ -201,23 +210,29 @@ class Cluster:
     def _run(
         self,
         function: Callable[[Kept, Any], Any],
-        packed: bytes,
+        thing: Any,
         jobs: Sequence[Any],
         done: Callable[[int, Any], Any],
         stop: Stop,
     ) -> bool:
-        digest = hashlib.blake2b(packed, digest_size=16).hexdigest()
-        blob = self._send(packed)
+        if self._shared is None or self._shared.thing is not thing:
+            self._shared = self._sent(thing, _packed(thing))
         waiting = list(range(len(jobs)))[::-1]
         out: dict[Any, int] = {}
         over: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        counted, room = -COUNTED, 0
         try:
             while waiting or out:
                 if stop.asked:
                     return False
-                while waiting and len(out) < AHEAD * self.threads:
+                if time.monotonic() - counted > COUNTED:
+                    counted, room = time.monotonic(), AHEAD * self.threads
+                while waiting and len(out) < room:
                     k = waiting.pop()
-                    future = self.client.submit(_job, function, digest, blob, jobs[k], pure=False)
+                    future = self.client.submit(
+                        _job, function, _versions(), self._shared.digest, self._shared.blob,
+                        jobs[k], pure=False,
+                    )  # fmt: skip
                     out[future] = k
                     future.add_done_callback(over.put)
                 try:
@@ -232,16 +247,18 @@ class Cluster:
                 else:
                     # Cancelled, or lost with the last worker that held the shared thing.
                     waiting.append(k)
-                    blob = self._send(packed)
+                    self._shared = self._sent(thing, self._shared.packed)
             return True
         finally:
             self.client.cancel(list(out), force=True)
 
-    def _send(self, packed: bytes) -> Any:
+    def _sent(self, thing: Any, packed: bytes) -> _Shared:
         """The shared thing on every worker there is; others fetch it from them."""
+        digest = hashlib.blake2b(packed, digest_size=16).hexdigest()
         for _ in range(LOSSES):
             try:
-                return self.client.scatter(packed, broadcast=True, hash=False, direct=False)
+                blob = self.client.scatter(packed, broadcast=True, hash=False, direct=False)
+                return _Shared(thing, packed, digest, blob)
             except (OSError, TimeoutError):
                 # To a worker that has just been lost, which the scheduler had not yet seen.
                 self._wait()
@@ -258,6 +275,19 @@ class Cluster:
             ) from None
 
 
+class _Shared(NamedTuple):
+    """What was sent last: the thing, its bytes and their digest, and Dask's handle of them."""
+
+    thing: Any
+    packed: bytes
+    digest: str
+    blob: Any
+
+
+def _another(where: str, name: str, theirs: str | None, ours: str) -> FabricError:
+    return FabricError(where, f"has {name} {theirs}; it must have {ours}, as the client's machine")
+
+
 def _packed(thing: Any) -> bytes:
     # Of Dask's own dependencies: it also packs the read-only mappings that a fabric holds.
     import cloudpickle
@@ -265,8 +295,18 @@ def _packed(thing: Any) -> bytes:
     return bytes(cloudpickle.dumps(thing))
 
 
-def _job(function: Callable[[Kept, Any], Any], digest: str, blob: bytes, job: Any) -> Any:
-    """Run one job on a worker."""
+def _job(
+    function: Callable[[Kept, Any], Any],
+    versions: tuple[tuple[str, str], ...],
+    digest: str,
+    blob: bytes,
+    job: Any,
+) -> Any:
+    """Run one job on a worker, which may have joined after the others were compared."""
+    if versions != _versions():
+        own = dict(_versions())
+        name, value = next((n, v) for n, v in versions if own.get(n) != v)
+        raise _another(f"worker on {platform.node()}", name, own.get(name), value)
     with _lock:
         entry = _kept.get(digest)
         if entry is None:
@@ -289,3 +329,9 @@ def identity() -> dict[str, str]:
         "numpy": np.__version__,
         "processor": f"{platform.machine()} {numba.config.CPU_NAME or llvm.get_host_cpu_name()}",
     }
+
+
+@cache
+def _versions() -> tuple[tuple[str, str], ...]:
+    """What must be equal of `identity`."""
+    return tuple((name, value) for name, value in identity().items() if name != "processor")

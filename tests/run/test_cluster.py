@@ -68,6 +68,26 @@ def test_a_worker_of_another_version_is_named(cluster, monkeypatch):
         cluster.compare()
 
 
+def test_a_worker_of_another_version_that_joins_late_does_nothing(cluster, monkeypatch):
+    monkeypatch.setattr(module, "_versions", lambda: (("numba", "0.1"),))
+    with pytest.raises(FabricError, match=r"worker on .* has numba .*; it must have 0\.1"):
+        cluster.run(double, {"plus": 0}, [1], lambda *_: None)
+
+
+def test_what_jobs_share_is_sent_once(cluster, monkeypatch):
+    sent: list[int] = []
+    real = cluster.client.scatter
+    monkeypatch.setattr(
+        cluster.client, "scatter", lambda data, **how: sent.append(len(data)) or real(data, **how)
+    )
+    shared = {"plus": 3}
+    for _ in range(3):
+        assert cluster.run(double, shared, range(4), lambda *_: None)
+    assert len(sent) == 1
+    assert cluster.run(double, {"plus": 4}, range(4), lambda *_: None)
+    assert len(sent) == 2
+
+
 def test_another_processor_is_a_note(cluster, monkeypatch):
     real = identity()
     theirs = {"tcp://one": {**real, "processor": "x86_64 old"}}
