@@ -7,7 +7,7 @@ BIN := $(VENV)/Scripts
 endif
 STAMP := $(VENV)/.installed
 
-.PHONY: help demo test test-all quick lint schema bench docs blender clean
+.PHONY: help demo test test-all quick lint schema bench docs site blender clean
 
 help:  ## Say what each target does.
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
@@ -54,6 +54,10 @@ docs: $(STAMP)  ## Remake every figure and table in docs/.
 	for script in docs/make_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 	$(BIN)/fabricusd chart -o docs/images/charts --page docs/charts.md
 	$(BIN)/fabricusd chart -o docs/images/charts --stability docs/stability.md
+
+site: $(STAMP)  ## Build the documentation's site into build/site; open build/site/index.html.
+	$(BIN)/python -m pip install --quiet --editable '.[site]'
+	$(BIN)/python -m mkdocs build --strict --quiet
 
 # Blender brings its own numpy and needs one version of Python: see `pip index versions bpy`.
 BLENDER_PYTHON ?= python3.11
