@@ -219,6 +219,8 @@ def _relative(path: Path, target: Path) -> str:
 
 def _wear(stage: Usd.Stage, cloth: Fabric, source: str, binding: Binding, target: Path) -> None:
     """Define the fabric, a material that carries it, and bind all garments to that."""
+    for group in ("Fabrics", "Looks"):
+        UsdGeom.Scope.Define(stage, ROOT.AppendChild(group))
     path = ROOT.AppendPath(f"Fabrics/{prim_name(cloth.name)}")
     file, _ = split_source(source)
     if is_draft(source) or PRESETS in file.parents:

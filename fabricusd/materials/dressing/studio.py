@@ -21,6 +21,10 @@ from fabricusd.scene.studio import (
 
 def define_studio(stage: Usd.Stage, root: Sdf.Path, subject: Subject) -> None:
     """Define backdrop, lights and camera below `root`; the stage is in metres."""
+    # Blender takes what lies below a prim without a type off its parent, and does not turn it z up.
+    UsdGeom.Xform.Define(stage, root)
+    UsdGeom.Xform.Define(stage, root.AppendChild("Lights"))
+    UsdGeom.Scope.Define(stage, root.AppendChild("Looks"))
     _backdrop(stage, root, subject)
     for light in studio_lights(subject):
         name = light.path.removeprefix("studio ").title().replace(" ", "")

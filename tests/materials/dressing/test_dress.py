@@ -67,6 +67,14 @@ def test_the_scene_is_lit_and_its_camera_sees_the_garment(panel: Path) -> None:
     assert np.all(film <= np.array(camera.aperture) / 2)
 
 
+def test_every_prim_of_the_scene_has_a_type(panel: Path) -> None:
+    # Blender takes what lies below a prim without one off its parent, and leaves it y up.
+    out = panel.with_name("scene.usda")
+    dress([panel], out, fabric="linen_plain", units="cm")
+    stage = Usd.Stage.Open(str(out))
+    assert [prim.GetPath() for prim in stage.Traverse() if not prim.GetTypeName()] == []
+
+
 def test_a_fabric_in_a_layer_is_referenced_and_a_preset_is_written(panel: Path) -> None:
     save(Fabric(name="Cloth"), panel.with_name("cloth.usda"))
     dress([panel], panel.with_name("a.usda"), fabric=str(panel.with_name("cloth.usda")), units="cm")

@@ -56,11 +56,16 @@ class ImportFabricusd(bpy.types.Operator, ImportHelper):  # type: ignore[misc]
             self.report({"ERROR"}, f"{self.filepath} {why}")
             return {"CANCELLED"}
         before = set(bpy.data.materials)
+        others = set(bpy.data.objects)
         with told() as prim_map:
             done = bpy.ops.wm.usd_import(**self._settings())
         if "FINISHED" not in done:
             self.report({"ERROR"}, f"{self.filepath} cannot be imported by Blender")
             return {"CANCELLED"}
+        if context.scene.camera is None:
+            # Blender's import leaves the scene without one, and nothing could be rendered.
+            cameras = [o for o in bpy.data.objects if o not in others and o.type == "CAMERA"]
+            context.scene.camera = next(iter(cameras), None)
         new = [m for m in bpy.data.materials if m not in before]
         made = build(looks, materials_by_path(looks, prim_map, new), self.surface)
         domed, left_out = bring_dome(stage, context.scene) if self.lights else (False, [])
