@@ -1,4 +1,4 @@
-"""Write docs/geometry.md: the cloth's laws against tubes, from the shipped tables.
+"""Write docs/geometry.md and geometry_conserving.md: the laws against tubes, from shipped tables.
 
 python docs/make_geometry.py
 """
@@ -47,6 +47,13 @@ runs underneath; sections are as high as threads that cross leave room. Volume l
 thread anywhere on its lit side, surface light at the mirror of where it came in. Published threads
 reflect more than they get, so their light scatters once; `conserving` threads let it go on until
 it leaves.
+
+[Conserving threads against tubes](geometry_conserving.md) has a page of its own.
+"""
+
+CONSERVING_HEAD = """# Conserving threads against tubes
+
+Made by `make docs` (`python docs/make_geometry.py`). [Geometry](geometry.md) says what the tubes are.
 """
 
 LAW = """## The laws at level `far`
@@ -79,8 +86,7 @@ at 1, where tubes of published threads go beyond.
 | preset | {columns} |
 |---|{rule}"""
 
-SHARES = """
-## `conserving` threads
+SHARES = """## By side
 
 Reflected, transmitted and passed by the gap, of a white sky, with the preset's threads in
 `conserving` at A = {shades}: first after one scattering, then after all, then the law with the
@@ -95,7 +101,7 @@ SECOND = """
 ## The presets in `conserving`
 
 `PRESET{appearance=conserving}` is a second opinion: the preset's threads under the conserving law,
-each as bright as comes nearest to the preset over the pairs above, up to an albedo of 1
+each as bright as comes nearest to the preset over the pairs of [geometry](geometry.md), up to an albedo of 1
 (`python -m fabricusd.geometry.conserve`). Published threads are brighter than white, so most stop
 at 1 and stay darker. *white sky* is what is reflected of one at 8°, brightest channel: preset,
 conserving. ΔE is over the pairs; with `conserving` scaled to the preset's mean, what is left is
@@ -184,7 +190,7 @@ def second_row(name: str) -> str:
 
 
 def main() -> None:
-    """Write the page."""
+    """Write the pages."""
     found = {name: table(name) for name in table_names()}
     lines = [HEAD, LAW.format(pairs=PAIRS, count=COUNT)]
     lines += [law_row(name, law, t) for name, t in found.items() for law in laws.REGISTRY]
@@ -206,11 +212,6 @@ def main() -> None:
         columns_of = [x[:, bright] for x in (truth, *worn)]
         cells = [" ".join(f"{x:.2f}" for x in row) for row in zip(*columns_of, strict=True)]
         lines.append(f"| {name} | {' | '.join(cells)} |")
-    lines.append(SHARES.format(shades=", ".join(f"{s:g}" for s in SHADES)))
-    for name, t in found.items():
-        lines += share_rows(name, t)
-    lines.append(SECOND)
-    lines += [second_row(name) for name in refitted_names()]
     lines.append(REFUSED)
     for name in sorted(set(published_names()) - set(found)):
         try:
@@ -218,6 +219,12 @@ def main() -> None:
         except FabricError as reason:
             lines.append(f"| {name} | {reason} |")
     (HERE / "geometry.md").write_text("\n".join(lines) + "\n", "utf-8")
+    lines = [CONSERVING_HEAD, SHARES.format(shades=", ".join(f"{s:g}" for s in SHADES))]
+    for name, t in found.items():
+        lines += share_rows(name, t)
+    lines.append(SECOND)
+    lines += [second_row(name) for name in refitted_names()]
+    (HERE / "geometry_conserving.md").write_text("\n".join(lines) + "\n", "utf-8")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/measurement.md: a thread through the simulated gantry and back.
+"""Draw the pictures of docs/measurement_error.md: a thread through the simulated gantry and back.
 
 python docs/make_measurement.py
 """

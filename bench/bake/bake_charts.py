@@ -1,4 +1,4 @@
-"""Measure the figures of docs/baking.md: time by texels, BTF error by size, horizons and tracing.
+"""Measure the figures of docs/baking_error.md and docs/btf.md: time, BTF error, horizons, tracing.
 
     python bench/bake/bake_charts.py [--texels 512 1024 2048 4096] [--btf] [--horizon] [--to DIR]
 

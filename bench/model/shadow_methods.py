@@ -1,4 +1,4 @@
-"""Compare the shadowing methods with the marched height field, for docs/shadowing.md.
+"""Compare the shadowing methods with the marched height field, for docs/shadowing_measured.md.
 
     python bench/model/shadow_methods.py [--figure docs/images/shadowing.png]
 

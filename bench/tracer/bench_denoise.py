@@ -43,7 +43,7 @@ def relative_error(a: np.ndarray, b: np.ndarray) -> float:
 def measure(
     name: str, scene: str, samples: int, reference: int, side: int, **settings: object
 ) -> None:
-    """Print a row of the table in docs/path_tracer.md."""
+    """Print a row of the table in docs/review.md."""
     size = {"width": side, "height": side}
     noisy = render(scene, spp=samples, aovs=GUIDES, **size, **settings)
     exact = render(scene, spp=reference, seed=1, **size, **settings).layers["beauty"][..., :3]

@@ -19,7 +19,7 @@ cosine). The columns sigma_r, sigma_g and sigma_b are their standard deviations.
 
 --flat fits a whole fabric to photographs of flat cloth: weave, densities, colours, lobes, gap. Each
 number has an interval and a source. --cylinder fits the threads of cloth whose weave is known. See
-docs/measurement.md.
+docs/measurement.md, docs/flat_cloth.md and docs/cylinder_fit.md.
 
 Printed are chi2 per degree of freedom and 95 % intervals. Parameters that the views do not tell
 apart are said to be, with the product that the views do tell.

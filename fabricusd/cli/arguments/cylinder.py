@@ -19,7 +19,7 @@ def add_cylinder(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--setup",
         metavar="JSON",
-        help="where camera, light and cylinders stand, see docs/measurement.md (no default)",
+        help="where camera, light and cylinders stand, see docs/cylinder_fit.md (no default)",
     )
     group.add_argument(
         "--fabric",

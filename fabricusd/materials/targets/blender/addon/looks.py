@@ -46,7 +46,7 @@ CONSTANTS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Lobe:
-    """A GGX lobe about a tilted normal, or a pair of opposite tilt; see docs/materials.md.
+    """A GGX lobe about a tilted normal, or a pair of opposite tilt; see docs/lobes.md.
 
     along : "weft" or "warp"
     """

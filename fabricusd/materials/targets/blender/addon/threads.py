@@ -1,4 +1,4 @@
-"""Read what a look says of single threads, `cycles:near:` in its inputs; see docs/materials.md.
+"""Read what a look says of single threads, `cycles:near:` in its inputs; see docs/lobes_near.md.
 
 This module knows USD and not Blender. The formulas are those of fabricusd.materials.near.mixture.
 """
