@@ -5,10 +5,13 @@ Importing this module imports neither USD nor Embree; the functions below load w
 
 from __future__ import annotations
 
-from importlib import import_module
+from importlib import import_module, metadata
 from typing import Any
 
-__version__ = "0.1.0"
+try:
+    __version__ = metadata.version("fabricusd")
+except metadata.PackageNotFoundError:  # a folder on the path that nobody installed
+    __version__ = "0+unknown"
 
 _WHERE = {
     "Fabric": "fabricusd.fabric",

@@ -131,7 +131,7 @@ def generate() -> dict[str, str]:
         if done.returncode or not made.exists():
             raise RuntimeError(f"usdGenSchema failed: {done.stdout}{done.stderr}")
         schema = _finished(made, source)
-        info_text = re.sub(r"^#.*\n", "", (out / "plugInfo.json").read_text(), flags=re.M)
+        info_text = re.sub(r"^#.*\n", "", (out / "plugInfo.json").read_text("utf-8"), flags=re.M)
     plugin = json.loads(info_text)["Plugins"][0]
     plugin.update({"LibraryPath": "", "ResourcePath": ".", "Root": "."})
     validators: dict[str, object] = {"keywords": ["fabricusd"]}
@@ -167,14 +167,14 @@ def main() -> int:
         stale = [
             name
             for name, text in made.items()
-            if not (PLUGIN / name).exists() or (PLUGIN / name).read_text() != text
+            if not (PLUGIN / name).exists() or (PLUGIN / name).read_text("utf-8") != text
         ]
         for name in stale:
             print(f"{name} differs from schema.usda and the rules; run `make schema`")
         return 1 if stale else 0
     for name, text in made.items():
         (PLUGIN / name).parent.mkdir(parents=True, exist_ok=True)
-        (PLUGIN / name).write_text(text)
+        (PLUGIN / name).write_text(text, "utf-8")
     return 0
 
 

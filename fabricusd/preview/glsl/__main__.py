@@ -6,4 +6,4 @@ from fabricusd.preview.glsl.kernels import SHADER, shader
 
 if __name__ == "__main__":
     SHADER.parent.mkdir(exist_ok=True)
-    SHADER.write_text(shader())
+    SHADER.write_text(shader(), "utf-8")

@@ -120,7 +120,7 @@ def side_data(fabric: Fabric, *, back: bool = False, live: bool = True) -> dict[
 
 def shaders() -> dict[str, str]:
     """The shaders' texts by name."""
-    read = {path.stem: path.read_text() for path in FOLDER.glob("*.glsl")}
+    read = {path.stem: path.read_text("utf-8") for path in FOLDER.glob("*.glsl")}
     kernels = read["kernels"] + read["cloth"]
     tone = read["tone"].replace("ACES_SCALE", repr(view._SCALE))
     return {
@@ -136,18 +136,18 @@ def shell() -> str:
         "policy": "", "style": '<link rel="stylesheet" href="page.css">', "data": "",
         "script": '<script type="module" src="page.js"></script>', "title": "fabricusd preview",
     }  # fmt: skip
-    text = _put((FOLDER / "page.html").read_text(), parts)
+    text = _put((FOLDER / "page.html").read_text("utf-8"), parts)
     return text
 
 
 def script() -> str:
     """The page's script."""
-    return "\n".join((FOLDER / name).read_text() for name in SCRIPTS).replace("export ", "")
+    return "\n".join((FOLDER / name).read_text("utf-8") for name in SCRIPTS).replace("export ", "")
 
 
 def style() -> str:
     """The page's style."""
-    return (FOLDER / "page.css").read_text()
+    return (FOLDER / "page.css").read_text("utf-8")
 
 
 def _filled(data: Any, title: str) -> str:
@@ -162,7 +162,7 @@ def _filled(data: Any, title: str) -> str:
         "data": f'<script type="application/json" id="data">{held}</script>',
         "script": f'<script type="module">{code}</script>',
     }  # fmt: skip
-    return _put((FOLDER / "page.html").read_text(), parts)
+    return _put((FOLDER / "page.html").read_text("utf-8"), parts)
 
 
 def _put(text: str, parts: dict[str, str]) -> str:

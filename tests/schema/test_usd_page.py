@@ -1,4 +1,4 @@
-"""What README says about putting a fabric on a garment works as it is written there."""
+"""What the page of USD says about putting a fabric on a garment works as it is written there."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fabricusd.cli.main import main
 from fabricusd.scene.usd.stage import read_usd_scene
 from fabricusd.schema import load
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "usd.md"
 
 SHAPE = """
     int[] faceVertexCounts = [4]
@@ -24,7 +24,7 @@ SHAPE = """
 
 
 def test_a_garment_wears_a_preset_by_reference(tmp_path, monkeypatch):
-    text = README.read_text()
+    text = PAGE.read_text()
     command = re.search(r"fabricusd (new --preset (\w+) -o silk\.usda)", text)
     blocks = re.findall(r"```usda\n(.*?)```", text, re.DOTALL)
     (block,) = [b for b in blocks if "WovenBindingAPI" in b]
