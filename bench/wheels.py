@@ -32,9 +32,9 @@ INDIRECT = ("llvmlite",)
 def packages() -> dict[str, str]:
     """Requirement, and the extra it belongs to."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    found = {each: "" for each in (*project["dependencies"], *INDIRECT)}
+    found = dict.fromkeys((*project["dependencies"], *INDIRECT), "")
     for extra in EXTRAS:
-        found |= {each: extra for each in project["optional-dependencies"][extra]}
+        found |= dict.fromkeys(project["optional-dependencies"][extra], extra)
     return found
 
 

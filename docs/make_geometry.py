@@ -103,10 +103,10 @@ SECOND = """
 
 `PRESET{appearance=conserving}` is a second opinion: the preset's threads under the conserving law,
 each as bright as comes nearest to the preset over the pairs of [geometry](geometry.md), up to an
-albedo of 1 (`python -m fabricusd.geometry.conserve`). Published threads are brighter than white, so most stop
-at 1 and stay darker. *white sky* is what is reflected of one at 8°, brightest channel: preset,
-conserving. ΔE is over the pairs; with `conserving` scaled to the preset's mean, what is left is
-shape.
+albedo of 1 (`python -m fabricusd.geometry.conserve`). Published threads are brighter than white, so
+most stop at 1 and stay darker. *white sky* is what is reflected of one at 8°, brightest channel:
+preset, conserving. ΔE is over the pairs; with `conserving` scaled to the preset's mean, what is
+left is shape.
 
 | preset | albedos | white sky | error | ΔE | ΔE scaled |
 |---|---|---|---|---|---|"""

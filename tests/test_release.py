@@ -1,9 +1,10 @@
-"""What a release consists of: the version, the changelog, the citation, the files that are built."""
+"""What a release consists of: the version, changelog, citation, and the files that are built."""
 
 from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -16,6 +17,9 @@ import yaml
 
 from fabricusd import __version__
 from tests.docs.pages import ROOT
+
+LEFT_OUT = (".venv", "build", "demo", "dist", "__pycache__", "*.egg-info", ".*_cache")
+"""What a build needs nothing of, and what would take long to copy."""
 
 HEADINGS = ["Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"]
 
@@ -58,9 +62,12 @@ def test_a_form_for_issues_has_fields_with_labels(form):
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory) -> tuple[Path, Path]:
-    """A source distribution, and the wheel that is built of it, outside of any history."""
+    """A source distribution, and the wheel that is built of it."""
     folder = tmp_path_factory.mktemp("dist")
-    run([sys.executable, "-m", "build", "--outdir", str(folder), str(ROOT)], folder)
+    # The build leaves files beside the sources while it runs, which other tests would find.
+    copy = folder / "copy"
+    shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(*LEFT_OUT))
+    run([sys.executable, "-m", "build", "--outdir", str(folder), str(copy)], folder)
     (source,), (wheel,) = folder.glob("*.tar.gz"), folder.glob("*.whl")
     return source, wheel
 

@@ -34,6 +34,12 @@ def test_a_broken_link_is_found():
     assert broken("README.md", "docs/glossary.md#cloth") == ""
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_a_link_that_is_called_after_a_page_leads_to_that_page(page):
+    named = re.findall(r"\[([\w/-]+\.md)\]\(([^)#]+)", text(page))
+    assert [pair for pair in named if len({posixpath.basename(name) for name in pair}) > 1] == []
+
+
 def test_pages_named_in_sources_are_there():
     named: dict[str, str] = {}
     for folder in ("fabricusd", "bench", "tests", "samples"):
