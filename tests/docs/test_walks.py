@@ -1,4 +1,4 @@
-"""The tutorial, as it stands on its page: every command in its order, then Blender."""
+"""The tutorial and the how-to pages, as they stand: every command in its order, then Blender."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from fabricusd.images.files import read_image
-from tests.docs.pages import ROOT, blocks, commands
+from tests.docs.pages import PAGES, ROOT, blocks, commands
 from tests.docs.test_commands import words_of
 from tests.materials.targets.blender.addon.blender import interpreter
 
@@ -25,16 +25,32 @@ bpy.ops.wm.save_userpref()
 """
 
 
+HOW_TO = [page for page in PAGES if page.startswith("docs/how-to/") and commands(page)]
+READERS_OWN = {"docs/how-to/photograph.md"}
+"""Pages whose commands need files of the reader's."""
+
+
+def walk(page, folder):
+    """Run every command of a page in `folder`."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for line in commands(page):
+        run = [sys.executable, "-m", "fabricusd", *words_of(line)]
+        done = subprocess.run(run, cwd=folder, env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, f"{line}\n{done.stderr}"
+
+
 @pytest.fixture(scope="module")
 def walked(tmp_path_factory):
     """A folder in which every command of the tutorial was run."""
     folder = tmp_path_factory.mktemp("tutorial")
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    for line in commands(TUTORIAL):
-        run = [sys.executable, "-m", "fabricusd", *words_of(line)]
-        done = subprocess.run(run, cwd=folder, env=environment, capture_output=True, text=True)
-        assert done.returncode == 0, f"{line}\n{done.stderr}"
+    walk(TUTORIAL, folder)
     return folder
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("page", [page for page in HOW_TO if page not in READERS_OWN])
+def test_every_command_of_a_how_to_page_works(page, tmp_path):
+    walk(page, tmp_path)
 
 
 @pytest.mark.exhaustive
