@@ -52,6 +52,11 @@ def test_pages_named_in_sources_are_there():
     assert {page for page in named if not (ROOT / page).is_file()} == set()
 
 
+def test_every_decision_is_listed():
+    pages = {path.name for path in (ROOT / "docs" / "decisions").glob("[0-9]*.md")}
+    assert set(links("docs/decisions/README.md")) == pages
+
+
 def test_every_picture_is_on_a_page():
     shown = " ".join(text(page) for page in PAGES)
     there = {path.name for path in (ROOT / "docs" / "images").rglob("*.png")}
