@@ -1,174 +1,153 @@
-"""Writing panels as CSV, JSON and Markdown."""
+"""The pages of charts: what to choose, and for each panel its picture and its front."""
 
 from __future__ import annotations
 
-import csv
-import json
-import math
-import platform
+import re
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from dataclasses import dataclass, field
 
-import fabricusd
-from fabricusd.appearance.weave.footprint import DEFAULT
+from fabricusd.chart.advice import Advice, advice, bounds_of
+from fabricusd.chart.bounds_page import bounds_page
+from fabricusd.chart.figures import Charts
 from fabricusd.chart.panel import Panel, Row, relative_costs
-from fabricusd.files import whole_file
-from fabricusd.reference.choice import BOUNDS as LEVEL_BOUNDS
-from fabricusd.reference.choice import cheapest, choose_limits, read_limits, read_table
+from fabricusd.chart.words import number
 
-Charts = Mapping[str, tuple[Panel, Sequence[Row]]]
+BOUNDS, SHEETS = "max-error", "thesis"
+"""Names of the pages that are no panel's."""
 
-
-def write_csv(path: Path, rows: Sequence[Row]) -> None:
-    """One line a row; further figures are columns of their own."""
-    lines = [
-        {**row.as_dict(), "relative_cost": relative}
-        for row, relative in zip(rows, relative_costs(rows), strict=True)
-    ]
-    names = list(dict.fromkeys(name for line in lines for name in line))
-    with whole_file(path) as temporary, temporary.open("w", newline="") as stream:
-        writer = csv.DictWriter(stream, names)
-        writer.writeheader()
-        writer.writerows(lines)
+LONG = 60
+"""Rows of a front beyond which each group gets one line."""
 
 
-def write_json(path: Path, charts: Charts, seconds: float, quick: bool) -> None:
-    """Write every panel with its axes and rows, and the software and machine of the measurement."""
-    content = {
-        "software": f"fabricusd {fabricusd.__version__}",
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-        "seconds": round(seconds, 1),
-        "quick": quick,
-        "panels": {
-            name: {
-                "title": panel.title,
-                "cost": panel.cost,
-                "error": panel.error,
-                "rows": [row.as_dict() for row in rows],
-            }
-            for name, (panel, rows) in charts.items()
-        },
-    }
-    with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+@dataclass(frozen=True, kw_only=True)
+class Pages:
+    """What the pages are made of.
 
+    sheets : name -> caption; notes : name of a panel -> what a reader must know of its figures
+    folder : of the panels' pages, seen from the first page; images, deeper : of the pictures, seen
+        from the first page and from the panels' pages
+    command : that measures and writes all of it
+    """
 
-def markdown(charts: Charts, sheets: Mapping[str, str], images: str, command: str) -> str:
-    """The page: for each panel a picture, the front, and the dominated methods; then the sheets."""
-    parts = [
-        "# Speed against accuracy\n",
-        f"`{command}` makes this page. It runs every method in one process on one machine, in "
-        "turns. The cost of a method is a multiple of the cost of the cheapest method in its "
-        "group. The figure after ± is half the range between the quartiles over repeats. A method "
-        "is dominated when another method is no dearer and no worse, and is better in cost or "
-        "error by more than both spreads. `charts.csv` and `charts.json` hold every figure, "
-        "including absolute costs.\n",
-        "## What --max-error takes\n",
-        *_choices(),
-        *_limits(),
-    ]
-    for name, (panel, rows) in charts.items():
-        parts += [
-            f"## {panel.title}\n",
-            f"{panel.about}\n",
-            f"Cost: {panel.cost}. Error: {panel.error}.\n",
-            f"![{panel.title}]({images}{name}.png)\n",
-            *_tables(rows),
+    charts: Charts
+    sheets: Mapping[str, str] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)
+    folder: str = "charts/"
+    images: str = ""
+    deeper: str = "../"
+    command: str = "fabricusd chart"
+
+    def texts(self) -> dict[str, str]:
+        """Name of each page -> its text; the first page is named ""."""
+        found = {"": self._first(), BOUNDS: bounds_page()}
+        for name, (panel, rows) in self.charts.items():
+            found[name] = self._panel(name, panel, rows)
+        if self.sheets:
+            found[SHEETS] = self._sheets()
+        return found
+
+    def _first(self) -> str:
+        lines = [
+            "# Speed against accuracy\n",
+            "## What to choose\n",
+            "For each question and each bound on the error: the method that is the cheapest within "
+            "the bound on most of what was measured. *Cost* is its median cost over that of the "
+            "cheapest method, which may err more. *Holds on* counts where it is the choice, out of "
+            "where any method meets the bound.\n",
+            "| question | error at most | choose | cost | holds on |",
+            "|---|---:|---|---:|---|",
         ]
-    if sheets:
-        parts.append("## The thesis's pictures\n")
-    for name, about in sheets.items():
-        parts += [f"{about}.\n", f"![{name}]({images}{name}.png)\n"]
-    return "\n".join(parts)
+        for name, (panel, rows) in self.charts.items():
+            title = f"[{panel.title}]({self.folder}{name}.md)"
+            for one in advice(rows, bounds_of(panel.error)):
+                lines.append(_choice(title, one))
+                title = ""
+        lines += [
+            "",
+            f"`fabricusd render --max-error` chooses by itself: [what it takes]({self.folder}"
+            f"{BOUNDS}.md) for each preset and bound.\n",
+            "## The fronts\n",
+            "Each page shows its methods in a picture, and those on the front in a table: methods "
+            "that no other dominates. A method is dominated when another is no dearer and no "
+            "worse, and is better in cost or error by more than both spreads. The dominated ones "
+            "are in the JSON beside the pictures.\n",
+        ]
+        for name, (panel, _) in self.charts.items():
+            lines.append(f"- [{panel.title}]({self.folder}{name}.md): {_lower(panel.error)}")
+        if self.sheets:
+            lines.append(f"- [The thesis's pictures]({self.folder}{SHEETS}.md), remade")
+        lines += [
+            "",
+            f"`{self.command}` measures all of it, in one process on one machine, in turns, and "
+            "writes these pages. Costs are multiples of the cheapest method's, because only ratios "
+            "carry over to other machines; `charts.csv` and `charts.json` hold the absolute ones. "
+            "With `--from charts.json` the pages are written from figures that were measured "
+            "before.\n",
+        ]
+        return "\n".join(lines)
 
-
-def _tables(rows: Sequence[Row]) -> list[str]:
-    """The rows of the front as a table, and the other rows as a list with a line per group."""
-    relative = relative_costs(rows)
-    lines = [
-        "<details><summary>The front</summary>\n",
-        "| measured on | method on the front | cost | error |",
-        "|---|---|---|---|",
-    ]
-    beaten: dict[str, list[str]] = {}
-    last = ""
-    for row, cost in zip(rows, relative, strict=True):
-        if row.on_front:
-            spread = row.cost_spread / row.cost * cost if row.cost else 0.0
-            group = "" if row.group == last else row.group
-            last = row.group
+    def _panel(self, name: str, panel: Panel, rows: Sequence[Row]) -> str:
+        # The text of a panel links to pages beside the first one.
+        about = re.sub(r"\]\((\w+\.md)", r"](../\1", panel.about)
+        lines = [
+            f"# {panel.title}\n",
+            f"![{panel.title}]({self.deeper}{name}.png)\n",
+            *([f"**{self.notes[name]}**\n"] if name in self.notes else []),
+            f"{about}\n",
+            f"Cost: {panel.cost}, over that of the cheapest method. Error: {panel.error}. The "
+            "figure after ± is half the range between the quartiles over repeats.\n",
+            "## The front\n",
+            *_front(rows),
+        ]
+        beaten = sum(not row.on_front for row in rows)
+        if beaten:
             lines.append(
-                f"| {group} | {row.method} | {number(cost)} ± {number(spread)} "
-                f"| {number(row.error)} ± {number(row.error_spread)} |"
+                f"\n{beaten} dominated methods: "
+                f"[{name}.dominated.json]({self.deeper}{name}.dominated.json)."
             )
-        else:
-            beaten.setdefault(row.group, []).append(f"{row.method} (by {row.dominated_by})")
-    lines.append("\n</details>\n")
-    if beaten:
-        lines.append("<details><summary>Dominated</summary>\n")
-        lines += [f"- {group}: {'; '.join(methods)}" for group, methods in beaten.items()]
-        lines.append("\n</details>\n")
+        return "\n".join([*lines, ""])
+
+    def _sheets(self) -> str:
+        lines = ["# The thesis's pictures\n"]
+        for name, about in self.sheets.items():
+            lines += [f"{about}.\n", f"![{name}]({self.deeper}{name}.png)\n"]
+        return "\n".join(lines)
+
+
+def _choice(title: str, one: Advice) -> str:
+    return (
+        f"| {title} | {one.bound:g} | {one.method} | {number(one.cost)}× | "
+        f"{one.chosen} of {one.within}"
+        + (f"; {one.groups - one.within} never" if one.within < one.groups else "")
+        + " |"
+    )
+
+
+def _front(rows: Sequence[Row]) -> list[str]:
+    """The front as a table, in which a group is a line where there are many."""
+    on = [(row, cost) for row, cost in zip(rows, relative_costs(rows), strict=True) if row.on_front]
+    if len(on) > LONG:
+        groups: dict[str, list[str]] = {}
+        for row, cost in on:
+            said = f"{row.method} ({number(cost)}×, {number(row.error)})"
+            groups.setdefault(row.group, []).append(said)
+        return [
+            "| measured on | methods on the front (cost, error) |",
+            "|---|---|",
+            *(f"| {group} | {'; '.join(methods)} |" for group, methods in groups.items()),
+        ]
+    lines = ["| measured on | method | cost | error |", "|---|---|---|---|"]
+    last = ""
+    for row, cost in on:
+        spread = row.cost_spread / row.cost * cost if row.cost else 0.0
+        group = "" if row.group == last else row.group
+        last = row.group
+        lines.append(
+            f"| {group} | {row.method} | {number(cost)} ± {number(spread)} "
+            f"| {number(row.error)} ± {number(row.error_spread)} |"
+        )
     return lines
 
 
-BOUNDS = (1.0, 0.5, 0.3, 0.1, 0.05, 0.01)
-
-
-def _choices() -> list[str]:
-    """The shadowing that each preset gets at some bounds, from the table in use."""
-    table = read_table()
-    lines = [
-        "`fabricusd render --max-error` chooses the cheapest shadowing whose error is within the "
-        "bound. If there is none, it chooses the one with the least error (*). In brackets: the "
-        "cost over that of the cheapest method, and the error. "
-        "`fabricusd chart --choice fabricusd/reference/choice.json` remakes the table. "
-        "`fabricusd render -n` prints the choice and the reason.\n",
-        "| preset | " + " | ".join(f"{b:g}" for b in BOUNDS) + " |",
-        "|---|" + "---|" * len(BOUNDS),
-    ]
-    for name, front in table.items():
-        least = min(cost for cost, _ in front.values())
-        cells = []
-        for bound in BOUNDS:
-            c = cheapest(front, bound)
-            star = "*" if c.error > bound else ""
-            cells.append(f"{c.method}{star} ({number(c.cost / least)}×, {number(c.error)})")
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return [*lines, ""]
-
-
-def _limits() -> list[str]:
-    """Where level `auto` changes for each preset at some bounds, from the table in use."""
-    lines = [
-        "The next table is for level `auto` with a bound. A cell holds two limits. `auto` uses "
-        "`far` when a pixel spans at least as many repeats as the first limit, and `thread` when a "
-        "thread spans at least as many pixels as the second limit. Between them it uses `weave`. "
-        "At its limit and at every wider pixel, a level is within the bound of a filtered "
-        "`thread`. This error is the rms over the pixels, over the cloth's mean, for the worst of "
-        "three lights, without shadows. Without a bound, the levels change gradually around "
-        f"{DEFAULT.repeats:g} / {DEFAULT.pixels:g}.\n",
-        "| preset | " + " | ".join(f"{b:g}" for b in LEVEL_BOUNDS) + " |",
-        "|---|" + "---|" * len(LEVEL_BOUNDS),
-    ]
-    for name in read_limits():
-        found = [choose_limits([name], bound)[0] for bound in LEVEL_BOUNDS]
-        cells = [
-            f"{number(x.repeats) if x.repeats < math.inf else 'never'} / {number(x.pixels)}"
-            for x in found
-        ]
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return [*lines, ""]
-
-
-def number(x: float) -> str:
-    """Two significant digits, without an exponent for numbers of moderate size."""
-    return (
-        "0"
-        if x == 0
-        else f"{x:.2g}"
-        if 1e-3 <= abs(x) < 100
-        else f"{x:.0f}"
-        if x >= 100
-        else f"{x:.1e}"
-    )
+def _lower(text: str) -> str:
+    return text[:1].lower() + text[1:]

@@ -9,13 +9,15 @@ from pathlib import Path
 from fabricusd.errors import FabricError
 from fabricusd.files import require_writable
 
-EPILOG = """Writes charts.csv, charts.json, charts.md, and a PNG and an SVG of each panel into DIR.
+EPILOG = """Writes charts.csv, charts.json, charts.md with a page for each panel, and a PNG and
+an SVG of each panel into DIR.
 Sheets remake the pictures of the thesis; they are left out with --quick and with --panel.
 
 example:
   fabricusd chart -o charts --quick
   fabricusd chart -o charts --panel zoom --panel shadows
-  fabricusd chart -o charts --sheet cylinders"""
+  fabricusd chart -o charts --sheet cylinders
+  fabricusd chart --from docs/images/charts/charts.json --page docs/charts.md"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,7 +52,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="measure the table that render --max-error reads instead, on this machine (default: "
         "charts)",
     )
-    parser.add_argument("--page", metavar="MD", help="file for the page (default: DIR/charts.md)")
+    parser.add_argument(
+        "--page",
+        metavar="MD",
+        help="file for the first page; the others lie in a folder beside it (default: "
+        "DIR/charts.md)",
+    )
+    parser.add_argument(
+        "--from",
+        dest="figures",
+        metavar="JSON",
+        help="write the pages from a charts.json that was measured before, and measure nothing "
+        "(default: measure)",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -73,6 +87,15 @@ def run(options: argparse.Namespace) -> int:
             print(f"{panel.name:12} {panel.title}")
         for name, (title, _) in SHEETS.items():
             print(f"{name:12} (sheet) {title}")
+        return 0
+    if options.figures:
+        from fabricusd.chart.make import remake_pages
+
+        if options.output or options.quick or options.panel or options.sheet:
+            raise FabricError("--from", "measures nothing; it takes --page alone")
+        figures = Path(options.figures)
+        for path in remake_pages(figures, Path(options.page or figures.with_name("charts.md"))):
+            print(path)
         return 0
     if not options.output:
         raise FabricError("chart", "needs -o DIR; see 'fabricusd chart --help'")

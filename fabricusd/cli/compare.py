@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "-o",
         "--output",
         metavar="PNG",
-        help="write a map of where they differ, by FLIP (default: none)",
+        help="write a map of where they differ, by FLIP, with its scale (default: none)",
     )
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     parser.add_argument(
@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print the figures, draw the map, and judge the difference by the bounds."""
     from fabricusd.images.files import parts_of, read_image, write_png
-    from fabricusd.quality.pictures import difference, flip_map, heat
+    from fabricusd.quality.pictures import difference, flip_map
 
     high_range = options.a.lower().endswith(".exr") and options.b.lower().endswith(".exr")
     a, b = read_image(options.a), read_image(options.b)
@@ -92,7 +92,11 @@ def run(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     if options.output:
-        write_png(options.output, heat(flip_map(a, b, high_range=high_range)))
+        from fabricusd.quality.scale import with_scale
+
+        differing = flip_map(a, b, high_range=high_range)
+        title = f"FLIP; mean {found.flip:.3g}; 0: none seen"
+        write_png(options.output, with_scale(differing, title))
     over = (options.max_flip is not None and found.flip > options.max_flip) or (
         options.max_error is not None and found.delta_e_mean > options.max_error
     )

@@ -21,7 +21,9 @@ def test_the_quick_chart_is_whole(capsys, tmp_path):
         rows = content["panels"][panel.name]["rows"]
         assert any(row["on_front"] for row in rows)
         assert all(row["cost"] >= 0 and row["error"] >= 0 for row in rows)
-        assert f"]({panel.name}.png)" in page
+        assert f"(charts/{panel.name}.md)" in page
+        one = (tmp_path / "charts" / "charts" / f"{panel.name}.md").read_text()
+        assert f"](../{panel.name}.png)" in one
         for suffix in (".png", ".svg"):
             assert (tmp_path / "charts" / f"{panel.name}{suffix}").stat().st_size > 1000
 

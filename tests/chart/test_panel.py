@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 
-from fabricusd.chart.page import write_csv
+from fabricusd.chart.figures import write_csv
 from fabricusd.chart.panel import Panel, Row, mark, measure, relative_costs
 
 
