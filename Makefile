@@ -56,7 +56,7 @@ docs: $(STAMP)  ## Remake every figure and table in docs/.
 	$(BIN)/fabricusd chart -o docs/images/charts --stability docs/stability.md
 
 site: $(STAMP)  ## Build the documentation's site into build/site; open build/site/index.html.
-	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 # Blender brings its own numpy and needs one version of Python: see `pip index versions bpy`.
 BLENDER_PYTHON ?= python3.11

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tests.docs.pages import PAGES, ROOT
 
@@ -17,11 +18,31 @@ from tests.docs.pages import PAGES, ROOT
 def site(tmp_path_factory) -> Path:
     """The site, built as `make site` builds it."""
     folder = tmp_path_factory.mktemp("site")
-    run = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-d", str(folder)]
-    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
-    done = subprocess.run(run, cwd=ROOT, env=environment, capture_output=True, text=True)
+    done = built(ROOT / "mkdocs.yml", folder)
     assert done.returncode == 0, done.stderr
     return folder
+
+
+def built(configuration: Path, folder: Path) -> subprocess.CompletedProcess[str]:
+    """What MkDocs says of a site. With `--quiet` it would not count warnings."""
+    run = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", str(configuration)]
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    return subprocess.run(
+        [*run, "-d", str(folder)], cwd=ROOT, env=environment, capture_output=True, text=True
+    )
+
+
+def test_a_lost_link_is_a_warning_that_fails_the_build(tmp_path):
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "index.md").write_text("# A page\n\n[lost](lost.md)\n")
+    said = {"site_name": "x", "docs_dir": "docs"}
+    said["validation"] = yaml.safe_load(
+        re.search(r"^validation:\n(?:  .*\n)+", (ROOT / "mkdocs.yml").read_text("utf-8"), re.M)[0]
+    )["validation"]
+    (tmp_path / "mkdocs.yml").write_text(yaml.safe_dump(said))
+    done = built(tmp_path / "mkdocs.yml", tmp_path / "site")
+    assert done.returncode == 1
+    assert "lost.md" in done.stderr
 
 
 def test_every_page_has_its_place(site):
