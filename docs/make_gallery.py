@@ -113,9 +113,9 @@ def swatch(fabric: Fabric) -> Scene:
             PreviewSurface(diffuse=(0.10,) * 3, roughness=1.0, ior=1.0),
         ],
         lights=[
-            Light(path="sky", kind=DOME, radiance=(0.30, 0.305, 0.31)),
-            lamp("key", (-0.30, 0.25, 0.40), (0, 0, 0), (0.16, 0.16), 22.0, 0.02),
-            lamp("rim", (0.35, 0.30, 0.20), (0, 0, 0), (0.10, 0.25), 8.0, -0.02),
+            Light(path="sky", kind=DOME, radiance=(0.36, 0.36, 0.36)),
+            lamp("key", (-0.30, 0.25, 0.40), (0, 0, 0), (0.16, 0.16), 29.0),
+            lamp("rim", (0.35, 0.30, 0.20), (0, 0, 0), (0.10, 0.25), 10.0),
         ],
         camera=camera((0.0, -0.13, 0.33), (0.0, 0.0, 0.002), 1.28 * SWATCH, (1, 1)),
     )
@@ -123,13 +123,16 @@ def swatch(fabric: Fabric) -> Scene:
 
 @cache
 def table() -> Scene:
-    """The drape of docs/make_presets.py, on a neutral ground."""
+    """The drape of docs/make_presets.py, on a neutral ground and in white light."""
     scene = drape()
+    lights = [
+        replace(light, radiance=(0.85 * sum(light.radiance) / 3,) * 3) for light in scene.lights
+    ]
     materials = [
         replace(m, diffuse=(0.32,) * 3) if isinstance(m, PreviewSurface) else m
         for m in scene.materials
     ]
-    return replace(scene, materials=materials)
+    return replace(scene, materials=materials, lights=lights)
 
 
 def strip(fabric: Fabric, spp: int) -> Image.Image:

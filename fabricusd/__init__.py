@@ -25,14 +25,21 @@ _WHERE = {
     "save": "fabricusd.schema",
     "check": "fabricusd.schema",
     "render": "fabricusd.reference",
+    "material": "fabricusd.api",
+    "fit": "fabricusd.api",
 }
 
-__all__ = [*_WHERE, "__version__"]
+_CALLED = ("bake", "preview")
+"""Folders of the package that are functions too, see `callable_module`."""
+
+__all__ = [*_WHERE, *_CALLED, "__version__"]
 
 
 def __getattr__(name: str) -> Any:
     if name in _WHERE:
         return getattr(import_module(_WHERE[name]), name)
+    if name in _CALLED:
+        return import_module(f"fabricusd.{name}")
     raise AttributeError(f"module 'fabricusd' has no attribute {name!r}")
 
 

@@ -52,11 +52,16 @@ def _limits(
     *,
     above: float | None = None,
     below: float | None = None,
+    radians: bool = False,
 ) -> Mapping[str, Any]:
-    """Field metadata: the closed (`minimum`, `maximum`) and open (`above`, `below`) bounds."""
+    """Field metadata: the closed (`minimum`, `maximum`) and open (`above`, `below`) bounds, and
+    whether the field is an angle in radians."""
     return MappingProxyType(
-        {"minimum": minimum, "maximum": maximum, "above": above, "below": below}
-    )
+        {
+            "minimum": minimum, "maximum": maximum, "above": above, "below": below,
+            "radians": radians,
+        }
+    )  # fmt: skip
 
 
 def describe_limits(limits: Mapping[str, Any], scale: float = 1.0, unit: str = "") -> str:
@@ -100,9 +105,21 @@ def _require_limits(owner: Any) -> None:
             continue
         for number in value if isinstance(value, tuple) else (value,):
             if not within_limits(number, f.metadata):
+                if f.metadata.get("radians"):
+                    limits = describe_limits(f.metadata, unit="radians")
+                    raise FabricError(
+                        f.name, f"is {number!r} radians; it must be {limits}{_if_degrees(number)}"
+                    )
                 raise FabricError(
                     f.name, f"is {number!r}; it must be {describe_limits(f.metadata)}"
                 )
+
+
+def _if_degrees(number: float) -> str:
+    """What an angle is in radians that was probably given in degrees, or ""."""
+    if not 1.5 < abs(number) <= 360.0:
+        return ""
+    return f"; {number:g}° is {math.radians(number):.3g}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +161,8 @@ class TangentCurve:
             if not (math.isfinite(x) and abs(x) <= math.pi / 2 + 1e-12):
                 raise FabricError(
                     f"curve angle {k}",
-                    f"is {math.degrees(x):.6g} degrees; it must be from -90 to 90 degrees",
+                    f"is {x:.6g} radians; it must be from -1.5708 to 1.5708 radians"
+                    f"{_if_degrees(x)}",
                 )
 
     @classmethod
@@ -243,8 +261,12 @@ class Thread:
     albedo: tuple[float, float, float] = field(default=(0.2, 0.2, 0.2), metadata=_limits(0.0))
     ior: float = field(default=1.5, metadata=_limits(1.0))
     isotropic: float = field(default=0.3, metadata=_limits(0.0, 1.0))
-    gamma_surface: float = field(default=12 * DEGREE, metadata=_limits(above=0.0, maximum=math.pi))
-    gamma_volume: float = field(default=24 * DEGREE, metadata=_limits(above=0.0, maximum=math.pi))
+    gamma_surface: float = field(
+        default=12 * DEGREE, metadata=_limits(above=0.0, maximum=math.pi, radians=True)
+    )
+    gamma_volume: float = field(
+        default=24 * DEGREE, metadata=_limits(above=0.0, maximum=math.pi, radians=True)
+    )
     surface_gain: float = field(default=1.0, metadata=_limits(0.0))
     thickness: float = field(default=0.0, metadata=_limits(0.0))
     linear_density: float = field(default=0.0, metadata=_limits(0.0))
@@ -427,7 +449,7 @@ class Fabric:
     opaque: bool = False
     sides: Sides = UNSTATED
     masking_width: float = field(
-        default=20 * DEGREE, metadata=_limits(above=0.0, maximum=2 * math.pi)
+        default=20 * DEGREE, metadata=_limits(above=0.0, maximum=2 * math.pi, radians=True)
     )
     unevenness_seed: int = field(default=0, metadata=_limits(0, 2**31 - 1))
     back: Fabric | None = None

@@ -34,7 +34,7 @@ from fabricusd.bake.layout.unwrap import unwrapped
 from fabricusd.bake.manifest import manifest_of
 from fabricusd.bake.ranges import check_settings
 from fabricusd.bake.reasons import explained
-from fabricusd.bake.report import write_report
+from fabricusd.bake.report import Portrait, write_report
 from fabricusd.bake.texels.encoding import stored_by
 from fabricusd.bake.texels.maps import TextureMap, chosen_maps
 from fabricusd.bake.texels.recipe import Recipe, recipe
@@ -69,6 +69,7 @@ def bake(
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Progress | None = None,
+    portrait: Portrait | None = None,
 ) -> Baked:
     """Bake every mesh of `scene` that wears a fabric: write textures and a manifest to `out`.
 
@@ -78,6 +79,7 @@ def bake(
     resume : continue an interrupted bake of the same job
     scheduler : of the Dask cluster that computes the blocks, see `run.cluster.open_cluster`; None
         for threads of this process
+    portrait : draws the garment for the report, which else shows none
 
     Raises FabricError before anything is written if the scene, the mesh or a setting cannot be
     baked or if another process bakes into `out`. Raises FabricError if the disk fills up; finished
@@ -95,7 +97,7 @@ def bake(
         if result.finished:
             result.seconds = time.perf_counter() - began
             write_json(folder / "manifest.json", manifest_of(result, settings, Path(scene)))
-            write_report(result, settings)
+            write_report(result, settings, Path(scene), portrait)
             Scratch.remove(folder)
     return result
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 from typing import Any
 
 from fabricusd.cli.arguments.number import number
@@ -166,6 +167,7 @@ def run(options: argparse.Namespace) -> int:
         options.scene, out, settings, fabric=options.fabric, mesh=options.mesh,
         units=options.units, resume=options.resume, workers=options.workers,
         scheduler=options.scheduler, progress=_progress(options),
+        portrait=partial(_portrait, options),
     )  # fmt: skip
     if not options.quiet:
         for note in result.notes:
@@ -190,6 +192,13 @@ def run(options: argparse.Namespace) -> int:
         )
         return 1
     return 0
+
+
+def _portrait(options: argparse.Namespace) -> Any:
+    """The garment as `preview` draws it, for the report."""
+    from fabricusd.preview.portrait import portrait
+
+    return portrait(options.scene, fabric=options.fabric, units=options.units)
 
 
 def _light(text: str | None) -> tuple[float, float, float] | None:

@@ -373,10 +373,13 @@ def shape_of(path: str | os.PathLike[str]) -> tuple[int, int, int]:
 
 
 @reads("a picture")
-def read_middle(path: str | os.PathLike[str], most: int) -> NDArray[np.float32]:
-    """(h, w, c) float32, the middle of a square texture, at most `most` pixels per side.
+def read_part(
+    path: str | os.PathLike[str], most: int, around: tuple[float, float] = (0.5, 0.5)
+) -> NDArray[np.float32]:
+    """(h, w, c) float32, a part of a square texture, at most `most` pixels per side.
 
-    most : a multiple of 64; of a tiled texture, only the tiles in the middle are read
+    most : a multiple of 64; of a tiled texture, only the tiles of the part are read
+    around : (u, v) of the part's middle, as near as tiles allow; v is 0 at the bottom
     """
     where = str(readable_file(path))
     with quietly():
@@ -391,13 +394,16 @@ def read_middle(path: str | os.PathLike[str], most: int) -> NDArray[np.float32]:
                 where, f"is {side} x {spec.height} pixels; it must be a square texture"
             )
         size = min(side, most)
-        begin = (side - size) // 2 // 64 * 64
-        end = begin + size
+        left, top = (
+            min(max(round(at * side - size / 2), 0), side - size) // 64 * 64
+            for at in (around[0], 1.0 - around[1])
+        )
+        right, below = left + size, top + size
         if spec.tile_width:
-            pixels = source.read_tiles(begin, end, begin, end, 0, 1, 0, channels, oiio.FLOAT)
+            pixels = source.read_tiles(left, right, top, below, 0, 1, 0, channels, oiio.FLOAT)
         else:
-            pixels = source.read_scanlines(begin, end, 0, 0, channels, oiio.FLOAT)
-            pixels = pixels if pixels is None else pixels[:, begin:end]
+            pixels = source.read_scanlines(top, below, 0, 0, channels, oiio.FLOAT)
+            pixels = pixels if pixels is None else pixels[:, left:right]
         reason = reason_of(source)
     if pixels is None:
         raise FabricError(where, f"cannot be read as a picture: {reason}")

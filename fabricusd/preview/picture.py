@@ -65,6 +65,12 @@ class Picture:
         codes[drawn] = encode(self.radiance[drawn] + behind, exposure, view)
         return codes
 
+    def _repr_png_(self) -> bytes:
+        """The picture as notebooks show it."""
+        from fabricusd.preview.png import png_bytes
+
+        return png_bytes(self.codes())
+
 
 def preview(
     fabric: Fabric,

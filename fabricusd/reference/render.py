@@ -131,6 +131,13 @@ def render(
 
     Raises `FabricError` if the scene cannot be rendered at all. Whatever had to be left out is in
     the result's `notes`. On Ctrl-C, the samples taken so far are written, and `complete` is False.
+
+    >>> import fabricusd, tempfile
+    >>> from fabricusd.samples.write import write_samples
+    >>> skirt = write_samples(tempfile.mkdtemp())[0]
+    >>> made = fabricusd.render(skirt, fabric="linen_plain", units="cm", width=32, height=18, spp=1)
+    >>> made.layers["beauty"].shape  # radiance, scene-linear Rec. 709, and alpha
+    (18, 32, 4)
     """
     _require_settings(
         width, height, spp, noise, max_bounces, max_translucent, seed, workers, exposure, shadow

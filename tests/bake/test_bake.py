@@ -78,7 +78,12 @@ def test_the_manifest_names_what_was_made_of_what(whole, square):
             assert hashlib.sha256(data).hexdigest() == one["sha256"]
     report = json.loads((whole.folder / "report.json").read_text())
     assert report["cost"]["resolution"] == 512
-    assert "<h1>Bake</h1>" in (whole.folder / "report.html").read_text()
+    page = (whole.folder / "report.html").read_text()
+    for heading in ("Garment", "Fabric", "Error", "Maps"):
+        assert f"<h2>{heading}</h2>" in page
+    for name in MAPS:
+        assert f'alt="map {name}"' in page
+    assert 'class="hero"' not in page  # nobody drew the garment
 
 
 def test_the_number_of_workers_does_not_show(whole, square, linen, tmp_path):
