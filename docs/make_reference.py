@@ -8,9 +8,11 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
+from types import ModuleType
 from unittest import mock
 
 import fabricusd
+from fabricusd import api
 from fabricusd.cli.main import COMMANDS, build_parser
 
 HERE = Path(__file__).parent / "reference"
@@ -28,7 +30,7 @@ commands have in common.
 NAMES_HEAD = """# Names of the package
 
 `python docs/make_reference.py` makes this page. Each name is imported from `fabricusd`; the site
-shows its signature and its docstring, and so does `help(fabricusd.NAME)` in Python. Angles are
+shows its signature and its docstring. [Python](../python.md) has examples that run. Angles are
 radians and lengths are metres. [appearance.md](../appearance.md) describes the functions of the
 appearance model.
 
@@ -54,8 +56,10 @@ def names_page() -> str:
     places = {name: getattr(fabricusd, name) for name in fabricusd.__all__ if name[0] != "_"}
     parts = []
     for name, value in places.items():
+        if isinstance(value, ModuleType):  # a folder of the package that is called
+            value = getattr(api, name)
         module = value.__module__
-        # Classes of the schema's documents show their fields, and errors have none to show.
+        # Errors have no members worth a line, and functions have none.
         fields = isinstance(value, type) and not issubclass(value, Exception)
         options = "" if fields else "\n    options:\n      members: false"
         parts.append(f"::: {module}.{name}{options}\n")
