@@ -58,10 +58,11 @@ class Pages:
             "|---|---:|---|---:|---|",
         ]
         for name, (panel, rows) in self.charts.items():
-            title = f"[{panel.title}]({self.folder}{name}.md)"
+            link, last = f"[{panel.title}]({self.folder}{name}.md)", None
             for one in advice(rows, bounds_of(panel.error)):
+                title = "" if one.case == last else ", ".join(filter(None, (link, one.case)))
                 lines.append(_choice(title, one))
-                title = ""
+                last = one.case
         lines += [
             "",
             f"`fabricusd render --max-error` chooses by itself: [what it takes]({self.folder}"
