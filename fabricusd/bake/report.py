@@ -116,8 +116,10 @@ def write_report(
                 if found.low is None or found.high is None
                 else (f"{found.low:.3g}", f"{found.high:.3g} {maps[name].unit}".strip())
             )
+            # The marks of code are for the pages of docs.
+            meaning = maps[name].meaning.replace("`", "")
             figures.setdefault(garment.name, []).append(
-                figure(f"report/{picture.name}", name, maps[name].meaning, found.legend, ends)
+                figure(f"report/{picture.name}", name, meaning, found.legend, ends)
             )
     with whole_file(result.folder / "report.html") as temporary:
         temporary.write_text(page_of(said, figures, drawn), "utf-8")

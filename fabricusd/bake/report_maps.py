@@ -102,10 +102,12 @@ def _coloured(pixels: NDArray[Any], one: TextureMap, inside: NDArray[np.bool_]) 
     colors = ("red", "green", "blue")[: part.shape[2]]
     if part.shape[2] == 2:
         scaled = np.concatenate((scaled, np.zeros_like(scaled[..., :1])), axis=2)
-    said = ", ".join(f"{c}: {name}" for c, name in zip(colors, one.channels, strict=False))
-    words = f"{said}; each {_number(low)} (dark) to {_number(high)} (bright){unit}"
+    words = (
+        f"{', '.join(colors)}: one number each, {_number(low)} (dark) to {_number(high)} (bright)"
+    )
+    words += unit
     if len(one.channels) > 3:
-        words += f"; {one.channels[3]} is not shown"
+        words += "; the fourth number is not shown"
     return Shown(picture=_codes(scaled), legend=words)
 
 

@@ -36,6 +36,14 @@ def test_what_lies_outside_the_layout_is_ground_and_does_not_widen_the_range():
     assert (nothing.picture == GROUND).all()
 
 
+def test_of_a_map_of_four_numbers_three_are_shown_and_the_legend_says_so():
+    values = np.concatenate([ramp(0, 1)] * 3 + [ramp(7, 9)], axis=2)
+    found = shown(values, REGISTRY["horizon_00"])
+    assert found.picture.shape == (4, 4, 3)
+    assert "0 (dark) to 1 (bright)" in found.legend
+    assert "fourth number is not shown" in found.legend
+
+
 def test_an_even_map_says_its_value():
     assert "0.5 everywhere" in shown(np.full((4, 4, 1), 0.5), REGISTRY["opacity"]).legend
 
