@@ -171,7 +171,10 @@ class Tracer:
                 self.opacity[k] = 1.0 - shader.gap
                 if shader.gaps is not None:
                     self.opacity[k], self.gaps[k] = BY_DIRECTION, shader.gaps
-        self.see_through = bool((self.opacity < 1).any())
+        passing = np.where(self.opacity < 0, np.float32(1), 1 - self.opacity)
+        for number in np.flatnonzero(self.opacity == BY_DIRECTION):
+            passing[number] = self.gaps[number].max()
+        self.most_through = np.float32(passing.max(initial=0.0))
 
     def aim(self, lens: Lens, width: int, height: int) -> None:
         """Set the chance of choosing each light by how brightly it lights what the camera sees."""
@@ -272,15 +275,15 @@ class Tracer:
         """Trace the shadow rays and add the light that they bring."""
         if count == 0:
             return
-        if not self.see_through:
-            self.accelerator.occluded(wave.shadows.rays, (count + 15) // 16)
-            settle(count, wave.shadows, wave.film, aovs)
-            return
+        # Most rays meet nothing. To ask only that takes a quarter of the time of finding what a ray
+        # meets, which matters for the others alone.
+        self.accelerator.occluded(wave.shadows.rays, (count + 15) // 16)
+        count = settle(count, wave.shadows, wave.film, aovs, self.most_through)
         for _ in range(MOST_LAYERS):
+            if count == 0:
+                break
             self.accelerator.intersect(wave.shadows.rays, (count + 15) // 16)
             count = thin_out(
                 count, wave.shadows, self.opacity, self.gaps, self.surfaces, self.triangles,
                 self.epsilon, aovs, wave.film,
             )  # fmt: skip
-            if count == 0:
-                break
