@@ -181,8 +181,8 @@ def conserving_far(
 ) -> Array:
     """(n, 3) single scattering of `conserving` cloth over the whole sphere, cosine included.
 
-    sides : (2, rows, columns, 3) - `ConservingTables.sides`, of which the first two entries are the
-        factors of surface and volume; None for factors of 1
+    sides : (2, rows, columns, 3) - `ConservingTables.sides` without the border, of which the first
+        two entries are the factors of surface and volume; None for factors of 1
     """
     wi, wo = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
     factors = np.ones((*wi.shape[:-1], 2))

@@ -27,8 +27,10 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.accuracy import choose_rule
-from fabricusd.appearance.conserving.levels import conserving_level_value
-from fabricusd.appearance.conserving.multiple import conserving_value
+from fabricusd.appearance.conserving.blocks import (
+    conserving_far_values,
+    conserving_point_values,
+)
 from fabricusd.appearance.fuzz import Fuzz, bald, compile_fuzz, fuzz_over_all, optical_depth
 from fabricusd.appearance.law import (
     CONSERVING_ONLY,
@@ -428,20 +430,27 @@ def conserving_all(R, tables, level, places, wi, wo, out):  # type: ignore[no-un
 
     level : FAR, WEAVE or THREAD; places : n `Places`, not read at FAR; wi, wo, out : (3, n)
     """
-    for k in prange(wi.shape[1]):
-        r, g, b = R(0), R(0), R(0)
-        if level == FAR:
-            r, g, b = conserving_value(
-                R, tables, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
-            )
-        else:
-            r, g, b = conserving_level_value(
-                R, tables, level == THREAD, place_at(places, k),
-                wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k],
-            )  # fmt: skip
-        out[0, k] += r
-        out[1, k] += g
-        out[2, k] += b
+    n = wi.shape[1]
+    for chunk in prange((n + BLOCK - 1) // BLOCK):
+        first, last = chunk * BLOCK, min(n, (chunk + 1) * BLOCK)
+        _add_conserving(R, tables, level, places, wi, wo, out, first, last)
+
+
+@njit(**KERNEL)
+def _add_conserving(R, tables, level, places, wi, wo, out, first, last):  # type: ignore[no-untyped-def]
+    values = np.empty((3, last - first), wi.dtype)
+    i, o = wi[:, first:last], wo[:, first:last]
+    if level == FAR:
+        conserving_far_values(R, tables, i, o, values, 0, last - first)
+    else:
+        ours = Places(
+            places.sets[first:last], places.threads[first:last], places.psi0[first:last],
+            places.w[first:last], places.shade[first:last],
+        )  # fmt: skip
+        conserving_point_values(R, tables, level == THREAD, ours, i, o, values, 0, last - first)
+    for channel in range(3):
+        for k in range(last - first):
+            out[channel, first + k] += values[channel, k]
 
 
 # numba's parallel loops cannot take a tuple of tuples, so the law is passed in parts.

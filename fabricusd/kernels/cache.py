@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from functools import lru_cache
 from pathlib import Path
 
 import numba
@@ -33,7 +34,13 @@ def sources(package: Path = PACKAGE) -> list[Path]:
     return sorted(found)
 
 
-def fingerprint(package: Path = PACKAGE) -> str:
+@lru_cache(maxsize=1)
+def fingerprint() -> str:
+    """`digest_of` the package as it was when this process first asked."""
+    return digest_of(PACKAGE)
+
+
+def digest_of(package: Path) -> str:
     """A digest of the sources' names and contents, numba's version, and whether its internals are
     used."""
     compiler = f"{numba.__version__} {use_internals()}"

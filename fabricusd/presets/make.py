@@ -22,7 +22,7 @@ from fabricusd.weaves.yarn import TEX, count_words, diameter, fibre_density, par
 MILLIMETRE = 1e-3
 
 DIGITS = 4
-"""Significant digits of albedos, thicknesses, counts and coverages: no law sees more."""
+"""Significant digits of albedos, colours, thicknesses, counts and coverages: no law sees more."""
 
 
 def woven(row: Row) -> Fabric:
@@ -61,8 +61,10 @@ def made(row: Row, sides: Sides = UNSTATED) -> Fabric:
         raise FabricError(f"preset '{row.name}'", f"has another colour: {done.notes[0]}")
     threads = {}
     for name, thread in done.fabric.threads.items():
-        r, g, b = (_rounded(x) for x in thread.albedo)
-        threads[name] = replace(thread, albedo=(r, g, b))
+        threads[name] = replace(
+            thread, albedo=_all_rounded(thread.albedo), color=_all_rounded(thread.color),
+            target_color=_all_rounded(thread.target_color),
+        )  # fmt: skip
     return replace(done.fabric, threads=threads)
 
 
@@ -140,6 +142,12 @@ def _corded(fabric: Fabric, row: Row) -> Fabric:
 
 def _rounded(value: float, unit: float = 1.0) -> float:
     return float(f"{value / unit:.{DIGITS}g}") * unit
+
+
+def _all_rounded(color: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A colour without the digits that differ between processors."""
+    r, g, b = (_rounded(x) for x in color)
+    return r, g, b
 
 
 def _lines(text: str) -> str:

@@ -44,7 +44,7 @@ from fabricusd.reference.stages import arrivals
 from fabricusd.reference.stages.arrivals import AUTO_LEVEL, QUEUES, Settings, arrive, sort_lanes
 from fabricusd.reference.stages.departures import depart, record_first
 from fabricusd.reference.stages.hits import add_emission, prepare
-from fabricusd.reference.stages.shadow_rays import settle, thin_out
+from fabricusd.reference.stages.shadow_rays import settle, share_that_goes_on, thin_out
 from fabricusd.reference.start.compile_ahead import CLOSE_UPS, EVERY_PICTURE, compile_ahead
 from fabricusd.reference.surfaces.fabric import FabricShader
 from fabricusd.reference.surfaces.fabric_gap import BY_DIRECTION, TABLE
@@ -171,7 +171,10 @@ class Tracer:
                 self.opacity[k] = 1.0 - shader.gap
                 if shader.gaps is not None:
                     self.opacity[k], self.gaps[k] = BY_DIRECTION, shader.gaps
-        self.see_through = bool((self.opacity < 1).any())
+        passing = np.where(self.opacity < 0, np.float32(1), 1 - self.opacity)
+        for number in np.flatnonzero(self.opacity == BY_DIRECTION):
+            passing[number] = self.gaps[number].max()
+        self.blocked_go_on = share_that_goes_on(passing.max(initial=0.0))
 
     def aim(self, lens: Lens, width: int, height: int) -> None:
         """Set the chance of choosing each light by how brightly it lights what the camera sees."""
@@ -272,15 +275,15 @@ class Tracer:
         """Trace the shadow rays and add the light that they bring."""
         if count == 0:
             return
-        if not self.see_through:
-            self.accelerator.occluded(wave.shadows.rays, (count + 15) // 16)
-            settle(count, wave.shadows, wave.film, aovs)
-            return
+        # Most rays meet nothing. To ask only that takes a quarter of the time of finding what a ray
+        # meets, which matters for the others alone.
+        self.accelerator.occluded(wave.shadows.rays, (count + 15) // 16)
+        count = settle(count, wave.shadows, wave.film, aovs, self.blocked_go_on)
         for _ in range(MOST_LAYERS):
+            if count == 0:
+                break
             self.accelerator.intersect(wave.shadows.rays, (count + 15) // 16)
             count = thin_out(
                 count, wave.shadows, self.opacity, self.gaps, self.surfaces, self.triangles,
                 self.epsilon, aovs, wave.film,
             )  # fmt: skip
-            if count == 0:
-                break

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fabricusd.kernels.cache import PACKAGE, fingerprint, sources
+from fabricusd.kernels.cache import PACKAGE, digest_of, fingerprint, sources
 
 ROOT = PACKAGE.parent
 WHERE = "from fabricusd.appearance.thread import _density_soa as k; print(k.stats.cache_path)"
@@ -26,15 +26,15 @@ def copy(tmp_path):
     return tmp_path
 
 
-def test_the_same_sources_elsewhere_have_the_same_fingerprint(copy):
-    assert fingerprint(copy) == fingerprint()
+def test_the_same_sources_elsewhere_have_the_same_digest_of(copy):
+    assert digest_of(copy) == fingerprint()
 
 
 @pytest.mark.parametrize("name", ["fabric.py", "appearance/scattering/lobes.py", "kernels/real.py"])
-def test_a_change_in_any_source_changes_the_fingerprint(copy, name):
+def test_a_change_in_any_source_changes_the_digest_of(copy, name):
     with (copy / name).open("a") as stream:
         stream.write("# changed\n")
-    assert fingerprint(copy) != fingerprint()
+    assert digest_of(copy) != fingerprint()
 
 
 def test_every_module_with_kernels_is_among_the_sources_and_chooses_the_folder_first():

@@ -73,7 +73,7 @@ def white_facets(fabric: Fabric, draws: int = 0) -> Facets:
     differ in colour alone, and both precisions of a law, share them. draws : points per entry; 0
     takes the default
     """
-    return _kept_facets(_white(fabric), draws)
+    return _kept_facets(white(fabric), draws)
 
 
 @lru_cache(maxsize=8)
@@ -90,10 +90,10 @@ def _kept_facets(fabric: Fabric, draws: int) -> Facets:
 
 def white_tables(fabric: Fabric) -> ConservingTables:
     """Float32 tables of `fabric` with white `conserving` threads only."""
-    return single_tables(_white(fabric), precision=np.float32)
+    return single_tables(white(fabric), precision=np.float32)
 
 
-def _white(fabric: Fabric) -> Fabric:
+def white(fabric: Fabric) -> Fabric:
     """`fabric` with white `conserving` threads, and without what its facets do not depend on."""
     threads = {
         k: replace(t, albedo=(1, 1, 1), color=(0.5, 0.5, 0.5), model="")

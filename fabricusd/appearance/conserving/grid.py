@@ -5,6 +5,9 @@ satin. Row t in [0, 1] lies at the polar angle 90 sin(90 t) degrees. Narrow lobe
 steep within their width of the horizon, and the rows are dense there. At the horizon an entry is
 an even function of 1 - t, and at the pole it continues on the opposite side, so cubic interpolation
 needs no one-sided stencil. A direction below the cloth reads the entry of its opposite.
+
+A table that is read for every pair of directions has a border (`bordered`): the entries beyond the
+pole, the horizon and the last column are then in place, and the stencil is one loop without tests.
 """
 
 from __future__ import annotations
@@ -75,8 +78,14 @@ def share_at(R, table, x, y, z):
     """The entry of a (rows, columns) table for a direction, at least 0."""
     if z < R(0):
         x, y, z = -x, -y, -z
+    row, column, t, u = cell(R, table.shape[0], table.shape[1], x, y, z)
+    return share_in(R, table, row, column, t, u)
+
+
+@njit(**INLINE)
+def share_in(R, table, row, column, t, u):
+    """`share_at` in the cell (row, column) at (t, u), as `cell` gives them."""
     rows, columns = table.shape
-    row, column, t, u = cell(R, rows, columns, x, y, z)
     total = R(0)
     for a in range(4):
         for b in range(4):
@@ -85,21 +94,56 @@ def share_at(R, table, x, y, z):
     return max(R(0), total)
 
 
+BORDER_ROWS, BORDER_COLUMNS, WIDTH = 2, 4, 4
+"""Rows and columns that `bordered` adds, and the numbers per entry there: with four of them, the
+four columns of a stencil are 16 numbers side by side."""
+
+
+def bordered(sides: Reals) -> Reals:
+    """(2, rows + BORDER_ROWS, columns + BORDER_COLUMNS, WIDTH) of a (2, rows, columns, 3) table.
+
+    Entry (i, j) of the result is entry (i - 1, j - 1) of the table, continued as `beyond` says.
+    """
+    rows, columns = sides.shape[1:3]
+    out = np.zeros((2, rows + BORDER_ROWS, columns + BORDER_COLUMNS, WIDTH), sides.dtype)
+    for row in range(out.shape[1]):
+        for column in range(out.shape[2]):
+            i, j = beyond.py_func(rows, columns, row - 1, column - 1)
+            out[:, row, column, :3] = sides[:, i, j]
+    return out
+
+
+def without_border(sides: Reals) -> Reals:
+    """(2, rows, columns, 3) view of what `bordered` was given."""
+    return sides[:, 1:-1, 1:-3, :3]
+
+
+@njit(**INLINE)
+def shape_of(sides):
+    """(rows, columns) of a bordered table without its border."""
+    return sides.shape[1] - BORDER_ROWS, sides.shape[2] - BORDER_COLUMNS
+
+
 @njit(**PART)
 def side_at(R, sides, side, x, y, z):
-    """The three entries of a (2, rows, columns, 3) table for a direction and side, at least 0."""
+    """The three entries of a `bordered` table for a direction and side, at least 0."""
     if z < R(0):
         x, y, z = -x, -y, -z
-    rows, columns = sides.shape[1], sides.shape[2]
+    rows, columns = shape_of(sides)
     row, column, t, u = cell(R, rows, columns, x, y, z)
+    return side_in(R, sides, side, row, column, t, u)
+
+
+@njit(**INLINE)
+def side_in(R, sides, side, row, column, t, u):
+    """`side_at` in the cell (row, column) at (t, u), as `cell` gives them."""
     first, second, third = R(0), R(0), R(0)
     for a in range(4):
         for b in range(4):
-            i, j = beyond(rows, columns, row + a - 1, column + b - 1)
             weight = cubic_weight(R, a, t) * cubic_weight(R, b, u)
-            first += weight * sides[side, i, j, 0]
-            second += weight * sides[side, i, j, 1]
-            third += weight * sides[side, i, j, 2]
+            first += weight * sides[side, row + a, column + b, 0]
+            second += weight * sides[side, row + a, column + b, 1]
+            third += weight * sides[side, row + a, column + b, 2]
     return max(R(0), first), max(R(0), second), max(R(0), third)
 
 

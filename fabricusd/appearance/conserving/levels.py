@@ -30,7 +30,7 @@ from fabricusd.appearance.scattering.columns import ALBEDO_B, ALBEDO_G, ALBEDO_R
 from fabricusd.appearance.scattering.model import CONSERVING
 from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.fabric import PILE_ANGLE
-from fabricusd.kernels.real import PART, cos, sin
+from fabricusd.kernels.real import INLINE, PART, cos, sin
 
 
 @njit(**PART)
@@ -51,9 +51,14 @@ def passing(R, tables, in_gap, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def _share_of_gaps(R, tables, x, y, z):  # type: ignore[no-untyped-def]
+def share_of_gaps(R, tables, x, y, z):  # type: ignore[no-untyped-def]
     """G(w): the share of the scattered light that places in gaps scatter."""
-    open_to_it = gap_towards(R, tables, x, y, z)
+    return share_of_closed(R, tables, gap_towards(R, tables, x, y, z))
+
+
+@njit(**INLINE)
+def share_of_closed(R, tables, open_to_it):  # type: ignore[no-untyped-def]
+    """G(w) where gap(w) is `open_to_it`."""
     closed = max(R(0), R(1) - tables.covered - open_to_it)
     return closed / (R(1) - open_to_it) if closed > R(0) else R(0)
 
@@ -63,7 +68,7 @@ def conserving_level_value(R, tables, across_too, place, ix, iy, iz, ox, oy, oz)
     """(r, g, b) at a `Place`, in a gap too, with the factors across the width if `across_too`."""
     in_gaps = R(0)
     if tables.covered < R(1):
-        in_gaps = min(_share_of_gaps(R, tables, ix, iy, iz), _share_of_gaps(R, tables, ox, oy, oz))
+        in_gaps = min(share_of_gaps(R, tables, ix, iy, iz), share_of_gaps(R, tables, ox, oy, oz))
     if place.thread_set > WARP:
         if in_gaps == R(0):
             return R(0), R(0), R(0)

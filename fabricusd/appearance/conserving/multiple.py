@@ -26,9 +26,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabricusd.appearance.cloth_key import cloth_key
 from fabricusd.appearance.conserving.by_side import by_side
-from fabricusd.appearance.conserving.facets import SURFACE, VOLUME, Facets, white_facets
-from fabricusd.appearance.conserving.grid import entry_angles, mean_share, side_at
+from fabricusd.appearance.conserving.facets import SURFACE, VOLUME, Facets, white, white_facets
+from fabricusd.appearance.conserving.grid import bordered, entry_angles, mean_share, side_at
 from fabricusd.appearance.conserving.single import (
     LOST,
     ON_SURFACE,
@@ -42,7 +43,9 @@ from fabricusd.appearance.scattering.model import CONSERVING
 from fabricusd.appearance.scattering.models import model_of
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.quadrature import Rule
+from fabricusd.cache import kept
 from fabricusd.fabric import Fabric
+from fabricusd.kernels.cache import fingerprint
 from fabricusd.kernels.real import PART
 
 Floats = NDArray[np.float64]
@@ -66,41 +69,50 @@ def conserving_tables(
 ) -> ConservingTables:
     """Tables of `fabric` in `precision`, with the multiple-scattering term if `multiple`.
 
-    The factors and the term take about a second to compute. They do not depend on `rule`, which is
-    the quadrature of single scattering.
+    The factors and the term take about a second to compute, once per weave, curves, lobes and
+    stated shares; the cache keeps them. They do not depend on `rule`, which is the quadrature of
+    single scattering.
     """
     tables = single_tables(fabric, precision=precision, rule=rule)
     if not tables.scatters.any():
         return tables
-    facets = white_facets(fabric)
-    rows, columns = facets.shape
-    sides = np.zeros((2, rows, columns, 3))
-    pile = facets.sent.shape[-1] == 1
-    theta, phi = entry_angles(rows, columns)
-    stated = by_side(fabric, theta, phi)
-    gap = np.full(theta.shape, 1.0 - float(tables.covered)) if pile else stated.gap
-    covered = 1.0 - gap
-    once = _pile_once(facets, sides) if pile else _fit_once(facets, stated, covered, sides)
-    if tables.opaque:
-        once[1] = 0.0
-    rest = np.maximum(covered - once.sum(axis=0), 0.0)
-    forward = stated.forward
-    if pile or tables.opaque:
-        r, t = mean_share(once[0]), mean_share(once[1])
-        forward = np.full(theta.shape, t / (r + t) if r + t > 0 else 0.0)
-    sides[0, :, :, LOST], sides[1, :, :, LOST] = (1.0 - forward) * rest, forward * rest
+    key = (fingerprint(), *cloth_key(white(fabric)))
+    found = kept("sides", key, lambda: _sides_and_gap(fabric))
+    sides, gap = found[..., :3].copy(), found[0, ..., 3]
     if not multiple:
-        sides[:, :, :, LOST] = 0.0
-    tables = tables._replace(
-        sides=np.ascontiguousarray(sides, dtype=precision),
-        gap=np.ascontiguousarray(gap, dtype=precision),
-    )
-    lost = [mean_share(tables.sides[side, :, :, LOST]) for side in range(2)]
-    escape = 1.0 - sum(lost) / max(mean_share(covered), 1e-300)
+        sides[..., LOST] = 0.0
+    sides = sides.astype(precision)
+    tables = tables._replace(sides=bordered(sides), gap=np.ascontiguousarray(gap, dtype=precision))
+    lost = [mean_share(sides[side, :, :, LOST]) for side in range(2)]
+    escape = 1.0 - sum(lost) / max(mean_share(1.0 - gap), 1e-300)
     alpha = mean_albedo(fabric)
     strength = alpha**2 * escape / (1.0 - alpha * (1.0 - escape))
     scale = np.array([1.0 / (math.pi * m) if m > 0 else 0.0 for m in lost])
     return tables._replace(strength=(scale[:, None] * strength).astype(precision))
+
+
+def _sides_and_gap(fabric: Fabric) -> Floats:
+    """(2, rows, columns, 4): `ConservingTables.sides` without the border, and gap(w) behind it."""
+    facets = white_facets(fabric)
+    rows, columns = facets.shape
+    out = np.zeros((2, rows, columns, 4))
+    sides = out[..., :3]
+    pile = facets.sent.shape[-1] == 1
+    theta, phi = entry_angles(rows, columns)
+    stated = by_side(fabric, theta, phi)
+    gap = np.full(theta.shape, coverage(fabric).gap) if pile else stated.gap
+    covered = 1.0 - gap
+    once = _pile_once(facets, sides) if pile else _fit_once(facets, stated, covered, sides)
+    if fabric.opaque:
+        once[1] = 0.0
+    rest = np.maximum(covered - once.sum(axis=0), 0.0)
+    forward = stated.forward
+    if pile or fabric.opaque:
+        r, t = mean_share(once[0]), mean_share(once[1])
+        forward = np.full(theta.shape, t / (r + t) if r + t > 0 else 0.0)
+    sides[0, :, :, LOST], sides[1, :, :, LOST] = (1.0 - forward) * rest, forward * rest
+    out[..., 3] = gap
+    return out
 
 
 def _pile_once(facets: Facets, sides: Floats) -> Floats:

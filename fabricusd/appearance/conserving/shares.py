@@ -6,14 +6,19 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from fabricusd.appearance.conserving.multiple import conserving_point_value, conserving_value
+from fabricusd.appearance.cloth_key import cloth_key
+from fabricusd.appearance.conserving.blocks import conserving_far_values
+from fabricusd.appearance.conserving.multiple import conserving_point_value
 from fabricusd.appearance.conserving.single import ConservingTables
 from fabricusd.appearance.sampling.fit import Singles, fitted_mixture
-from fabricusd.appearance.sampling.mixture import Mixture
-from fabricusd.appearance.sampling.stretches import OF_SET, OF_THREAD, PSI0
+from fabricusd.appearance.sampling.mixture import Mixture, count_lobes
+from fabricusd.appearance.sampling.stretches import OF_SET, OF_THREAD, PSI0, stretches_of
 from fabricusd.appearance.weave.place import Place
+from fabricusd.cache import kept
 from fabricusd.fabric import Fabric
+from fabricusd.kernels.cache import fingerprint
 from fabricusd.kernels.real import KERNEL
 
 EVEN_SHARE = 0.1
@@ -25,20 +30,34 @@ LEAST_SHARE = 0.02
 
 
 def conserving_mixture(fabric: Fabric, tables: ConservingTables) -> Mixture:
-    """Lobes on both sides, or on one side of opaque cloth, with shares measured on `tables`."""
+    """Lobes on both sides, or on one side of opaque cloth, with shares measured on `tables`.
+
+    The shares take a second to measure; the cache keeps them.
+    """
     single: Any = np.float32
-    kept = _in_single_precision(tables)
+    held = _in_single_precision(tables)
 
     def far(wi: Singles, wo: Singles, out: Singles) -> None:
-        _far_values(single, kept, wi, wo, out)
+        conserving_far_values(single, held, wi, wo, out, 0, wi.shape[1])
 
     def at_point(stretch: Singles, wi: Singles, wo: Singles, out: Singles) -> None:
-        _point_values(single, kept, stretch, wi, wo, out)
+        _point_values(single, held, stretch, wi, wo, out)
 
-    return fitted_mixture(
-        fabric, tables.threads, even=EVEN_SHARE, least=LEAST_SHARE,
-        sides=2, opaque=bool(tables.opaque),
-        cosines=True, far=far, at_point=at_point,
+    def made() -> NDArray[np.float32]:
+        found = fitted_mixture(
+            fabric, tables.threads, even=EVEN_SHARE, least=LEAST_SHARE, sides=2,
+            opaque=bool(tables.opaque), cosines=True, far=far, at_point=at_point,
+        )  # fmt: skip
+        both = np.concatenate((found.shares, found.point_shares), axis=-1)
+        return both.astype(np.float32)
+
+    rows = stretches_of(fabric)
+    R = tables.threads.dtype.type
+    lobes = count_lobes(len(rows), 2, 1)
+    shares = kept("shares", (fingerprint(), held.nodes, held.sides, *cloth_key(fabric)), made)
+    return Mixture(
+        rows.astype(R), np.ascontiguousarray(shares[..., :lobes], R),
+        np.ascontiguousarray(shares[..., lobes:], R), R(EVEN_SHARE), 2, int(tables.opaque), 1,
     )  # fmt: skip
 
 
@@ -52,15 +71,6 @@ def _in_single_precision(tables: ConservingTables) -> ConservingTables:
         gap=tables.gap.astype(np.float32),
         strength=tables.strength.astype(np.float32),
     )
-
-
-@njit(**KERNEL)
-def _far_values(R, tables, wi, wo, out):
-    """`conserving_value` of all pairs: wi, wo, out are (3, n)."""
-    for k in range(wi.shape[1]):
-        out[0, k], out[1, k], out[2, k] = conserving_value(
-            R, tables, wi[0, k], wi[1, k], wi[2, k], wo[0, k], wo[1, k], wo[2, k]
-        )
 
 
 @njit(**KERNEL)

@@ -69,8 +69,9 @@ class ConservingTables(NamedTuple):
     warp_start : int - nodes from here on are warp
     covered : real - 1 - gap
     opaque : int - 1 if no light passes through the cloth
-    sides : (2, r, c, 3) real - ON_SURFACE, ON_VOLUME, LOST by direction, of light that leaves on
-        its own side and on the other; (2, 0, 0, 3) for factors of 1 and nothing lost
+    sides : (2, r + 2, c + 4, 4) real - ON_SURFACE, ON_VOLUME, LOST by direction, of light that
+        leaves on its own side and on the other, `grid.bordered`; (2, 0, 0, 4) for factors of 1 and
+        nothing lost
     gap : (r, c) real - share of the light that passes between the threads, by direction; (0, 0) for
         the gap seen from above
     strength : (2, 3) real - C/(pi M) per side and channel; 0 without multiple scattering
@@ -115,7 +116,7 @@ def single_tables(
         warp_start=q.warp_start,
         covered=precision(1.0 - coverage(fabric).gap),
         opaque=int(fabric.opaque),
-        sides=np.zeros((2, 0, 0, 3), precision),
+        sides=np.zeros((2, 0, 0, 4), precision),
         gap=np.zeros((0, 0), precision),
         strength=np.zeros((2, 3), precision),
     )

@@ -1,10 +1,12 @@
-"""The vectorised form of `mixture`: sample many hits at a time, on one side of the cloth.
+"""The vectorised form of `mixture`: sample many hits at a time.
 
 The shares of each hit are read once for one drawn direction and two densities, and the loops run
 over hits so that LLVM vectorises them. They are tested against the scalar functions of `mixture`.
-The mixtures must have one side and no cosine lobes, like those of published cloth. All rows of a
-block are in a single array at distances known to the compiler, which then need not check them for
-overlap.
+All rows of a block are in a single array at distances known to the compiler, which then need not
+check them for overlap.
+
+A mixture of one side without cosine lobes, like those of published cloth, and one of two sides with
+them, like those of `conserving` cloth, are compiled apart: `both` is a constant in each.
 """
 
 from __future__ import annotations
@@ -47,19 +49,25 @@ from fabricusd.appearance.weave.coverage import WARP
 from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, atan2, cos, sin
 from fabricusd.kernels.unrolled import tuple_reader
 
-_EVEN = THREAD_LOBES
-"""Stands in place of a lobe's number for directions that are uniform over the hemisphere."""
+_EVEN, _COSINE = THREAD_LOBES, THREAD_LOBES + 1
+"""Stand in place of a lobe's number for directions that are uniform over the hemisphere, and for
+those of a cosine lobe."""
 
 # Rows of a block: the viewer, the light, and the drawn direction; the stretch of thread that it is
 # drawn from, with the surface lobe of its thread; two uniform numbers; both densities; the place of
 # the view on the grid of shares; the position across the thread and its factor on both surface
-# densities; the shares of one stretch's lobes, followed by the shares of all lobes.
+# densities; of two sides, -1 where the drawn direction is opposite the viewer, and where the viewer
+# is below the cloth; the shares of one stretch's lobes, of two sides those for the light and those
+# for the drawn direction, followed by the shares of all lobes.
 (_OX, _OY, _OZ, _IX, _IY, _IZ, _GX, _GY, _GZ, _WARP, _PSI0, _COS, _SIN, _TAN, _ON_SURFACE,
  _ON_VOLUME, _GAMMA, _LOBE, _U1, _U2, _P_LIGHT, _P_GO, _ELEVATION, _AZIMUTH, _UP, _ROUND, _W,
- _NARROW_LIGHT, _NARROW_GO, _OURS) = (
-    row * BLOCK for row in range(30)
+ _NARROW_LIGHT, _NARROW_GO, _TURN, _FLIP, _OURS) = (
+    row * BLOCK for row in range(32)
 )  # fmt: skip
-_SHARES = _OURS + THREAD_LOBES * BLOCK
+_OTHERS = _OURS + THREAD_LOBES * BLOCK
+_SHARES = _OTHERS + THREAD_LOBES * BLOCK
+POINT_SHARES = 2 * (THREAD_LOBES + 1)
+"""Lobes at a point of a mixture of two sides with cosine lobes."""
 
 _shares_of = tuple_reader(THREAD_LOBES, BLOCK)
 """Called with (block, _OURS + x): the shares of the lobes of the current stretch."""
@@ -120,13 +128,31 @@ def _lobes_at(R, stretch, theta_o, x, y, z, shares, narrow):
 
 
 @njit(**INLINE)
-def _load(wo, wi, start, size, block):
+def _lobes_on(R, both, stretch, theta_o, x, y, z, shares, narrow):
+    """`_lobes_at`, of the side that the direction is on."""
+    if both:
+        # A product with 1 or -1: LLVM does not vectorise a loop that selects between more.
+        turn = R(1) if z > R(0) else R(-1)
+        theta_o, x, y, z = turn * theta_o, turn * x, turn * y, turn * z
+    return _lobes_at(R, stretch, theta_o, x, y, z, shares, narrow)
+
+
+@njit(**INLINE)
+def _load(R, both, wo, wi, start, size, block):
+    """Copy the directions; of two sides, negated where the viewer is below the cloth."""
     for row in range(3):
         to_viewer, to_light = wo[row][start:], wi[row][start:]
         for x in range(size):
             block[_OX + row * BLOCK + x] = to_viewer[x]
         for x in range(size):
             block[_IX + row * BLOCK + x] = to_light[x]
+    if both:
+        for x in range(size):
+            flip = R(-1) if block[_OZ + x] < R(0) else R(1)
+            block[_FLIP + x], block[_TURN + x] = flip, R(1)
+            for row in range(3):
+                block[_OX + row * BLOCK + x] *= flip
+                block[_IX + row * BLOCK + x] *= flip
 
 
 @njit(**INLINE)
@@ -183,36 +209,87 @@ def _choose(R, even, shares, count, u0, block, x):
     return k
 
 
+@njit(**INLINE)
+def _choose_side(R, mixture, lobe, lobes, u0, block, x):
+    """Write the number and the side of lobe `lobe` out of `lobes` of each side and the cosine
+    lobes; returns which of the lobes of one side it is."""
+    block[_LOBE + x], block[_TURN + x] = R(_EVEN), R(1)
+    if lobe < 0:
+        opposite = mixture.opaque == 0 and u0 < R(0.5) * mixture.even
+        block[_TURN + x] = R(-1) if opposite else R(1)
+        return 0
+    if lobe >= 2 * lobes:
+        # Rounding may select the lower cosine lobe of opaque cloth, whose share is 0.
+        opposite = lobe > 2 * lobes and mixture.opaque == 0
+        block[_LOBE + x], block[_TURN + x] = R(_COSINE), R(-1) if opposite else R(1)
+        return 0
+    block[_LOBE + x] = R(lobe % THREAD_LOBES)
+    block[_TURN + x] = R(-1) if lobe >= lobes else R(1)
+    return lobe % lobes
+
+
 @njit(**PART)
-def _draw(R, size, block):
+def _draw(R, both, size, block):
     """Draw directions from the chosen lobes, in the surface frame."""
     for x in range(size):
         stretch, lobe = _stretch_at(block, x), block[_LOBE + x]
         u1, u2 = block[_U1 + x], block[_U2 + x]
         theta_o, _, _ = _viewer(R, stretch, block, x)
-        t, b, n = sample_any_lobe(R, lobe, stretch, theta_o, u1, u2)
+        turn = block[_TURN + x] if both else R(1)
+        t, b, n = sample_any_lobe(R, lobe, stretch, turn * theta_o, u1, u2)
         gx, gy, z = _outwards(R, stretch, t, b, n)
-        flat = math.sqrt(max(R(0), (R(1) - u1) * (R(1) + u1)))
+        up = math.sqrt(u1) if both and lobe == R(_COSINE) else u1
+        flat = math.sqrt(max(R(0), (R(1) - up) * (R(1) + up)))
         phi = R(2 * math.pi) * u2
-        even = lobe == R(_EVEN)
-        block[_GX + x] = flat * cos(R, phi) if even else gx
-        block[_GY + x] = flat * sin(R, phi) if even else gy
-        block[_GZ + x] = u1 if even else z
+        even = lobe >= R(_EVEN)
+        block[_GX + x] = turn * (flat * cos(R, phi) if even else gx)
+        block[_GY + x] = turn * (flat * sin(R, phi) if even else gy)
+        block[_GZ + x] = turn * (up if even else z)
 
 
 @njit(**INLINE)
-def _store(R, start, size, block, drawn, first):
-    """Write the directions and densities of a block; the densities are 0 at or below the cloth."""
+def _drawn_from(R, both, opaque, z):
+    """Whether a direction with this N.w is ever drawn, for a viewer above the cloth."""
+    if both and not opaque:
+        return z != R(0)
+    return z > R(0)
+
+
+@njit(**INLINE)
+def _store(R, both, opaque, start, size, block, drawn, first):
+    """Write the directions and densities of a block; the densities of what is not drawn are 0."""
     for row in range(3):
         go = drawn.go[row][start:]
         for x in range(size):
-            go[x] = block[_GX + row * BLOCK + x]
+            turn = block[_FLIP + x] if both else R(1)
+            go[x] = turn * block[_GX + row * BLOCK + x]
     to_light, onwards = drawn.p_light[first + start :], drawn.p_go[first + start :]
     for x in range(size):
-        lit = block[_IZ + x] > R(0) and block[_OZ + x] > R(0)
+        lit = _drawn_from(R, both, opaque, block[_IZ + x]) and block[_OZ + x] > R(0)
         to_light[x] = block[_P_LIGHT + x] if lit else R(0)
-        seen = block[_GZ + x] > R(0) and block[_OZ + x] > R(0)
+        seen = _drawn_from(R, both, opaque, block[_GZ + x]) and block[_OZ + x] > R(0)
         onwards[x] = block[_P_GO + x] if seen else R(0)
+
+
+@njit(**INLINE)
+def _start_densities(R, both, sampling, size, block):
+    """Set both densities to that of the uniform part."""
+    even = sampling.even * R(1 / (2 * math.pi))
+    if both and sampling.opaque == 0:
+        even *= R(0.5)
+    for x in range(size):
+        block[_P_LIGHT + x] = block[_P_GO + x] = even
+
+
+@njit(**INLINE)
+def _add_cosines(R, upper, size, block):
+    """Add the cosine lobes, whose shares are in the row `upper` and in the next."""
+    for x in range(size):
+        own, other = block[upper + x], block[upper + BLOCK + x]
+        z = block[_IZ + x]
+        block[_P_LIGHT + x] += (own if z > R(0) else other) * abs(z) * R(1 / math.pi)
+        z = block[_GZ + x]
+        block[_P_GO + x] += (own if z > R(0) else other) * abs(z) * R(1 / math.pi)
 
 
 @njit(**KERNEL)
@@ -224,21 +301,41 @@ def sample_far(R, sampling, wo, wi, numbers, drawn, first, n):
     numbers : three rows of uniform reals, read from `first` to `first + n - 1`
     drawn : a `Drawn`; the densities are written from `first` to `first + n - 1`
     """
+    count = THREAD_LOBES * sampling.stretches.shape[0]
+    block = np.empty(_SHARES + count * BLOCK, wo.dtype)
+    mixed = np.empty(count * BLOCK, wo.dtype)
+    _sample_far(R, False, sampling, wo, wi, numbers, drawn, first, n, block, mixed)
+
+
+@njit(**KERNEL)
+def sample_far_both(R, sampling, wo, wi, numbers, drawn, first, n):
+    """`sample_far` of a mixture of two sides with cosine lobes."""
+    count = 2 * THREAD_LOBES * sampling.stretches.shape[0] + 2
+    block = np.empty(_SHARES + count * BLOCK, wo.dtype)
+    mixed = np.empty(count * BLOCK, wo.dtype)
+    _sample_far(R, True, sampling, wo, wi, numbers, drawn, first, n, block, mixed)
+
+
+@njit(**INLINE)
+def _sample_far(R, both, sampling, wo, wi, numbers, drawn, first, n, block, mixed):
+    """block, mixed : room for the rows of a block, and for its shares hit by hit."""
     u0, u1, u2 = numbers
     stretches = sampling.stretches
     lobes = THREAD_LOBES * stretches.shape[0]
-    block = np.empty(_SHARES + lobes * BLOCK, wo.dtype)
-    mixed = np.empty(lobes * BLOCK, wo.dtype)
+    count = 2 * lobes + 2 if both else lobes
     for start in range(0, n, BLOCK):
         size = min(BLOCK, n - start)
-        _load(wo, wi, start, size, block)
+        _load(R, both, wo, wi, start, size, block)
         _find_views(R, size, block)
         _read_shares(R, sampling.shares, size, block, mixed)
         for x in range(size):
             h = first + start + x
-            k = _choose(R, sampling.even, _SHARES, lobes, u0[h], block, x)
+            k = _choose(R, sampling.even, _SHARES, count, u0[h], block, x)
             block[_U1 + x], block[_U2 + x] = u1[h], u2[h]
-            block[_LOBE + x] = R(_EVEN) if k < 0 else R(k % THREAD_LOBES)
+            if both:
+                k = _choose_side(R, sampling, k, lobes, u0[h], block, x)
+            else:
+                block[_LOBE + x] = R(_EVEN) if k < 0 else R(k % THREAD_LOBES)
             if lobes == 0:
                 block[_WARP + x] = block[_PSI0 + x] = block[_SIN + x] = block[_TAN + x] = R(0)
                 block[_COS + x] = block[_ON_SURFACE + x] = block[_ON_VOLUME + x] = R(1)
@@ -248,34 +345,51 @@ def sample_far(R, sampling, wo, wi, numbers, drawn, first, n):
             block[_PSI0 + x], block[_COS + x] = row[PSI0], row[COS]
             block[_SIN + x], block[_TAN + x] = row[SIN], row[TAN]
             block[_ON_SURFACE + x], block[_ON_VOLUME + x] = row[SURFACE_WIDTH], row[VOLUME_WIDTH]
-        _draw(R, size, block)
-        for x in range(size):
-            block[_P_LIGHT + x] = block[_P_GO + x] = sampling.even * R(1 / (2 * math.pi))
+        _draw(R, both, size, block)
+        _start_densities(R, both, sampling, size, block)
         for y in range(stretches.shape[0]):
-            _add_stretch(R, stretches[y], _SHARES + THREAD_LOBES * y * BLOCK, size, block)
-        _store(R, start, size, block, drawn, first)
+            at = _SHARES + THREAD_LOBES * y * BLOCK
+            _add_stretch(R, both, stretches[y], at, at + lobes * BLOCK, size, block)
+        if both:
+            _add_cosines(R, _SHARES + 2 * lobes * BLOCK, size, block)
+        _store(R, both, sampling.opaque != 0, start, size, block, drawn, first)
 
 
 @njit(**PART)
-def _add_stretch(R, row, shares, size, block):
-    """Add a stretch's part of both densities."""
+def _add_stretch(R, both, row, shares, others, size, block):
+    """Add a stretch's part of both densities; shares, others : rows of its shares by side."""
     stretch = Stretch(
         R(1) if int(row[OF_SET]) == WARP else R(0), row[PSI0], row[COS], row[SIN], row[TAN],
         row[SURFACE_WIDTH], row[VOLUME_WIDTH],
     )  # fmt: skip
-    # Copy the shares to a fixed offset: with an offset unknown to the compiler, the loop below
-    # would stay scalar.
-    for x in range(THREAD_LOBES * BLOCK):
-        block[_OURS + x] = block[shares + x]
+    # Copy the shares to fixed offsets: with an offset unknown to the compiler, the loop below would
+    # stay scalar.
+    if both:
+        _choose_shares(R, shares, others, _IZ, _OURS, size, block)
+        _choose_shares(R, shares, others, _GZ, _OTHERS, size, block)
+    else:
+        for x in range(THREAD_LOBES * BLOCK):
+            block[_OURS + x] = block[shares + x]
+    of_go = _OTHERS if both else _OURS
     for x in range(size):
         theta_o, _, _ = _viewer(R, stretch, block, x)
-        ours = _shares_of(block, _OURS + x)
-        block[_P_LIGHT + x] += _lobes_at(
-            R, stretch, theta_o, block[_IX + x], block[_IY + x], block[_IZ + x], ours, R(1)
-        )
-        block[_P_GO + x] += _lobes_at(
-            R, stretch, theta_o, block[_GX + x], block[_GY + x], block[_GZ + x], ours, R(1)
-        )
+        block[_P_LIGHT + x] += _lobes_on(
+            R, both, stretch, theta_o, block[_IX + x], block[_IY + x], block[_IZ + x],
+            _shares_of(block, _OURS + x), R(1),
+        )  # fmt: skip
+        block[_P_GO + x] += _lobes_on(
+            R, both, stretch, theta_o, block[_GX + x], block[_GY + x], block[_GZ + x],
+            _shares_of(block, of_go + x), R(1),
+        )  # fmt: skip
+
+
+@njit(**INLINE)
+def _choose_shares(R, shares, others, z, into, size, block):
+    """Copy a stretch's shares on the side of the direction whose N.w is in row z."""
+    for lobe in range(THREAD_LOBES):
+        for x in range(size):
+            own, other = block[shares + lobe * BLOCK + x], block[others + lobe * BLOCK + x]
+            block[into + lobe * BLOCK + x] = own if block[z + x] > R(0) else other
 
 
 @njit(**KERNEL)
@@ -285,36 +399,68 @@ def sample_points(R, table, sampling, across_too, places, wo, wi, numbers, drawn
     table : rows of `pack_threads`
     places : `Places` of n hits; a gap is sampled uniformly
     """
-    u0, u1, u2 = numbers
     block = np.empty(_SHARES, wo.dtype)
+    _sample_points(R, False, table, sampling, across_too, places, wo, wi, numbers, drawn, first, n,
+                   block)  # fmt: skip
+
+
+@njit(**KERNEL)
+def sample_points_both(R, table, sampling, across_too, places, wo, wi, numbers, drawn, first, n):
+    """`sample_points` of a mixture of two sides with cosine lobes."""
+    block = np.empty(_SHARES + POINT_SHARES * BLOCK, wo.dtype)
+    _sample_points(R, True, table, sampling, across_too, places, wo, wi, numbers, drawn, first, n,
+                   block)  # fmt: skip
+
+
+@njit(**INLINE)
+def _sample_points(
+    R, both, table, sampling, across_too, places, wo, wi, numbers, drawn, first, n, block
+):
+    """block : room for the rows of a block."""
+    u0, u1, u2 = numbers
+    of_go = _OTHERS if both else _OURS
     for start in range(0, n, BLOCK):
         size = min(BLOCK, n - start)
-        _load(wo, wi, start, size, block)
+        _load(R, both, wo, wi, start, size, block)
         _find_views(R, size, block)
-        _find_threads(R, table, sampling, places, start, size, block)
+        _find_threads(R, both, table, sampling, places, start, size, block)
         for x in range(size):
             h = first + start + x
             block[_U1 + x], block[_U2 + x] = u1[h], u2[h]
             on_thread = places.sets[start + x] <= WARP and sampling.stretches.shape[0] > 0
-            count = THREAD_LOBES if on_thread else 0
-            k = _choose(R, sampling.even, _OURS, count, u0[h], block, x)
-            block[_LOBE + x] = R(_EVEN) if k < 0 else R(k)
+            if both:
+                count = POINT_SHARES if on_thread else 0
+                k = _choose(R, sampling.even, _SHARES, count, u0[h], block, x)
+                _choose_side(R, sampling, k, THREAD_LOBES, u0[h], block, x)
+            else:
+                count = THREAD_LOBES if on_thread else 0
+                k = _choose(R, sampling.even, _OURS, count, u0[h], block, x)
+                block[_LOBE + x] = R(_EVEN) if k < 0 else R(k)
         _turn(R, size, block)
-        _draw(R, size, block)
+        _draw(R, both, size, block)
         if across_too:
-            _draw_across(R, size, block)
+            _draw_across(R, both, size, block)
         for x in range(size):
             block[_NARROW_LIGHT + x] = block[_NARROW_GO + x] = R(1)
         if across_too:
-            _narrow(R, size, block)
-        _add_points(R, sampling.even, size, block)
-        _store(R, start, size, block, drawn, first)
+            _narrow(R, both, size, block)
+        if both:
+            others = _SHARES + THREAD_LOBES * BLOCK
+            _choose_shares(R, _SHARES, others, _IZ, _OURS, size, block)
+            _choose_shares(R, _SHARES, others, _GZ, _OTHERS, size, block)
+        if both:
+            _start_densities(R, both, sampling, size, block)
+        _add_points(R, both, of_go, sampling.even, size, block)
+        if both:
+            _add_cosines(R, _SHARES + 2 * THREAD_LOBES * BLOCK, size, block)
+        _store(R, both, sampling.opaque != 0, start, size, block, drawn, first)
 
 
 @njit(**PART)
-def _find_threads(R, table, sampling, places, start, size, block):
+def _find_threads(R, both, table, sampling, places, start, size, block):
     """Read the thread under each hit and the shares of its lobes, which are 0 in a gap."""
     sets, threads, psi0, w = places.sets, places.threads, places.psi0, places.w
+    into, count = (_SHARES, POINT_SHARES) if both else (_OURS, THREAD_LOBES)
     for x in range(size):
         on_thread = sets[start + x] <= WARP and sampling.stretches.shape[0] > 0
         thread_set, thread, angle = 0, 0, R(0)
@@ -331,11 +477,11 @@ def _find_threads(R, table, sampling, places, start, size, block):
         if on_thread:
             k = nearest_stretch(R, sampling.stretches, thread_set, thread, psi0[start + x])
         corner = _corner(block, x)
-        for lobe in range(THREAD_LOBES):
+        for lobe in range(count):
             share = R(0)
             if on_thread:
-                share = share_at(R, sampling.point_shares, corner, THREAD_LOBES * k + lobe)
-            block[_OURS + lobe * BLOCK + x] = share
+                share = share_at(R, sampling.point_shares, corner, count * k + lobe)
+            block[into + lobe * BLOCK + x] = share
 
 
 @njit(**PART)
@@ -347,7 +493,7 @@ def _turn(R, size, block):
 
 
 @njit(**PART)
-def _draw_across(R, size, block):
+def _draw_across(R, both, size, block):
     """Draw from the surface lobe at level `thread`, in place of the directions of `_draw`."""
     for x in range(size):
         stretch = _stretch_at(block, x)
@@ -359,13 +505,15 @@ def _draw_across(R, size, block):
         )  # fmt: skip
         gx, gy, z = _outwards(R, stretch, t, b, n)
         ours = block[_LOBE + x] == R(SURFACE)
+        if both:
+            ours = ours and min(block[_TURN + x], block[_FLIP + x]) > R(0)
         block[_GX + x] = gx if ours else block[_GX + x]
         block[_GY + x] = gy if ours else block[_GY + x]
         block[_GZ + x] = z if ours else block[_GZ + x]
 
 
 @njit(**PART)
-def _narrow(R, size, block):
+def _narrow(R, both, size, block):
     """Compute the factors of the position across the thread on both surface densities."""
     for x in range(size):
         stretch = _stretch_at(block, x)
@@ -373,28 +521,37 @@ def _narrow(R, size, block):
         phi_o, w = azimuth_seen(R, b_o, n_o), block[_W + x]
         beta, tangent = across_deviation(R, block[_GAMMA + x]), stretch.tan
         t, b, n = _into(R, stretch, block[_IX + x], block[_IY + x], block[_IZ + x])
-        block[_NARROW_LIGHT + x] = density_across(
-            R, tangent, phi_o, w, beta, t, b, max(n, R(1e-12))
-        )
+        to_light = density_across(R, tangent, phi_o, w, beta, t, b, max(n, R(1e-12)))
         t, b, n = _into(R, stretch, block[_GX + x], block[_GY + x], block[_GZ + x])
-        block[_NARROW_GO + x] = density_across(R, tangent, phi_o, w, beta, t, b, max(n, R(1e-12)))
+        onwards = density_across(R, tangent, phi_o, w, beta, t, b, max(n, R(1e-12)))
+        if both:
+            # Only where viewer and direction are both on the front.
+            front = block[_FLIP + x]
+            to_light = to_light if min(front, block[_IZ + x]) > R(0) else R(1)
+            onwards = onwards if min(front, block[_GZ + x]) > R(0) else R(1)
+        block[_NARROW_LIGHT + x], block[_NARROW_GO + x] = to_light, onwards
 
 
 @njit(**PART)
-def _add_points(R, uniform, size, block):
-    """Compute both densities from the lobes of each hit's own thread."""
+def _add_points(R, both, of_go, uniform, size, block):
+    """Add the lobes of each hit's own thread to both densities.
+
+    of_go : row of the shares of the drawn direction's side; uniform : share of the uniform part
+    """
     for x in range(size):
         stretch = _stretch_at(block, x)
         theta_o, _, _ = _viewer(R, stretch, block, x)
-        ours = _shares_of(block, _OURS + x)
+        ours, its = _shares_of(block, _OURS + x), _shares_of(block, of_go + x)
         # In a gap all shares are 0 and every direction is drawn uniformly.
-        even = R(1 / (2 * math.pi))
-        even = uniform * even if mixed(ours, ours) > R(0) else even
-        block[_P_LIGHT + x] = even + _lobes_at(
-            R, stretch, theta_o, block[_IX + x], block[_IY + x], block[_IZ + x], ours,
+        if not both:
+            even = R(1 / (2 * math.pi))
+            even = uniform * even if mixed(ours, ours) > R(0) else even
+            block[_P_LIGHT + x] = block[_P_GO + x] = even
+        block[_P_LIGHT + x] += _lobes_on(
+            R, both, stretch, theta_o, block[_IX + x], block[_IY + x], block[_IZ + x], ours,
             block[_NARROW_LIGHT + x],
         )  # fmt: skip
-        block[_P_GO + x] = even + _lobes_at(
-            R, stretch, theta_o, block[_GX + x], block[_GY + x], block[_GZ + x], ours,
+        block[_P_GO + x] += _lobes_on(
+            R, both, stretch, theta_o, block[_GX + x], block[_GY + x], block[_GZ + x], its,
             block[_NARROW_GO + x],
         )  # fmt: skip

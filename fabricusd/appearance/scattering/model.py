@@ -53,8 +53,10 @@ class ThreadModel:
     cell_lobes : (R, row, half, sin_i, cos_i, cos_phi_i, sin_o, cos_o, cos_phi_o) -> `lobes`,
         averaged over tangent angles up to `half` [rad] to each side; None if no closed form is
         known, in which case curves are integrated by points only
-    looked_up : (R, row, cos_i, cos_o) -> (factor, addend) of the volume term, read from tables;
-        None for (1, 0)
+    position : (R, cos_theta) -> place of an inclination in the tables; None without them
+    read : (R, row, position) -> two numbers from the tables; None without them
+    looked_up : (R, row, the two of theta_i, the two of theta_o) -> (factor, addend) of the volume
+        term, from what `read` gives; None for (1, 0)
     transmission : thread, entries -> T for the columns from TRANSMISSION on; None without this
         table. `entries` is how many are computed, all by default; the others are interpolated
     completion : thread, entries -> (x for the columns from COMPLETION on, X); None without it
@@ -71,6 +73,8 @@ class ThreadModel:
     energies: Kernel
     plain: Callable[[Thread, Any, Any], tuple[Floats, Floats]]
     cell_lobes: Kernel = None
+    position: Kernel = None
+    read: Kernel = None
     looked_up: Kernel = None
     transmission: Callable[..., Floats] | None = None
     completion: Callable[..., tuple[Floats, float]] | None = None

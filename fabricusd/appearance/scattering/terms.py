@@ -22,27 +22,50 @@ CELL_MODELS = tuple(k for k in PUBLISHED_MODELS if REGISTRY[k].cell_lobes is not
 
 
 @njit(**INLINE)
-def _no_table(R, row, cos_i, cos_o):
+def _nowhere(R, cos_theta):
+    return R(0)
+
+
+@njit(**INLINE)
+def _nothing_read(R, row, position):
     return R(1), R(0)
+
+
+@njit(**INLINE)
+def _nothing_looked_up(R, row, first_i, second_i, first_o, second_o):
+    return R(1), R(0)
+
+
+_WITHOUT = {"position": _nowhere, "read": _nothing_read, "looked_up": _nothing_looked_up}
 
 
 def _parts(name: str, numbers: Iterable[int]) -> Any:
     """A kernel (R, model, row, ...) that selects one field of `ThreadModel` by the model's
     number."""
-    return by_number({k: getattr(REGISTRY[k], name) or _no_table for k in numbers})
+    return by_number({k: getattr(REGISTRY[k], name) or _WITHOUT.get(name) for k in numbers})
 
 
 factors, lobes = _parts("factors", ALL), _parts("lobes", ALL)
-looked_up = _parts("looked_up", ALL)
+_position, _read, _looked_up = (_parts(name, ALL) for name in ("position", "read", "looked_up"))
 energies = _parts("energies", ALL)
 published_factors = _parts("factors", PUBLISHED_MODELS)
 published_lobes = _parts("lobes", PUBLISHED_MODELS)
 cell_lobes = _parts("cell_lobes", CELL_MODELS)
 _conserving_factors = _parts("factors", CONSERVING_MODELS)
 _conserving_lobes = _parts("lobes", CONSERVING_MODELS)
+conserving_position = _parts("position", CONSERVING_MODELS)
+conserving_read = _parts("read", CONSERVING_MODELS)
 _conserving_looked_up = _parts("looked_up", CONSERVING_MODELS)
 """Each of these takes (R, model, row, ...) as in `ThreadModel`. Kernels that serve one law select
 among the models of that law only, so they do not contain the code of the others."""
+
+
+@njit(**INLINE)
+def looked_up(R, model, row, cos_i, cos_o):
+    """(factor, addend) of the volume term that a model reads from tables."""
+    first_i, second_i = _read(R, model, row, _position(R, model, cos_i))
+    first_o, second_o = _read(R, model, row, _position(R, model, cos_o))
+    return _looked_up(R, model, row, first_i, second_i, first_o, second_o)
 
 
 @njit(**INLINE)
@@ -80,8 +103,20 @@ def terms(R, row, ix, iy, iz, ox, oy, oz):
 def conserving_terms(R, row, ix, iy, iz, ox, oy, oz):
     """`terms` of a thread that follows the conserving law."""
     model = int(row[MODEL])
+    cos_i, cos_o = cos_inclination(R, iy, iz), cos_inclination(R, oy, oz)
+    first_i, second_i = conserving_read(R, model, row, conserving_position(R, model, cos_i))
+    first_o, second_o = conserving_read(R, model, row, conserving_position(R, model, cos_o))
+    return conserving_terms_read(
+        R, row, first_i, second_i, first_o, second_o, ix, iy, iz, ox, oy, oz
+    )
+
+
+@njit(**INLINE)
+def conserving_terms_read(R, row, first_i, second_i, first_o, second_o, ix, iy, iz, ox, oy, oz):
+    """`conserving_terms`, given what `conserving_read` gives for both directions."""
+    model = int(row[MODEL])
     cos_i, cos_o, cos_half = pair_angles(R, iy, iz, oy, oz)
     surface, volume = _conserving_factors(R, model, row, ix, cos_i, ox, cos_o, cos_half)
     on_surface, on_volume = _conserving_lobes(R, model, row, ix, cos_i, ox, cos_o)
-    scale, added = _conserving_looked_up(R, model, row, cos_i, cos_o)
+    scale, added = _conserving_looked_up(R, model, row, first_i, second_i, first_o, second_o)
     return surface * on_surface, volume * on_volume * scale + added

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.cloth_key import cloth_key
 from fabricusd.cache import kept
-from fabricusd.fabric import Fabric, Weave
+from fabricusd.fabric import Fabric
 from fabricusd.kernels.cache import fingerprint
 from fabricusd.materials.fit.fit import Fitted, fit, fit_threads
 from fabricusd.materials.fit.target import TexelSample
@@ -63,18 +64,6 @@ def _fitted(said: dict[str, Any]) -> Fitted:
 def _key(texels: TexelSample) -> tuple[object, ...]:
     # Sums of arrays differ in their last digit with the place of the arrays in memory.
     return tuple(np.round(np.atleast_1d(getattr(texels, one.name)), 7) for one in fields(texels))
-
-
-def cloth_key(fabric: Fabric) -> tuple[object, ...]:
-    """What a fit depends on of a fabric."""
-    # colour-science changes how NumPy prints its numbers, and a fit imports it.
-    with np.printoptions(legacy=False):
-        said = repr(replace(fabric, weave=_ANY_WEAVE, back=None))
-    return said, fabric.weave.cells
-
-
-_ANY_WEAVE = Weave(np.eye(2, dtype=bool))
-"""Stands for a weave, whose text would leave out the middle of a large array."""
 
 
 @lru_cache(maxsize=1)

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance.cloth_key import cloth_key
 from fabricusd.cache import kept
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.cache import fingerprint
-from fabricusd.materials.fit.keep import cloth_key
 from fabricusd.materials.lobes.mixture import Mixture
 from fabricusd.materials.near.fit import fit_near
 from fabricusd.materials.near.mixture import NearMixture

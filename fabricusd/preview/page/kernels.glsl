@@ -829,6 +829,10 @@ T_fff k_point_value(Place place, float ix, float iy, float iz, float ox, float o
   return T_fff((surface + (volume * F(published_threads_at + (row) * published_threads_n1 + 0))), (surface + (volume * F(published_threads_at + (row) * published_threads_n1 + 1))), (surface + (volume * F(published_threads_at + (row) * published_threads_n1 + 2))));
 }
 
+T_ii k_shape_of() {
+  return T_ii((conserving_sides_n1 - 2), (conserving_sides_n2 - 4));
+}
+
 struct T_iiff { int m0_; int m1_; float m2_; float m3_; };
 
 T_iiff k_cell(int rows, int columns, float x, float y, float z) {
@@ -848,22 +852,6 @@ T_iiff k_cell(int rows, int columns, float x, float y, float z) {
   return T_iiff(row, column, (i - float(row)), (j - float(column)));
 }
 
-T_ii k_beyond(int rows, int columns, int row, int column) {
-  int t1;
-  int t2;
-  if ((row < 0)) {
-    t1 = (-row);
-    t2 = (column + (columns / 2));
-    row = t1;
-    column = t2;
-  } else {
-    if ((row > (rows - 1))) {
-      row = ((2 * (rows - 1)) - row);
-    }
-  }
-  return T_ii(row, ((column + columns) % columns));
-}
-
 float k_cubic_weight(int k, float t) {
   if ((k == 0)) {
     return ((0.5 * t) * ((t * (2.0 - t)) - 1.0));
@@ -877,24 +865,37 @@ float k_cubic_weight(int k, float t) {
   return (((0.5 * t) * t) * (t - 1.0));
 }
 
+T_fff k_side_in(int side, int row, int column, float t, float u) {
+  float first;
+  float second;
+  float third;
+  float weight;
+  first = 0.0;
+  second = 0.0;
+  third = 0.0;
+  for (int a = 0; a < 4; ++a) {
+    for (int b = 0; b < 4; ++b) {
+      weight = (k_cubic_weight(a, t) * k_cubic_weight(b, u));
+      first = (first + (weight * F(conserving_sides_at + (((side) * conserving_sides_n1 + (row + a)) * conserving_sides_n2 + (column + b)) * conserving_sides_n3 + 0)));
+      second = (second + (weight * F(conserving_sides_at + (((side) * conserving_sides_n1 + (row + a)) * conserving_sides_n2 + (column + b)) * conserving_sides_n3 + 1)));
+      third = (third + (weight * F(conserving_sides_at + (((side) * conserving_sides_n1 + (row + a)) * conserving_sides_n2 + (column + b)) * conserving_sides_n3 + 2)));
+    }
+  }
+  return T_fff(max(0.0, first), max(0.0, second), max(0.0, third));
+}
+
 T_fff k_side_at(int side, float x, float y, float z) {
   float t1;
   float t2;
   float t3;
+  T_ii t4;
   int rows;
   int columns;
-  T_iiff t4;
+  T_iiff t5;
   int row;
   int column;
   float t;
   float u;
-  float first;
-  float second;
-  float third;
-  T_ii t5;
-  int i;
-  int j;
-  float weight;
   if ((z < 0.0)) {
     t1 = (-x);
     t2 = (-y);
@@ -903,28 +904,15 @@ T_fff k_side_at(int side, float x, float y, float z) {
     y = t2;
     z = t3;
   }
-  rows = conserving_sides_n1;
-  columns = conserving_sides_n2;
-  t4 = k_cell(rows, columns, x, y, z);
-  row = t4.m0_;
-  column = t4.m1_;
-  t = t4.m2_;
-  u = t4.m3_;
-  first = 0.0;
-  second = 0.0;
-  third = 0.0;
-  for (int a = 0; a < 4; ++a) {
-    for (int b = 0; b < 4; ++b) {
-      t5 = k_beyond(rows, columns, ((row + a) - 1), ((column + b) - 1));
-      i = t5.m0_;
-      j = t5.m1_;
-      weight = (k_cubic_weight(a, t) * k_cubic_weight(b, u));
-      first = (first + (weight * F(conserving_sides_at + (((side) * conserving_sides_n1 + i) * conserving_sides_n2 + j) * conserving_sides_n3 + 0)));
-      second = (second + (weight * F(conserving_sides_at + (((side) * conserving_sides_n1 + i) * conserving_sides_n2 + j) * conserving_sides_n3 + 1)));
-      third = (third + (weight * F(conserving_sides_at + (((side) * conserving_sides_n1 + i) * conserving_sides_n2 + j) * conserving_sides_n3 + 2)));
-    }
-  }
-  return T_fff(max(0.0, first), max(0.0, second), max(0.0, third));
+  t4 = k_shape_of();
+  rows = t4.m0_;
+  columns = t4.m1_;
+  t5 = k_cell(rows, columns, x, y, z);
+  row = t5.m0_;
+  column = t5.m1_;
+  t = t5.m2_;
+  u = t5.m3_;
+  return k_side_in(side, row, column, t, u);
 }
 
 T_fff k_between_sides(float ix, float iy, float iz, float ox, float oy, float oz) {
@@ -992,6 +980,40 @@ T_fff k_to_thread(int thread_set, float cos_psi0, float sin_psi0, float x, float
   return T_fff(((cos_psi0 * along) - (sin_psi0 * z)), across, ((sin_psi0 * along) + (cos_psi0 * z)));
 }
 
+float k_position(float cos_theta) {
+  return min((sqrt(cos_theta) * 720.0), 720.0);
+}
+
+float k_chosen_2(int number, float a1) {
+  return k_position(a1);
+}
+
+T_ff k_read(int row, float place) {
+  int entry;
+  float part;
+  float through;
+  float lost;
+  entry = int(place);
+  part = (place - float(entry));
+  through = F(conserving_threads_at + (row) * conserving_threads_n1 + (19 + entry));
+  lost = F(conserving_threads_at + (row) * conserving_threads_n1 + (741 + entry));
+  through = (through + (part * (F(conserving_threads_at + (row) * conserving_threads_n1 + (20 + entry)) - through)));
+  lost = (lost + (part * (F(conserving_threads_at + (row) * conserving_threads_n1 + (742 + entry)) - lost)));
+  return T_ff(through, lost);
+}
+
+T_ff k_chosen_3(int number, int a1, float a2) {
+  return k_read(a1, a2);
+}
+
+float k_chosen_4(int number, float a1) {
+  return k_position(a1);
+}
+
+T_ff k_chosen_5(int number, int a1, float a2) {
+  return k_read(a1, a2);
+}
+
 T_fff k_pair_angles(float iy, float iz, float oy, float oz) {
   float cos_i;
   float cos_o;
@@ -1023,7 +1045,7 @@ T_ff k_factors_3(int row, float sin_i, float cos_i, float sin_o, float cos_o, fl
   return T_ff((((0.25 * reflected) * cos_half) / max(max(cos_i, cos_o), 1e-06)), 1.0);
 }
 
-T_ff k_chosen_2(int number, int a1, float a2, float a3, float a4, float a5, float a6) {
+T_ff k_chosen_6(int number, int a1, float a2, float a3, float a4, float a5, float a6) {
   return k_factors_3(a1, a2, a3, a4, a5, a6);
 }
 
@@ -1075,47 +1097,19 @@ T_ff k_lobes(int row, float sin_i, float cos_i, float sin_o, float cos_o) {
   return T_ff(k_s, (((((1.0 - kd) * 0.15915494309189535) * k_v) / widest) + (kd * 0.10132118364233778)));
 }
 
-T_ff k_chosen_3(int number, int a1, float a2, float a3, float a4, float a5) {
+T_ff k_chosen_7(int number, int a1, float a2, float a3, float a4, float a5) {
   return k_lobes(a1, a2, a3, a4, a5);
 }
 
-T_ff k_tabulated(int row, float cos_theta) {
-  float position;
-  int index;
-  float part;
-  float through;
-  float lost;
-  position = (sqrt(cos_theta) * 720.0);
-  index = int(min(position, 720.0));
-  part = (position - float(index));
-  through = F(conserving_threads_at + (row) * conserving_threads_n1 + (19 + index));
-  lost = F(conserving_threads_at + (row) * conserving_threads_n1 + (741 + index));
-  through = (through + (part * (F(conserving_threads_at + (row) * conserving_threads_n1 + (20 + index)) - through)));
-  lost = (lost + (part * (F(conserving_threads_at + (row) * conserving_threads_n1 + (742 + index)) - lost)));
-  return T_ff(through, lost);
-}
-
-T_ff k_looked_up(int row, float cos_i, float cos_o) {
-  T_ff t1;
-  float through_i;
-  float lost_i;
-  T_ff t2;
-  float through_o;
-  float lost_o;
-  t1 = k_tabulated(row, cos_i);
-  through_i = t1.m0_;
-  lost_i = t1.m1_;
-  t2 = k_tabulated(row, cos_o);
-  through_o = t2.m0_;
-  lost_o = t2.m1_;
+T_ff k_looked_up(int row, float through_i, float lost_i, float through_o, float lost_o) {
   return T_ff(((through_i * through_o) * F(conserving_threads_at + (row) * conserving_threads_n1 + 17)), (lost_i * lost_o));
 }
 
-T_ff k_chosen_4(int number, int a1, float a2, float a3) {
-  return k_looked_up(a1, a2, a3);
+T_ff k_chosen_8(int number, int a1, float a2, float a3, float a4, float a5) {
+  return k_looked_up(a1, a2, a3, a4, a5);
 }
 
-T_ff k_conserving_terms(int row, float ix, float iy, float iz, float ox, float oy, float oz) {
+T_ff k_conserving_terms_read(int row, float first_i, float second_i, float first_o, float second_o, float ix, float iy, float iz, float ox, float oy, float oz) {
   int model;
   T_fff t1;
   float cos_i;
@@ -1135,16 +1129,38 @@ T_ff k_conserving_terms(int row, float ix, float iy, float iz, float ox, float o
   cos_i = t1.m0_;
   cos_o = t1.m1_;
   cos_half = t1.m2_;
-  t2 = k_chosen_2(model, row, ix, cos_i, ox, cos_o, cos_half);
+  t2 = k_chosen_6(model, row, ix, cos_i, ox, cos_o, cos_half);
   surface = t2.m0_;
   volume = t2.m1_;
-  t3 = k_chosen_3(model, row, ix, cos_i, ox, cos_o);
+  t3 = k_chosen_7(model, row, ix, cos_i, ox, cos_o);
   on_surface = t3.m0_;
   on_volume = t3.m1_;
-  t4 = k_chosen_4(model, row, cos_i, cos_o);
+  t4 = k_chosen_8(model, row, first_i, second_i, first_o, second_o);
   scale = t4.m0_;
   added = t4.m1_;
   return T_ff((surface * on_surface), (((volume * on_volume) * scale) + added));
+}
+
+T_ff k_conserving_terms(int row, float ix, float iy, float iz, float ox, float oy, float oz) {
+  int model;
+  float cos_i;
+  float cos_o;
+  T_ff t1;
+  float first_i;
+  float second_i;
+  T_ff t2;
+  float first_o;
+  float second_o;
+  model = int(F(conserving_threads_at + (row) * conserving_threads_n1 + 3));
+  cos_i = k_cos_inclination(iy, iz);
+  cos_o = k_cos_inclination(oy, oz);
+  t1 = k_chosen_3(model, row, k_chosen_2(model, cos_i));
+  first_i = t1.m0_;
+  second_i = t1.m1_;
+  t2 = k_chosen_5(model, row, k_chosen_4(model, cos_o));
+  first_o = t2.m0_;
+  second_o = t2.m1_;
+  return k_conserving_terms_read(row, first_i, second_i, first_o, second_o, ix, iy, iz, ox, oy, oz);
 }
 
 T_ff k_facet_terms(int row, int thread_set, float c, float s, float ix, float iy, float iz, float ox, float oy, float oz) {
@@ -1242,21 +1258,52 @@ T_fff k_conserving_value(float ix, float iy, float iz, float ox, float oy, float
   return T_fff((red + (share * F(conserving_strength_at + (side) * conserving_strength_n1 + 0))), (green + (share * F(conserving_strength_at + (side) * conserving_strength_n1 + 1))), (blue + (share * F(conserving_strength_at + (side) * conserving_strength_n1 + 2))));
 }
 
+T_ii k_beyond(int rows, int columns, int row, int column) {
+  int t1;
+  int t2;
+  if ((row < 0)) {
+    t1 = (-row);
+    t2 = (column + (columns / 2));
+    row = t1;
+    column = t2;
+  } else {
+    if ((row > (rows - 1))) {
+      row = ((2 * (rows - 1)) - row);
+    }
+  }
+  return T_ii(row, ((column + columns) % columns));
+}
+
+float k_share_in(int row, int column, float t, float u) {
+  int rows;
+  int columns;
+  float total;
+  T_ii t1;
+  int i;
+  int j;
+  rows = conserving_gap_n0;
+  columns = conserving_gap_n1;
+  total = 0.0;
+  for (int a = 0; a < 4; ++a) {
+    for (int b = 0; b < 4; ++b) {
+      t1 = k_beyond(rows, columns, ((row + a) - 1), ((column + b) - 1));
+      i = t1.m0_;
+      j = t1.m1_;
+      total = (total + ((k_cubic_weight(a, t) * k_cubic_weight(b, u)) * F(conserving_gap_at + (i) * conserving_gap_n1 + j)));
+    }
+  }
+  return max(0.0, total);
+}
+
 float k_share_at(float x, float y, float z) {
   float t1;
   float t2;
   float t3;
-  int rows;
-  int columns;
   T_iiff t4;
   int row;
   int column;
   float t;
   float u;
-  float total;
-  T_ii t5;
-  int i;
-  int j;
   if ((z < 0.0)) {
     t1 = (-x);
     t2 = (-y);
@@ -1265,23 +1312,12 @@ float k_share_at(float x, float y, float z) {
     y = t2;
     z = t3;
   }
-  rows = conserving_gap_n0;
-  columns = conserving_gap_n1;
-  t4 = k_cell(rows, columns, x, y, z);
+  t4 = k_cell(conserving_gap_n0, conserving_gap_n1, x, y, z);
   row = t4.m0_;
   column = t4.m1_;
   t = t4.m2_;
   u = t4.m3_;
-  total = 0.0;
-  for (int a = 0; a < 4; ++a) {
-    for (int b = 0; b < 4; ++b) {
-      t5 = k_beyond(rows, columns, ((row + a) - 1), ((column + b) - 1));
-      i = t5.m0_;
-      j = t5.m1_;
-      total = (total + ((k_cubic_weight(a, t) * k_cubic_weight(b, u)) * F(conserving_gap_at + (i) * conserving_gap_n1 + j)));
-    }
-  }
-  return max(0.0, total);
+  return k_share_in(row, column, t, u);
 }
 
 float k_gap_towards(float x, float y, float z) {
@@ -1291,12 +1327,14 @@ float k_gap_towards(float x, float y, float z) {
   return min(1.0, k_share_at(x, y, z));
 }
 
-float k_share_of_gaps(float x, float y, float z) {
-  float open_to_it;
+float k_share_of_closed(float open_to_it) {
   float closed;
-  open_to_it = k_gap_towards(x, y, z);
   closed = max(0.0, ((1.0 - conserving_covered) - open_to_it));
   return mix(0.0, (closed / (1.0 - open_to_it)), (closed > 0.0));
+}
+
+float k_share_of_gaps(float x, float y, float z) {
+  return k_share_of_closed(k_gap_towards(x, y, z));
 }
 
 T_fff k_conserving_point_single(Place place, float on_surface, float on_volume, float ix, float iy, float iz, float ox, float oy, float oz) {

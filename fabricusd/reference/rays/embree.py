@@ -26,6 +26,8 @@ from fabricusd.scene.surface.embree_library import PATH, library
 
 LANES = 16
 ROWS = 24
+RAY_ROWS = 12
+"""Rows of the ray itself; the others are those of its hit."""
 """Rows of a packet: 21 in Embree 4.4 with instance arrays; the rest is room for later versions."""
 
 OX, OY, OZ, TNEAR, DX, DY, DZ, TIME, TFAR, MASK, ID, FLAGS = range(12)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fabricusd.kernels.real import LEAN, whole
+from fabricusd.kernels.real import INLINE, LEAN, whole
 from fabricusd.reference.rays.embree import (
     DX,
     DY,
@@ -19,6 +19,7 @@ from fabricusd.reference.rays.embree import (
     OY,
     OZ,
     PRIMITIVE,
+    RAY_ROWS,
     TFAR,
     TNEAR,
 )
@@ -30,22 +31,73 @@ from fabricusd.reference.surfaces.preview import opacity_at
 R = np.float32
 
 
+FAINT = 0.2
+"""Where less light than this passes a surface, chance decides whether a shadow ray goes on, with
+the expected light unchanged: the ray would bring next to nothing. Linen, which passes a third,
+would be noisier by it."""
+
+
+def share_that_goes_on(most: float) -> np.float32:
+    """The share of the blocked shadow rays that is looked at, if surfaces pass at most `most`."""
+    return np.float32(most if most < FAINT else 1.0)
+
+
 @njit(**LEAN)
-def settle(count, shadows, film, aovs):
-    """Add the light of the shadow rays that are not blocked."""
-    shadow_rays, shadow, shadow_path = shadows
+def settle(count, shadows, film, aovs, go_on):
+    """Add the light of the shadow rays that are not blocked, after `occluded`.
+
+    go_on : `share_that_goes_on`: this share of the blocked rays, with as much more light, is packed
+        to the front, ready for `intersect`, to see what passes
+    Returns the number of rays that are packed.
+    """
+    rays, shadow, shadow_path = shadows
+    bits = rays.view(np.uint32)
+    left = 0
     for k in range(whole(count)):
         signed = shadow_path[k]
+        p, lane = k >> 4, k & 15
+        if rays[p, TFAR, lane] < R(0):
+            if _chance(bits, p, lane, 0) < go_on:
+                q, place = left >> 4, left & 15
+                for row in range(RAY_ROWS):
+                    rays[q, row, place] = rays[p, row, lane]
+                for j in range(3):
+                    shadow[j, left] = shadow[j, k] / go_on
+                shadow[3, left] = shadow[3, k]
+                shadow_path[left] = signed
+                rays[q, TFAR, place] = shadow[3, left]
+                bits[q, GEOMETRY, place] = MISS
+                left += 1
+            continue
         path, row = whole(signed if signed >= 0 else -1 - signed), DIRECT
         if signed < 0:
             row = INDIRECT
-        if shadow_rays[k >> 4, TFAR, k & 15] < R(0):
-            continue
         if aovs and row == DIRECT:
             film[LIT, path] += shadow[0, k] + shadow[1, k] + shadow[2, k]
         film[row, path] += shadow[0, k]
         film[row + 1, path] += shadow[1, k]
         film[row + 2, path] += shadow[2, k]
+    _close(rays, left)
+    return left
+
+
+@njit(**INLINE)
+def _close(rays, count):
+    """Switch off the lanes behind `count` rays."""
+    for k in range(count, ((count + 15) >> 4) << 4):
+        rays[k >> 4, TNEAR, k & 15] = R(0)
+        rays[k >> 4, TFAR, k & 15] = R(-1)
+
+
+@njit(**INLINE)
+def _chance(bits, p, lane, number):
+    """Number `number` in [0, 1) from the bits of a ray, the same on every machine."""
+    x = np.uint32(bits[p, DX, lane] + np.uint32(number))
+    x ^= np.uint32(bits[p, DY, lane]) * np.uint32(0x9E3779B1)
+    x ^= np.uint32(bits[p, OX, lane]) * np.uint32(0x85EBCA77)
+    x = np.uint32(x ^ (x >> np.uint32(15))) * np.uint32(0x2C1B3C6D)
+    x = np.uint32(x ^ (x >> np.uint32(12))) * np.uint32(0x297A2D39)
+    return R(np.uint32(x ^ (x >> np.uint32(15))) >> np.uint32(8)) * R(1.0 / (1 << 24))
 
 
 @njit(**LEAN)
@@ -92,8 +144,10 @@ def thin_out(count, shadows, opacity, gaps, surfaces, triangles, epsilon, aovs, 
                 record[ST + 1] + u * record[D1 + 1] + v * record[D2 + 1],
             )  # fmt: skip
         through = R(1) - blocked
-        if through <= R(1e-4):
-            continue
+        if through < R(FAINT):
+            if through <= R(1e-4) or _chance(whole, p, lane, 1) * R(FAINT) >= through:
+                continue
+            through = R(FAINT)
         rest = rays[p, TFAR, lane]
         q, place = left >> 4, left & 15
         end = shadow[3, k]
@@ -111,7 +165,5 @@ def thin_out(count, shadows, opacity, gaps, surfaces, triangles, epsilon, aovs, 
         shadow[3, left] = rays[q, TFAR, place]
         whole[q, GEOMETRY, place] = MISS
         left += 1
-    for k in range(left, ((left + 15) >> 4) << 4):
-        rays[k >> 4, TNEAR, k & 15] = R(0)
-        rays[k >> 4, TFAR, k & 15] = R(-1)
+    _close(rays, left)
     return left

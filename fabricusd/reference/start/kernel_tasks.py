@@ -145,7 +145,7 @@ def _trace_and_settle() -> None:
     rays = Accelerator(scene.meshes[0].points, scene.meshes[0].triangles)
     rays.intersect(wave.lanes.rays, 0)
     rays.occluded(wave.lanes.rays, 0)
-    settle(0, wave.shadows, wave.film, False)
+    settle(0, wave.shadows, wave.film, False, R(0))
     thin_out(
         0, wave.shadows, np.ones(1, np.float32), np.zeros((0, *TABLE), np.float32),
         build_surfaces(scene), triangles, R(0), False, wave.film,

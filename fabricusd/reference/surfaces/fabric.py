@@ -15,8 +15,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabricusd.appearance.conserving.blocks import conserving_point_values
 from fabricusd.appearance.fuzz import Fuzz, optical_depth
 from fabricusd.appearance.law import (
+    CONSERVING_ONLY,
     PUBLISHED_ONLY,
     SurfaceLaw,
     law_density,
@@ -26,7 +28,8 @@ from fabricusd.appearance.law import (
 )
 from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.published.levels import point_values
-from fabricusd.appearance.sampling.blocks import Drawn, sample_points
+from fabricusd.appearance.sampling.blocks import Drawn, sample_points, sample_points_both
+from fabricusd.appearance.sampling.mixture import density, direction
 from fabricusd.appearance.scattering.models import translucent
 from fabricusd.appearance.shadow.methods import NONE, Shadow, compile_shadow, shade
 from fabricusd.appearance.surface import fuzz_of
@@ -64,7 +67,12 @@ from fabricusd.reference.rays.wave import (
     F,
     Wave,
 )
-from fabricusd.reference.surfaces.fabric_far import STRAIGHT, gather, shade_far
+from fabricusd.reference.surfaces.fabric_far import (
+    STRAIGHT,
+    gather,
+    shade_far,
+    shade_far_conserving,
+)
 from fabricusd.reference.surfaces.fabric_fuzz import lay_fuzz
 from fabricusd.reference.surfaces.fabric_gap import gap_table, pass_far, pass_gaps, pass_places
 
@@ -225,6 +233,12 @@ class FabricShader:
         if level == FAR_LEVEL and side.law.kind == PUBLISHED_ONLY:
             shade_far(R, side.law.published, side.law.lobes, self.is_open, hits, first, last)
             return
+        if level == FAR_LEVEL and side.law.kind == CONSERVING_ONLY:
+            shade_far_conserving(
+                R, side.law.conserving, side.law.conserving_lobes, self.sides[0].law.conserving,
+                self.is_open, hits, first, last,
+            )  # fmt: skip
+            return
         scratch = wave.scratch or _Scratch(wave.capacity)
         wave.scratch = scratch
         scattering = scratch.scattering(last - first)
@@ -244,7 +258,7 @@ class FabricShader:
         scattering: Scattering,
         passes: NDArray[np.float32],
     ) -> None:
-        """Shade hits at level `far` on cloth with `conserving` threads."""
+        """Shade hits at level `far` on cloth whose threads follow both laws."""
         count = len(passes)
         none, real = np.zeros(count, np.uint8), np.zeros(count, np.float32)
         points = Points(none, none.astype(np.int32), real, real, real, real, real, real[:0])
@@ -287,7 +301,22 @@ class FabricShader:
             point_values(*near, go, wo, onwards, 0, count)
             pass_gaps(R, law.published, self.is_open, wo, passes)
         else:
-            _by_law(R, law, level, hits, first, scattering, places)
+            if law.kind == CONSERVING_ONLY:
+                table, lobes, across_too = (
+                    law.conserving,
+                    law.conserving_lobes,
+                    level == THREAD_LEVEL,
+                )
+                sample_points_both(
+                    R, table.threads, lobes, across_too, places, wo, wi,
+                    tuple(hits[CHANCE : CHANCE + 3]), Drawn(go, hits[F_PDF], hits[GO_PDF]), first,
+                    count,
+                )  # fmt: skip
+                sample_gaps(R, lobes, places.sets, hits, first, scattering)
+                conserving_point_values(R, table, across_too, places, wi, wo, towards, 0, count)
+                conserving_point_values(R, table, across_too, places, go, wo, onwards, 0, count)
+            else:
+                _by_law(R, law, level, hits, first, scattering, places)
             pass_places(R, law.conserving, self.is_open, points.sets, wo, passes)
         finish_point(
             R, cloth, shadow, v_sign, law.kind == PUBLISHED_ONLY, side.types, hits, first,
@@ -297,7 +326,7 @@ class FabricShader:
 
 @njit(**LEAN)
 def _by_law(R, law, level, hits, first, scattering, places):
-    """Sample and evaluate cloth with `conserving` threads, one hit at a time."""
+    """Sample and evaluate cloth whose threads follow both laws, one hit at a time."""
     wo, wi, go, towards, onwards = scattering
     for k in range(wo.shape[1]):
         h = first + k
@@ -319,6 +348,23 @@ def _by_law(R, law, level, hits, first, scattering, places):
             else:
                 hits[F_PDF, h] = pdf
                 towards[0, k], towards[1, k], towards[2, k] = red, green, blue
+
+
+@njit(**KERNEL)
+def sample_gaps(R, lobes, sets, hits, first, scattering):
+    """Sample hits in gaps as the whole repeat: what does not pass there is scattered like that."""
+    wo, wi, go, _, _ = scattering
+    for k in range(wo.shape[1]):
+        if sets[k] <= WARP:
+            continue
+        h = first + k
+        ox, oy, oz = wo[0, k], wo[1, k], wo[2, k]
+        x, y, z = direction(
+            R, lobes, ox, oy, oz, hits[CHANCE, h], hits[CHANCE + 1, h], hits[CHANCE + 2, h]
+        )
+        go[0, k], go[1, k], go[2, k] = x, y, z
+        hits[GO_PDF, h] = density(R, lobes, x, y, z, ox, oy, oz)
+        hits[F_PDF, h] = density(R, lobes, wi[0, k], wi[1, k], wi[2, k], ox, oy, oz)
 
 
 @njit(**INLINE)

@@ -1,4 +1,4 @@
-"""Shading of cloth with the published law at level `far`, one block of hits at a time.
+"""Shading of cloth at level `far` with one law alone, one block of hits at a time.
 
 A block goes through sampling and evaluation while it stays in the first-level cache.
 """
@@ -9,8 +9,10 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance import laws
+from fabricusd.appearance.conserving.blocks import conserving_far_values
+from fabricusd.appearance.conserving.levels import gap_towards
 from fabricusd.appearance.published.far import far_values
-from fabricusd.appearance.sampling.blocks import Drawn, sample_far
+from fabricusd.appearance.sampling.blocks import Drawn, sample_far, sample_far_both
 from fabricusd.kernels.real import BLOCK, KERNEL, LEAN, as_part
 from fabricusd.reference.rays.wave import CHANCE, F_PDF, GO, GO_PDF, KEEP, THREAD, WEIGHT, WI, WO, F
 
@@ -63,6 +65,9 @@ def finish_far(R, hits, first, count, passes, go, towards, onwards):
 _gather, _sample_far, _far_values, _finish_far = (
     as_part(kernel) for kernel in (gather, sample_far, far_values, finish_far)
 )
+_sample_far_both, _conserving_far_values = (
+    as_part(kernel) for kernel in (sample_far_both, conserving_far_values)
+)
 
 
 @njit(**KERNEL)
@@ -84,4 +89,23 @@ def shade_far(R, tables, sampling, is_open, hits, first, last):
         _far_values(R, tables, go, wo, onwards, 0, size)
         for k in range(size):
             passes[k] = is_open * laws.openness(R, tables, wo[0, k], wo[1, k], wo[2, k])
+        _finish_far(R, hits, start, size, passes, go, towards, onwards)
+
+
+@njit(**KERNEL)
+def shade_far_conserving(R, tables, sampling, front, is_open, hits, first, last):
+    """`shade_far` with the conserving law; front : its tables of the cloth's front, for the gaps"""
+    wo, wi = np.empty((3, BLOCK), np.float32), np.empty((3, BLOCK), np.float32)
+    go, towards = np.empty((3, BLOCK), np.float32), np.empty((3, BLOCK), np.float32)
+    onwards, passes = np.empty((3, BLOCK), np.float32), np.empty(BLOCK, np.float32)
+    for start in range(first, last, BLOCK):
+        size = min(BLOCK, last - start)
+        _gather(hits, start, size, wo, wi)
+        numbers = hits[CHANCE], hits[CHANCE + 1], hits[CHANCE + 2]
+        drawn = Drawn(go, hits[F_PDF], hits[GO_PDF])
+        _sample_far_both(R, sampling, wo, wi, numbers, drawn, start, size)
+        _conserving_far_values(R, tables, wi, wo, towards, 0, size)
+        _conserving_far_values(R, tables, go, wo, onwards, 0, size)
+        for k in range(size):
+            passes[k] = is_open * gap_towards(R, front, wo[0, k], wo[1, k], wo[2, k])
         _finish_far(R, hits, start, size, passes, go, towards, onwards)

@@ -11,6 +11,7 @@ from fabricusd.appearance import plain
 from fabricusd.appearance.conserving import facets, levels, multiple
 from fabricusd.appearance.conserving import single as conserving
 from fabricusd.appearance.conserving.by_side import by_side
+from fabricusd.appearance.conserving.grid import without_border
 from fabricusd.appearance.conserving.shares import conserving_mixture
 from fabricusd.appearance.sampling.mixture import density, direction
 from fabricusd.appearance.weave.place import Place
@@ -94,7 +95,9 @@ def test_single_scattering_agrees_with_the_plain_version(name):
     fabric = replace(CLOTHS[name], opaque=False)
     tables = multiple.conserving_tables(fabric, multiple=False, rule=rule)
     got = _value(tables, wi, wo)
-    want = plain.conserving_far(CLOTHS[name], wi, wo, sides=tables.sides)
+    want = plain.conserving_far(
+        CLOTHS[name], wi, wo, sides=None if tables.sides.size == 0 else without_border(tables.sides)
+    )
     # The two integrate the curves differently; q = 1/cos makes pile converge slowly.
     bound = 1e-2 if name == "velvet" else 1e-3
     assert np.abs(got - want).mean() < bound * want.mean()

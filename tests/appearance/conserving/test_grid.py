@@ -4,18 +4,25 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance import plain
-from fabricusd.appearance.conserving.grid import entry_angles, mean_share, share_at, side_at
+from fabricusd.appearance.conserving.grid import (
+    bordered,
+    entry_angles,
+    mean_share,
+    share_at,
+    side_at,
+    without_border,
+)
 from fabricusd.kernels.real import KERNEL
 
 ROWS, COLUMNS = 9, 12
 
 
 @njit(**KERNEL)
-def _read(R, sides, w, out):
+def _read(R, sides, table, w, out):
     for k in range(len(w)):
         a, b, c = side_at(R, sides, 1, w[k, 0], w[k, 1], w[k, 2])
         out[k, 0], out[k, 1], out[k, 2] = a, b, c
-        out[k, 3] = share_at(R, sides[1, :, :, 0], w[k, 0], w[k, 1], w[k, 2])
+        out[k, 3] = share_at(R, table, w[k, 0], w[k, 1], w[k, 2])
 
 
 def _entries(w):
@@ -23,7 +30,9 @@ def _entries(w):
     # The pole is one direction.
     table[:, 0] = table[:, 0, :1]
     out = np.empty((len(w), 4))
-    _read(np.float64, table, w, out)
+    sides = bordered(table)
+    np.testing.assert_array_equal(without_border(sides), table)
+    _read(np.float64, sides, np.ascontiguousarray(table[1, :, :, 0]), w, out)
     return table[1], out
 
 

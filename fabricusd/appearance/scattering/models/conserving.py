@@ -49,8 +49,10 @@ from fabricusd.appearance.scattering.lobes import (
     longitudinal_constants,
 )
 from fabricusd.appearance.scattering.model import CONSERVING, Floats, ThreadModel
+from fabricusd.cache import kept
 from fabricusd.fabric import Thread
-from fabricusd.kernels.real import INLINE, KERNEL
+from fabricusd.kernels.cache import fingerprint
+from fabricusd.kernels.real import INLINE, KERNEL, whole
 
 _PIECES = 6
 """Subdivisions of each interval of the quadrature, each with _NODES Gauss-Legendre points."""
@@ -85,27 +87,36 @@ def lobe_constants(gamma: float) -> tuple[float, float]:
 
 
 @njit(**INLINE)
-def tabulated(R, row, cos_theta):
-    """(T, x/sqrt(2 pi X)): the transmittance of the surface, and the light that is lost.
+def position(R, cos_theta):
+    """Place of an inclination in the tables, from 0 to TRANSMISSION_ENTRIES - 1.
 
     The entries are uniform in sqrt(cos theta). Both are even in theta and therefore smooth in the
     cosine, and they are steep only within the lobe's width of 90 degrees, where this spacing is
     finest.
     """
-    position = math.sqrt(cos_theta) * R(TRANSMISSION_ENTRIES - 1)
-    index = np.int32(min(position, R(TRANSMISSION_ENTRIES - 1)))
-    part = position - R(index)
-    through, lost = row[TRANSMISSION + index], row[COMPLETION + index]
-    through += part * (row[TRANSMISSION + 1 + index] - through)
-    lost += part * (row[COMPLETION + 1 + index] - lost)
+    return min(math.sqrt(cos_theta) * R(TRANSMISSION_ENTRIES - 1), R(TRANSMISSION_ENTRIES - 1))
+
+
+@njit(**INLINE)
+def read(R, row, place):
+    """(T, x/sqrt(2 pi X)) at a `position`."""
+    entry = whole(np.int32(place))
+    part = place - R(entry)
+    through, lost = row[TRANSMISSION + entry], row[COMPLETION + entry]
+    through += part * (row[TRANSMISSION + 1 + entry] - through)
+    lost += part * (row[COMPLETION + 1 + entry] - lost)
     return through, lost
 
 
 @njit(**INLINE)
-def looked_up(R, row, cos_i, cos_o):
+def tabulated(R, row, cos_theta):
+    """(T, x/sqrt(2 pi X)): the transmittance of the surface, and the light that is lost."""
+    return read(R, row, position(R, cos_theta))
+
+
+@njit(**INLINE)
+def looked_up(R, row, through_i, lost_i, through_o, lost_o):
     """(T(theta_i) T(theta_o)/T_max, x(theta_i) x(theta_o)/(2 pi X))."""
-    through_i, lost_i = tabulated(R, row, cos_i)
-    through_o, lost_o = tabulated(R, row, cos_o)
     return through_i * through_o * row[INVERSE_T_MAX], lost_i * lost_o
 
 
@@ -145,13 +156,18 @@ def surface_albedo(
     row[SURFACE_GAIN] = surface_gain
     row[GAMMA_SURFACE] = gamma_surface
     row[SURFACE_LOBE : SURFACE_LOBE + 2] = lobe_constants(gamma_surface)
+    key = (fingerprint(), ior, gamma_surface, surface_gain, entries)
+    albedo = kept("thread-surface", key, lambda: _surface_albedo(row, entries))
+    albedo.flags.writeable = False
+    return albedo
+
+
+def _surface_albedo(row: Floats, entries: int) -> Floats:
     albedo = np.empty(entries)
     x, x_weight = np.polynomial.legendre.leggauss(_NODES)
     y, y_weight = np.polynomial.legendre.leggauss(_AZIMUTHS)
     _integrate_surface(row, x, x_weight, (y + 1) * math.pi / 2, y_weight * math.pi, albedo)
-    albedo = np.clip(_filled(albedo), 0.0, 1.0)
-    albedo.flags.writeable = False
-    return albedo
+    return np.asarray(np.clip(_filled(albedo), 0.0, 1.0))
 
 
 @njit(**KERNEL)
@@ -223,7 +239,20 @@ def lost_energy(
         0, and x with it, where that is below LEAST_NORM
     entries : as in `surface_albedo`
     """
-    through = 1.0 - surface_albedo(gamma_surface, ior, surface_gain, entries)
+    key = (fingerprint(), gamma_surface, ior, surface_gain, gamma_volume, isotropic, entries)
+    held = kept(
+        "thread-lost", key,
+        lambda: _lost_energy(
+            1.0 - surface_albedo(gamma_surface, ior, surface_gain, entries), gamma_volume,
+            isotropic, entries,
+        ),
+    )  # fmt: skip
+    held.flags.writeable = False
+    return held[:-1], float(held[-1])
+
+
+def _lost_energy(through: Floats, gamma_volume: float, isotropic: float, entries: int) -> Floats:
+    """x, and X behind it."""
     volume = np.zeros(entries)
     largest = float(through.max())
     if largest > 0.0:
@@ -240,8 +269,7 @@ def lost_energy(
     norm = cosine_square_integral(lost)
     if norm < LEAST_NORM:
         lost, norm = np.zeros_like(lost), 0.0
-    lost.flags.writeable = False
-    return lost, norm
+    return np.append(lost, norm)
 
 
 def cosine_square_integral(entries: Floats) -> float:
@@ -390,6 +418,8 @@ MODEL = ThreadModel(
     factors=factors,
     lobes=lobes,
     lobe_constants=lobe_constants,
+    position=position,
+    read=read,
     looked_up=looked_up,
     transmission=thread_transmission,
     completion=thread_completion,
