@@ -7,13 +7,13 @@ const made = new Map(), MOST_MADE = 12;  // sides that the server made, by what 
 // What tables depend on; without the numbers that the page can write into them.
 function wovenOf(s) {
   const { threads } = data.sides.front, { live } = data.sides[s.side];
-  return JSON.stringify([s.cloth, s.side, s.weave, s.coverage,
+  return JSON.stringify([s.cloth, s.side, s.weave, s.coverage, s.density,
     s.threads.map((t, k) => t.filter((_, n) => !(live && threads[k].controls[n].live)))]);
 }
-const wholeOf = s => JSON.stringify([s.cloth, s.side, s.weave, s.coverage, s.threads]);
+const wholeOf = s => JSON.stringify([s.cloth, s.side, s.weave, s.coverage, s.density, s.threads]);
 
 // The state of a cloth as it was opened, from one side.
-const unedited = (number, side) => ({ cloth: number, side, weave: '', coverage: [-1, -1], threads: valuesOf(cloths.get(number)) });
+const unedited = (number, side) => ({ cloth: number, side, ...copy(OWN), threads: valuesOf(cloths.get(number)) });
 
 function showCloth() {
   if (data !== cloths.get(state.cloth)) data = cloths.get(state.cloth);
@@ -53,9 +53,9 @@ function makeLater(whole) {
     if (whole !== wholeOf(state)) return;
     asking = true;
     busy('making tables');
-    const { cloth: number, side, threads, weave, coverage } = state, woven = wovenOf(state);
+    const { side } = state, woven = wovenOf(state);
     try {
-      const found = await ask('/fabric', { cloth: number, side, threads, weave, coverage });
+      const found = await ask('/fabric', { side, ...changes() });
       made.set(whole, { ...found.side, swatch: found.swatch, whole, woven });
       if (made.size > MOST_MADE) made.delete(made.keys().next().value);
       trouble('');
@@ -82,6 +82,20 @@ function writeThread(k, values) {
   put('lobes', [...lobe(said.surface), ...lobe(said.volume)]);
 }
 
+// Where an input of a group goes: a fold of its own, closed until somebody opens it.
+function folded(box, folds, group) {
+  if (!group) return box;
+  if (!folds.has(group)) {
+    const fold = document.createElement('details'), said = document.createElement('summary');
+    said.textContent = group;
+    fold.id = `${box.id} ${group}`;
+    fold.append(said);
+    box.append(fold);
+    folds.set(group, fold);
+  }
+  return folds.get(group);
+}
+
 // The inputs of this cloth's threads, in place of those of another.
 function makeThreads() {
   for (const input of threadInputs) controls.splice(controls.indexOf(input), 1);
@@ -97,7 +111,8 @@ function makeThreads() {
     box.append(legend);
     by('threads').append(box);
     const reached = thread.controls.filter(control => served || control.live);
-    thread.controls.forEach((control, n) => threadInputs.push(number(box, {
+    const folds = new Map();
+    thread.controls.forEach((control, n) => threadInputs.push(number(folded(box, folds, control.group), {
       ...control, get: s => s.threads[k][n], set: (s, v) => { s.threads[k][n] = v; },
       without: served || control.live ? '' : `${control.label} ${NEEDS_SERVER}`,
     })));

@@ -21,12 +21,12 @@ async function trace() {
   by('trace').disabled = true;
   busy('path tracing');
   const of = viewKey(), { eye, right, up } = placed(), { key_power: key, even, slope } = lights();
-  const { cloth: number, side, shape, threads, weave, coverage, grain, azimuth, elevation } = state;
+  const { side, shape, grain, azimuth, elevation } = state;
   const { clientWidth, clientHeight } = canvas;
   const size = Math.max(16, Math.min(MOST_TRACED, clientWidth, clientHeight));
   try {
     takeTraced(await ask('/render', {
-      cloth: number, side, shape, threads, weave, coverage, grain, azimuth, elevation, key, even, slope, eye, right, up,
+      ...changes(), side, shape, grain, azimuth, elevation, key, even, slope, eye, right, up,
       focal: data.focal, size, samples: Math.round(+by('samples').value) || 64, level: LEVELS[levelFor(metresPerPixel() * Math.min(canvas.width, canvas.height) / size)],
     }), of);
     trouble('');
@@ -51,7 +51,7 @@ function takeTraced(found, of) {
 // The file's own picture is of the view that the page began with.
 function showHeld() {
   change(s => {
-    for (const name of ['shape', 'grain', 'azimuth', 'elevation', 'key', 'sky', 'side', 'threads', 'weave', 'coverage']) s[name] = copy(first[name]);
+    for (const name of ['shape', 'grain', 'azimuth', 'elevation', 'key', 'sky', 'side', 'threads', ...Object.keys(OWN)]) s[name] = copy(first[name]);
     s.level = data.reference.level;
   });
   frameShape();

@@ -11,7 +11,7 @@ async function openFile(file) {
     for (let k = 0; k < bytes.length; k += 32768) text += String.fromCharCode(...bytes.subarray(k, k + 32768));
     const found = await ask('/open', { name: file.name, data: btoa(text) });
     cloths.set(found.cloth, found);
-    change(s => Object.assign(s, { cloth: found.cloth, threads: valuesOf(found), weave: '', coverage: [-1, -1] }));
+    change(s => Object.assign(s, { cloth: found.cloth, threads: valuesOf(found), ...copy(OWN) }));
     trouble('');
     tell([`${file.name} is open.`, ...found.notes].join(' '));
   } catch (error) {
@@ -22,10 +22,9 @@ async function openFile(file) {
 }
 
 async function saveVariant() {
-  const { cloth: number, threads, weave, coverage } = state;
   busy('saving');
   try {
-    const found = await ask('/save', { cloth: number, threads, weave, coverage, variant: by('variant').value.trim() });
+    const found = await ask('/save', { ...changes(), variant: by('variant').value.trim() });
     trouble('');
     tell(`${found.file} has the variant ${found.variant}, which sets ${found.set.length} values.`);
   } catch (error) {

@@ -115,6 +115,7 @@ def side_data(fabric: Fabric, *, back: bool = False, live: bool = True) -> dict[
         ),
         "ends": ends, "picks": picks,
         "coverage": [float(covered.area[WARP]), float(covered.area[WEFT])],
+        "density": [fabric.warp.density / 100.0, fabric.weft.density / 100.0],
     }  # fmt: skip
 
 

@@ -24,11 +24,13 @@ function start() {
   }
 }
 
+// The weave, what it covers and how dense it is, as the cloth itself says.
+const OWN = { weave: '', coverage: [-1, -1], density: [-1, -1] };
 const valuesOf = d => d.sides.front.threads.map(t => [...t.values]);
 const first = {
   shape: Object.keys(data.meshes)[0], level: data.level, tone: 0, exposure: 0, grain: 0,
   azimuth: data.light.azimuth, elevation: data.light.elevation, key: data.light.key_power, sky: data.light.even,
-  side: 'front', cloth: 0, threads: valuesOf(data), weave: '', coverage: [-1, -1],
+  side: 'front', cloth: 0, threads: valuesOf(data), ...copy(OWN),
 };
 let state = copy(first), past = [], future = [];
 const controls = [];  // each { show() } brings an input up to the state
@@ -47,6 +49,9 @@ function restored(text) {
     return { ...found, cloth: 0 };
   } catch { return copy(first); }
 }
+
+// What a request to the server says of the cloth.
+const changes = () => ({ cloth: state.cloth, threads: state.threads, weave: state.weave, coverage: state.coverage, density: state.density });
 
 function change(edit, { again = true, key = '' } = {}) {
   const before = copy(state);
@@ -87,7 +92,7 @@ let keeping = 0;
 function keep() {
   clearTimeout(keeping);
   // Cloth that was opened is the server's: a URL could not bring it back.
-  const { cloth: number, threads, weave, coverage, ...rest } = state;
-  const said = number ? rest : { ...rest, threads, coverage, ...(weave.length < 1000 ? { weave } : {}) };
+  const { cloth: number, threads, weave, coverage, density, ...rest } = state;
+  const said = number ? rest : { ...rest, threads, coverage, density, ...(weave.length < 1000 ? { weave } : {}) };
   keeping = setTimeout(() => history.replaceState(null, '', `#${encodeURIComponent(JSON.stringify(said))}`), 300);
 }

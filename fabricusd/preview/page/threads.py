@@ -17,7 +17,12 @@ DEGREE = math.pi / 180.0
 
 @dataclass(frozen=True, kw_only=True)
 class Number:
-    """A number of a thread. channel : index into a field of three numbers; unit : of the page's."""
+    """A number of a thread.
+
+    channel : index into a field of several numbers; unit : of the page's; group : the heading under
+    which the page folds it away, or ""; without : what is shown where the thread has 0 for "not
+    stated", and is stated along with what needs it
+    """
 
     name: str
     label: str
@@ -26,11 +31,15 @@ class Number:
     step: float = 0.01
     scale: float = 1.0
     unit: str = ""
+    group: str = ""
+    without: float = 0.0
 
     def of(self, thread: Thread) -> float:
         """Its value, in the page's unit."""
-        held = getattr(thread, self.field)
-        return float(held[self.channel] if self.channel >= 0 else held) / self.scale
+        held: Any = thread.curve.angles if self.field == "curve" else getattr(thread, self.field)
+        one = float(held[self.channel] if self.channel >= 0 else held)
+        # Rounded, so that a length of 10 mm is written as 10.
+        return float(f"{one / self.scale:.12g}") or self.without
 
     def range_of(self, thread: Thread, conserving: bool) -> tuple[float, float]:
         """Least and largest value that the page offers, the thread's own among them."""
@@ -41,10 +50,15 @@ class Number:
         ranges = {
             "ior": (1.0, 3.0), "isotropic": (0.0, 1.0), "gamma_surface": (surface, 60.0),
             "gamma_volume": (min(surface, volume), 90.0), "surface_gain": (0.0, 2.0),
-            "hairiness": (0.0, 20.0),
+            "hairiness": (0.0, 20.0), "curve": (-85.0, 85.0), "unevenness_cv": (0.0, 40.0),
+            "unevenness_count": (0.0, 20.0), "unevenness_shade": (0.0, 20.0),
+            "unevenness_length": (0.5, 200.0), "slub_amount": (0.0, 4.0),
+            "slub_length": (1.0, 200.0), "slub_spacing": (1.0, 2000.0), "plies": (1.0, 12.0),
+            "twist": (-2000.0, 2000.0),
         }  # fmt: skip
         low, high = ranges[self.field]
-        return low, max(high, self.of(thread))
+        own = self.of(thread)
+        return min(low, own), max(high, own)
 
 
 NUMBERS = (
@@ -60,16 +74,47 @@ NUMBERS = (
     Number(name="gain", label="Gain", field="surface_gain"),
     Number(name="hairiness", label="Hairiness", field="hairiness", step=0.1, unit="H"),
 )
-"""In the order in which the page holds them."""
+"""In the order in which the page holds them; those of the curve and of the yarn follow."""
+
+MILLIMETRE, PERCENT = 1e-3, 0.01
+_YARN = "Yarn, as the path tracer shows it"
+YARN = (
+    Number(name="cv", label="CVm", field="unevenness_cv", step=0.5, scale=PERCENT, unit="%",
+           group=_YARN),
+    Number(name="count", label="From thread to thread", field="unevenness_count", step=0.5,
+           scale=PERCENT, unit="%", group=_YARN),
+    Number(name="shade", label="Shade", field="unevenness_shade", step=0.5, scale=PERCENT,
+           unit="%", group=_YARN),
+    Number(name="length", label="Over", field="unevenness_length", step=0.5, scale=MILLIMETRE,
+           unit="mm", group=_YARN, without=10.0),
+    Number(name="slub", label="Slubs", field="slub_amount", step=0.05, group=_YARN),
+    Number(name="slub length", label="Slub length", field="slub_length", step=1,
+           scale=MILLIMETRE, unit="mm", group=_YARN, without=20.0),
+    Number(name="slub spacing", label="Slub spacing", field="slub_spacing", step=1,
+           scale=MILLIMETRE, unit="mm", group=_YARN, without=100.0),
+    Number(name="plies", label="Plies", field="plies", step=1, group=_YARN),
+    Number(name="twist", label="Twist", field="twist", step=10, unit="turns/m", group=_YARN),
+)  # fmt: skip
+"""What `fabric.Thread` says of uneven yarn; the page itself draws threads even."""
+
+MOST_ANGLES = 16
+"""Angles of the longest curve that the page has controls for."""
 
 ON_PAGE = ("red", "green", "blue", "ior", "isotropic", "surface", "volume")
 """Numbers of published threads that the page itself writes into its tables."""
 
 
 def shown_numbers(fabric: Fabric, thread: Thread) -> tuple[Number, ...]:
-    """The numbers that a thread's model reads."""
+    """The numbers that a thread's model reads, the angles of its curve, and those of its yarn."""
     gain = fabric.model_of(thread) == CONSERVING_MODEL
-    return tuple(n for n in NUMBERS if gain or n.field != "surface_gain")
+    own = tuple(n for n in NUMBERS if gain or n.field != "surface_gain")
+    angles = len(thread.curve.angles)
+    curve = tuple(
+        Number(name=f"angle {k}", label=f"Angle {k + 1}", field="curve", channel=k, step=0.5,
+               scale=DEGREE, unit="°", group="Curve, along a run")
+        for k in range(angles if angles <= MOST_ANGLES else 0)
+    )  # fmt: skip
+    return own + curve + YARN
 
 
 def is_live(fabric: Fabric) -> bool:
@@ -94,7 +139,7 @@ def thread_controls(fabric: Fabric) -> list[dict[str, Any]]:
             rows.append(
                 {
                     "name": number.name, "label": number.label, "low": low, "high": high,
-                    "step": number.step, "unit": number.unit,
+                    "step": number.step, "unit": number.unit, "group": number.group,
                     "live": live and number.name in ON_PAGE,
                 }
             )  # fmt: skip
@@ -138,13 +183,34 @@ def _changed(
                 f"thread {name} {number.name}",
                 f"is {value:g}; it must be from {low:g} to {high:g} {number.unit}".rstrip(),
             )
-        if number.channel < 0:
+        if number.field == "curve":
+            curve = fields.get("curve", thread.curve)
+            angles = list(curve.angles)
+            angles[number.channel] = value * DEGREE
+            fields["curve"] = replace(curve, angles=tuple(angles))
+        elif number.channel >= 0:
+            held = list(fields.get(number.field, getattr(thread, number.field)))
+            held[number.channel] = value
+            fields[number.field] = tuple(held)
+        elif number.field == "plies":
+            fields["plies"] = round(value)
+        else:
             fields[number.field] = value * number.scale
-            continue
-        held = list(fields.get(number.field, getattr(thread, number.field)))
-        held[number.channel] = value
-        fields[number.field] = tuple(held)
     if not fields:
         return thread
+    for number, value in values:
+        # What is shown where nothing is stated holds as soon as something needs it.
+        if number.without and value == number.of(thread) and not getattr(thread, number.field):
+            needs = any(fields.get(name) for name in _NEEDS[number.field])
+            if needs:
+                fields[number.field] = value * number.scale
     # The albedo that is shown is the one that is kept, whatever colour it once made.
     return replace(thread, **fields, target_basis=BASES[0])
+
+
+_NEEDS = {
+    "unevenness_length": ("unevenness_cv", "unevenness_shade"),
+    "slub_length": ("slub_amount",),
+    "slub_spacing": ("slub_amount",),
+}
+"""The fields that make no sense without a field of YARN."""

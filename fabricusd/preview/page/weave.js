@@ -71,7 +71,13 @@ function makeWeave() {
       },
     });
   }
-  for (const [label, k] of [['Ends', 0], ['Picks', 1]]) {
+  for (const k of [0, 1]) {
+    number('coverage', {
+      label: k ? 'Picks' : 'Ends', unit: 'per cm', low: 0.5, high: 400, step: 0.5, without,
+      get: s => (s.density[k] < 0 ? cloth.density[k] : s.density[k]), set: (s, v) => { s.density[k] = v; },
+    });
+  }
+  for (const [label, k] of [['Ends of the repeat', 0], ['Picks of the repeat', 1]]) {
     number('repeat', {
       label, low: 1, high: MOST_ENDS, step: 1, without, get: () => (k ? rowsNow().length : rowsNow()[0]?.length ?? 0),
       set: (s, v) => {
@@ -82,7 +88,7 @@ function makeWeave() {
       },
     });
   }
-  by('ownWeave').onclick = () => change(s => { s.weave = ''; s.coverage = [-1, -1]; });
+  by('ownWeave').onclick = () => change(s => { Object.assign(s, copy(OWN)); });
   grid.onfocus = grid.onblur = () => showWeave();
   if (!served) {
     by('ownWeave').disabled = true;

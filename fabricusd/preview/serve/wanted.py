@@ -18,7 +18,12 @@ MOST_CELLS = 1 << 18
 MOST_THREADS = 256
 """Threads of the largest fabric that is served."""
 
-CHANGES: Mapping[str, type] = {"threads": list, "weave": str, "coverage": list}
+DENSITIES = (0.5, 400.0)
+"""Least and most threads per centimetre that are served."""
+
+CHANGES: Mapping[str, type] = {
+    "threads": list, "weave": str, "coverage": list, "density": list
+}  # fmt: skip
 """What a page may change: see `changed`."""
 
 
@@ -28,6 +33,7 @@ def changed(fabric: Fabric, said: Mapping[str, Any]) -> Fabric:
     threads : a list of numbers for each thread, as `page.threads` has them
     weave : rows of 0 and 1 from the first pick on, with `/` between them; "" for the fabric's own
     coverage : of warp and weft, from 0 to 1; -1 for the fabric's own
+    density : of warp and weft [1/cm]; -1 for the fabric's own
 
     Raises FabricError for changes that make no fabric.
     """
@@ -41,17 +47,17 @@ def changed(fabric: Fabric, said: Mapping[str, Any]) -> Fabric:
         fabric = with_numbers(fabric, lists)
     if text := said.get("weave"):
         fabric = replace(fabric, weave=_woven(fabric, text))
-    if asked := said.get("coverage"):
+    sets = {which: getattr(fabric, which) for which in ("warp", "weft")}
+    for name, low, high, unit in (("coverage", 0.0, 1.0, 1.0), ("density", *DENSITIES, 100.0)):
+        asked = said.get(name) or [-1, -1]
         if len(asked) != 2:
-            raise FabricError("coverage", f"has {len(asked)} numbers; it must have 2")
-        sets = {}
-        for which, value in zip(("warp", "weft"), asked, strict=True):
+            raise FabricError(name, f"has {len(asked)} numbers; it must have 2")
+        for which, value in zip(sets, asked, strict=True):
             if value != -1:
-                share = number(f"coverage of the {which}", value, 0.0, 1.0)
-                sets[which] = replace(getattr(fabric, which), coverage=share)
-        # One at a time they might cover more than the cloth.
-        fabric = replace(fabric, **sets)
-    return fabric
+                found = number(f"{name} of the {which}", value, low, high) * unit
+                sets[which] = replace(sets[which], **{name: found})
+    # One at a time they might cover more than the cloth.
+    return replace(fabric, **sets)
 
 
 def _woven(fabric: Fabric, text: str) -> Weave:

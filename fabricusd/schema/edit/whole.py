@@ -16,7 +16,7 @@ from fabricusd.files import whole_file
 from fabricusd.schema import attributes
 from fabricusd.schema.access import thread_prims
 from fabricusd.schema.access import value as composed
-from fabricusd.schema.attributes import Attribute
+from fabricusd.schema.attributes import DEGREE, Attribute, unscale
 from fabricusd.schema.edit.dye import Value
 from fabricusd.schema.edit.edit import author, format_of, held_in_file, named
 from fabricusd.schema.edit.variant import Variant, names_of
@@ -94,6 +94,9 @@ def _wanted(prim: Usd.Prim, threads: Sequence[Usd.Prim], fabric: Fabric) -> Iter
         if thread.target_basis == "none":
             table = tuple(entry for entry in table if entry.field != "target_color")
         yield from _all(at, (*table, attributes.TARGET_BASIS), thread, Thread)
+        degrees = [unscale(a, DEGREE) for a in thread.curve.angles]
+        for name, numbers in (("positions", thread.curve.positions), ("angles", degrees)):
+            yield at, named(at, f"thread:curve:{name}")[0], Vt.DoubleArray(numbers)
     for which, threads_of in (("warp", fabric.warp), ("weft", fabric.weft)):
         yield from _all(prim, attributes.thread_set(which), threads_of, ThreadSet)
     rows = weave_rows.from_cells(fabric.weave.cells)

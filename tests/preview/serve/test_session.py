@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 
 import pytest
 
@@ -26,14 +28,24 @@ def test_a_variant_is_saved_that_check_passes(tmp_path):
     session = Session(Fabric(), lights=Lights(), save=file)
     numbers = [thread["values"] for thread in thread_controls(Fabric())]
     numbers[0][0] = 0.55
+    names = [control["name"] for control in thread_controls(Fabric())[0]["controls"]]
+    for name, value in (("angle 1", 30.0), ("cv", 12.0), ("plies", 2)):
+        numbers[0][names.index(name)] = value
     said = answered(
-        session, "/save", variant="claret", threads=numbers, weave="10/11", coverage=[0.25, 0.5]
-    )
+        session, "/save", variant="claret", threads=numbers, weave="10/11", coverage=[0.25, 0.5],
+        density=[-1, 24.0],
+    )  # fmt: skip
     assert said["file"] == "look.usda"
     answered(session, "/save", variant="plain")
     assert check(file) == []
     claret = load(f"{file}{{fabricVariant=claret}}")
     assert claret.threads["Thread"].albedo == (0.55, 0.2, 0.2)
+    thread = claret.threads["Thread"]
+    assert thread.curve.angles == pytest.approx((0.0, math.radians(30)))
+    yarn = thread.unevenness_cv, thread.unevenness_length, thread.plies
+    assert yarn == pytest.approx((0.12, 0.01, 2))
+    assert claret.weft.density == pytest.approx(2400)
+    assert claret.warp == replace(Fabric().warp, coverage=0.25)
     assert claret.weave.cells.tolist() == [[True, True], [False, True]]
     assert (claret.warp.coverage, claret.weft.coverage) == (0.25, 0.5)
     for other in ("plain", "original"):

@@ -9,7 +9,7 @@ import pytest
 
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, Thread, Weave
-from fabricusd.preview.page.threads import NUMBERS, shown_numbers, thread_controls
+from fabricusd.preview.page.threads import NUMBERS, YARN, shown_numbers, thread_controls
 from fabricusd.preview.serve import wanted
 from fabricusd.preview.serve.wanted import changed
 
@@ -29,6 +29,13 @@ def test_the_page_s_own_numbers_change_nothing():
         assert changed(fabric, said) == fabric
 
 
+STATED_TOO = {
+    "cv": ("unevenness_length",), "shade": ("unevenness_length",),
+    "slub": ("slub_length", "slub_spacing"),
+}  # fmt: skip
+"""Fields that a number of uneven yarn brings along, by the number's name."""
+
+
 @pytest.mark.parametrize("model", ["microcylinder", "conserving"])
 def test_each_number_changes_its_own_field_and_no_other(model):
     fabric = replace(TWO, model=model)
@@ -38,13 +45,34 @@ def test_each_number_changes_its_own_field_and_no_other(model):
         said = numbers_of(fabric)
         low, high = number.range_of(fabric.threads["Warp"], model == "conserving")
         said[0][k] = low + 0.75 * (high - low)
+        if number.name == "plies":
+            said[0][k] = round(said[0][k])
         found = changed(fabric, {"threads": said})
         assert found.threads["Weft"] == fabric.threads["Weft"]
         assert numbers_of(found)[0] == pytest.approx(said[0], rel=1e-12)
         held = getattr(found.threads["Warp"], number.field)
-        back = {number.field: getattr(fabric.threads["Warp"], number.field)}
+        own = fabric.threads["Warp"]
+        back = {
+            name: getattr(own, name) for name in (number.field, *STATED_TOO.get(number.name, ()))
+        }
         assert replace(found.threads["Warp"], **back) == fabric.threads["Warp"]
         assert held != back[number.field]
+
+
+def test_unevenness_that_needs_a_length_takes_the_one_that_is_shown():
+    said, names = numbers_of(TWO), [n.name for n in shown_numbers(TWO, TWO.threads["Warp"])]
+    said[0][names.index("cv")] = 12.0
+    said[0][names.index("slub")] = 0.5
+    thread = changed(TWO, {"threads": said}).threads["Warp"]
+    assert (thread.unevenness_cv, thread.slub_amount) == pytest.approx((0.12, 0.5))
+    lengths = thread.unevenness_length, thread.slub_length, thread.slub_spacing
+    assert lengths == pytest.approx((0.01, 0.02, 0.1))
+    assert changed(TWO, {"threads": numbers_of(TWO)}) == TWO
+
+
+def test_densities_are_per_centimetre():
+    found = changed(TWO, {"density": [24.0, -1]})
+    assert (found.warp.density, found.weft.density) == (2400.0, TWO.weft.density)
 
 
 def test_a_changed_thread_forgets_the_colour_it_was_made_for():
@@ -65,14 +93,15 @@ def test_weave_and_coverage_are_changed():
     ("said", "problem"),
     [
         ({"threads": [[0.1]]}, "are 1 lists of numbers; there must be 2"),
-        ({"threads": [[0.1], [0.1]]}, "thread Warp has 1 numbers; it must have 8"),
-        ({"threads": [["x"] * 8, [0.1] * 8]}, "threads 0 is not a number"),
-        ({"threads": [[0.5] * 8, [0.1] * 8]}, "thread Warp ior is 0.5; it must be from 1 to 3"),
+        ({"threads": [[0.1], [0.1]]}, "thread Warp has 1 numbers; it must have 19"),
+        ({"threads": [["x"] * 19, [0.1] * 19]}, "threads 0 is not a number"),
+        ({"threads": [[0.5] * 19, [0.1] * 19]}, "thread Warp ior is 0.5; it must be from 1 to 3"),
         ({"threads": [3, 4]}, "threads 0 is not a list of numbers"),
         ({"weave": "10/1"}, r"weave \[1\] has 1 characters; it must have 2"),
         ({"weave": "12"}, "it must be 0"),
         ({"coverage": [0.9, 0.9]}, "coverage of warp and weft together is 1.8"),
         ({"coverage": [0.9]}, "coverage has 1 numbers; it must have 2"),
+        ({"density": [0.0, 5.0]}, "density of the warp is not a number from 0.5 to 400"),
         ({"coverage": [-0.5, 0.5]}, "coverage of the warp is not a number from 0 to 1"),
     ],
 )
@@ -90,4 +119,5 @@ def test_a_weave_that_is_too_large_is_refused(monkeypatch):
 
 
 def test_every_number_has_a_name_of_its_own():
-    assert len({n.name for n in NUMBERS}) == len(NUMBERS)
+    every = shown_numbers(replace(TWO, model="conserving"), TWO.threads["Warp"])
+    assert len({n.name for n in every}) == len(every) == len(NUMBERS) + 2 + len(YARN)
