@@ -99,7 +99,9 @@ def variant(look: Path, name: str) -> Scene:
     return read_scene(look.with_name(f"{name}.usda"))
 
 
-@pytest.mark.parametrize("preset", ["linen_plain", "silk_shot"])
+@pytest.mark.parametrize(
+    "preset", ["linen_plain", pytest.param("silk_shot", marks=pytest.mark.exhaustive)]
+)
 def test_a_sheet_lets_as_much_of_an_even_sky_through_as_its_threads(preset):
     """Shiny threads send light on in narrow cones, of which a sheet has the mean."""
     fabric = conserving(preset)

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from fabricusd.appearance.conserving.grid import mean_share
+from fabricusd.appearance.conserving.grid import mean_share, without_border
 from fabricusd.appearance.conserving.multiple import conserving_tables, mean_albedo
-from fabricusd.appearance.conserving.single import ConservingTables, single_tables
+from fabricusd.appearance.conserving.single import LOST, ConservingTables, single_tables
 from fabricusd.appearance.levels import FAR, WEAVE
 from fabricusd.appearance.scattering.columns import LAW
 from fabricusd.appearance.scattering.model import CONSERVING
@@ -84,7 +84,8 @@ def balance(fabric: Fabric) -> Balance:
     """The tables by side of a cloth; takes seconds."""
     tables = conserving_tables(white_pair(fabric, (1, 1, 1), (1, 1, 1)))
     covered = 1.0 - tables.gap
-    lost = sum(mean_share(tables.sides[side, :, :, 2]) for side in range(2))
+    sides = without_border(tables.sides)
+    lost = sum(mean_share(sides[side, :, :, LOST]) for side in range(2))
     return Balance(tables=tables, escape=1.0 - lost / max(mean_share(covered), 1e-300))
 
 

@@ -12,7 +12,6 @@ from fabricusd.materials.lobes.bound import Bound
 from fabricusd.materials.lobes.judge import Judge
 from fabricusd.materials.lobes.mixture import CYCLES, FORMS, MATERIALX, POWERS, Mixture
 from fabricusd.schema import load
-from tests.appearance.presets import often
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +31,8 @@ def brighter(mixture: Mixture, factor: float) -> Mixture:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("form", often(FORMS, (CYCLES,)))
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("form", FORMS)
 def test_what_is_too_bright_becomes_as_bright_as_the_cloth(linen, form):
     bound, judge = linen
     bright = brighter(known.mixture_of(load("linen_plain"), 4, form), 1.4)

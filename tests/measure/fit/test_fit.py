@@ -33,7 +33,7 @@ def test_lobes_without_noise_give_the_thread_back(thread, model):
     assert found.chi2 < 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_the_conserving_model_is_fitted_with_a_gain_of_its_surface():
     thread = replace(SPUN, albedo=(0.2, 0.8, 0.9), surface_gain=3.0)
     found = fit_thread(lobes_of(thread, "coarse", "conserving", noise=0.0), "conserving")

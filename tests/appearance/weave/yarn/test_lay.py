@@ -197,7 +197,7 @@ def test_shades_keep_the_albedo_of_conserving_threads_from_0_to_1():
         assert (shade.std() > 1e-3) == (albedo < 1.0)
 
 
-@pytest.mark.parametrize("turns", [400.0, -400.0])
+@pytest.mark.parametrize("turns", [pytest.param(400.0, marks=pytest.mark.exhaustive), -400.0])
 def test_z_twist_runs_like_the_middle_of_a_z(turns):
     """Along a warp thread seen from its front, the border of two plies moves to the right."""
     cloth = woven("linen_plain", plies=2, twist=turns)
