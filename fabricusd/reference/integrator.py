@@ -45,7 +45,7 @@ from fabricusd.reference.stages.arrivals import AUTO_LEVEL, QUEUES, Settings, ar
 from fabricusd.reference.stages.departures import depart, record_first
 from fabricusd.reference.stages.hits import add_emission, prepare
 from fabricusd.reference.stages.shadow_rays import settle, share_that_goes_on, thin_out
-from fabricusd.reference.start.compile_ahead import CLOSE_UPS, EVERY_PICTURE, compile_ahead
+from fabricusd.reference.start.compile_ahead import CLOSE_UPS, EVERY_PICTURE, compile_ahead, of_law
 from fabricusd.reference.surfaces.fabric import FabricShader
 from fabricusd.reference.surfaces.fabric_gap import BY_DIRECTION, TABLE
 from fabricusd.reference.surfaces.normal_map import shade_mapped
@@ -86,7 +86,10 @@ paths before: light that cloth of albedo .9 scattered 64 times is a thousandth o
 
 def _shaders(scene: Scene, shadow: str) -> list[FabricShader | None]:
     """The shaders of all materials, made once the kernels that they need are ready."""
-    compile_ahead(EVERY_PICTURE).wait()
+    cloths = [one.binding.fabric for one in scene.materials if isinstance(one, FabricSurface)]
+    waiting = [compile_ahead(of) for of in dict.fromkeys(map(of_law, cloths)) if of is not None]
+    for one in (compile_ahead(EVERY_PICTURE), *waiting):
+        one.wait()
     return [_shader(surface, shadow) for surface in scene.materials] or [None]
 
 

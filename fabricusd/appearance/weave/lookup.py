@@ -9,6 +9,7 @@ are in `docs/model.md`, sections 1 and 3.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from fabricusd.appearance.weave.place import Places
 from fabricusd.appearance.weave.yarn.compiled import Yarn, compile_yarn
 from fabricusd.appearance.weave.yarn.lay import crest, laid, strands_all
 from fabricusd.errors import FabricError
-from fabricusd.fabric import Fabric, ThreadSet, Weave
+from fabricusd.fabric import Fabric, Weave
 from fabricusd.kernels.real import INLINE, KERNEL, PART, index
 
 FARTHEST = 2.0**52
@@ -455,24 +456,10 @@ def back_of(fabric: Fabric) -> Fabric:
     cells = ~fabric.weave.cells[:, ::-1]
     name = fabric.weave.name
     front_name = name.removesuffix(" (back)")
-    return Fabric(
-        name=fabric.name,
-        threads=fabric.threads,
+    # What is not named here, the surface law among it, is that of the front.
+    return replace(
+        fabric,
         weave=Weave(cells, front_name if front_name != name else f"{name} (back)"),
-        warp=ThreadSet(
-            sequence=fabric.warp.sequence,
-            density=fabric.warp.density,
-            coverage=float(area[WARP]),
-        ),
-        weft=ThreadSet(
-            sequence=fabric.weft.sequence[::-1],
-            density=fabric.weft.density,
-            coverage=float(area[WEFT]),
-        ),
-        model=fabric.model,
-        sides=fabric.sides,
-        opaque=fabric.opaque,
-        masking_width=fabric.masking_width,
-        unevenness_seed=fabric.unevenness_seed,
-        documentation=fabric.documentation,
+        warp=replace(fabric.warp, coverage=float(area[WARP])),
+        weft=replace(fabric.weft, sequence=fabric.weft.sequence[::-1], coverage=float(area[WEFT])),
     )

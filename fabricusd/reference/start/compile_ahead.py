@@ -29,10 +29,16 @@ from pathlib import Path
 from numba.core.dispatcher import Dispatcher
 
 from fabricusd.kernels.start import load_as_they_are, load_without_blas
-from fabricusd.reference.start.kernel_tasks import CLOSE_UPS, EVERY_PICTURE, LONGEST, TASKS
+from fabricusd.reference.start.kernel_tasks import (
+    CLOSE_UPS,
+    EVERY_PICTURE,
+    LONGEST,
+    TASKS,
+    of_law,
+)
 from fabricusd.run.workers import worker_count
 
-__all__ = ["CLOSE_UPS", "EVERY_PICTURE", "compile_ahead", "compile_kernels"]
+__all__ = ["CLOSE_UPS", "EVERY_PICTURE", "compile_ahead", "compile_kernels", "of_law"]
 
 _LONGEST = 120.0
 """Longest time to wait for the other processes [s]."""

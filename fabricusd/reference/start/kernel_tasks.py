@@ -12,11 +12,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.published.shares import published_mixture
 from fabricusd.appearance.published.tables import SurfaceTables, surface_tables
 from fabricusd.appearance.sampling.blocks import Drawn, sample_points
 from fabricusd.appearance.sampling.fit import no_mixture
+from fabricusd.appearance.scattering.models import any_conserving
 from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.place import Places
@@ -52,7 +54,7 @@ from fabricusd.reference.surfaces.fabric import (
     places_of,
 )
 from fabricusd.reference.surfaces.fabric_far import shade_far
-from fabricusd.reference.surfaces.fabric_gap import TABLE
+from fabricusd.reference.surfaces.fabric_gap import TABLE, pass_published
 from fabricusd.reference.surfaces.preview import build_surfaces, shade_preview
 from fabricusd.scene.scene import Camera, Mesh, PreviewSurface, Scene
 
@@ -86,10 +88,12 @@ def _sample() -> _Sample:
     )  # fmt: skip
 
 
-def _cloth() -> tuple[Any, SurfaceTables]:
+@cache
+def _cloth(law: str = Fabric().surface_law) -> tuple[Any, SurfaceTables]:
     # The default fabric's threads are level, so its lobes are made quickly.
-    fabric = Fabric()
-    return fabric, surface_tables(fabric, precision=np.float32)
+    fabric = Fabric(surface_law=law)
+    shadow = compile_shadow(fabric, "none") if law_of(fabric).absolute else None
+    return fabric, surface_tables(fabric, precision=np.float32, shadow=shadow)
 
 
 def _prepare() -> None:
@@ -106,6 +110,16 @@ def _shade_far() -> None:
 
 def _share_lobes() -> None:
     published_mixture(*_cloth())
+
+
+def _shade_far_projected() -> None:
+    tables = _cloth("projected")[1]
+    shade_far(R, tables, no_mixture(R), R(0), _sample().wave.hits.rows, 0, 0)
+    pass_published(R, tables, R(1), np.zeros((3, 0), np.float32), np.zeros(0, np.float32))
+
+
+def _share_lobes_projected() -> None:
+    published_mixture(*_cloth("projected"))
 
 
 def _arrive() -> None:
@@ -206,19 +220,34 @@ def _finish_point() -> None:
     )  # fmt: skip
 
 
-EVERY_PICTURE, CLOSE_UPS = "every picture", "close-ups"
+EVERY_PICTURE, CLOSE_UPS, MASKED, PROJECTED = (
+    "every picture", "close-ups", "cloth that masks", "projected cloth",
+)  # fmt: skip
 TASKS: dict[str, tuple[Callable[[], None], ...]] = {
     EVERY_PICTURE: (
-        _shade_far, _share_lobes, _shade_preview, _depart, _trace_and_settle, _camera_rays,
-        _arrive, _prepare,
+        _trace_and_settle, _shade_preview, _depart, _camera_rays, _arrive, _prepare,
     ),
+    MASKED: (_shade_far, _share_lobes),
+    PROJECTED: (_shadow_table, _share_lobes_projected, _shade_far_projected),
     CLOSE_UPS: (
         _finish_point, _look_up_uneven, _look_up, _sample_points, _point_values, _shadow_table,
     ),
 }  # fmt: skip
 """The tasks of each list. Tasks that take longest stand at both ends, next to those with which they
-share parts. Every picture needs the first list; levels `weave` and `thread` also need the second.
+share parts. Every picture needs the first list, levels `weave` and `thread` also the second, and
+cloth at any level that of its law: those of `of_law`. Cloth of other laws compiles its own kernels.
 """
 
-LONGEST = {EVERY_PICTURE: shade_far, CLOSE_UPS: finish_point}
-"""A kernel of each list that takes long to compile: if it is cached, so are the others."""
+
+def of_law(fabric: Fabric) -> str | None:
+    """The list that `fabric` needs at level `far`; None where there is none for its law."""
+    if any_conserving(fabric):
+        return None
+    return {"masked": MASKED, "projected": PROJECTED}.get(fabric.surface_law)
+
+
+LONGEST = {
+    EVERY_PICTURE: prepare, CLOSE_UPS: finish_point, MASKED: shade_far, PROJECTED: pass_published
+}  # fmt: skip
+"""A kernel of each list that takes long to compile, or comes last: if it is cached, so are the
+others."""

@@ -183,12 +183,12 @@ class _Side:
         """Weave and shadowing for levels `weave` and `thread`, made when they are first needed."""
         # One lock for all cloths: numba's own workers compute some of these tables, and they may
         # not be called from two threads at once.
+        self.make_ready()
         with _ONE_AT_A_TIME:
             return self._made()
 
     def _made(self) -> tuple[CompiledFabric, Shadow]:
         if self._near is None:
-            self.make_ready()
             cloth = compile_fabric(self.fabric, precision=np.float32)
             self._near = cloth, compile_shadow(self.fabric, self.method)
         return self._near

@@ -18,6 +18,7 @@ from fabricusd.appearance.weave.lookup import back_of, find_all, lookup
 from fabricusd.appearance.weave.sections import sections
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, TangentCurve, Thread, ThreadSet, Weave, even
+from fabricusd.sides import Sides
 from tests.appearance.presets import PLAIN, PRESETS, SATIN_5
 from tests.appearance.weave.slow_weave import slow_lookup
 from tests.strategies import fabrics
@@ -224,6 +225,16 @@ def test_height_is_the_curve_s_over_the_real_length_of_the_run(fabric: Fabric) -
         assert hit.height[k] == pytest.approx(expected + lift, abs=1e-12)
         half = fitted.half_height[j, kind]
         assert hit.crown[k] == pytest.approx(half * math.sqrt(1 - hit.across[k] ** 2), abs=1e-12)
+
+
+def test_a_mirrored_back_is_in_all_else_the_front():
+    front = replace(
+        PRESETS["linen_plain"], surface_law="projected", opaque=True, masking_width=0.3,
+        unevenness_seed=7, documentation="told", sides=Sides(reflected=(0.4,)),
+    )  # fmt: skip
+    back = back_of(front)
+    kept = replace(back, weave=front.weave, warp=front.warp, weft=front.weft)
+    assert kept == front
 
 
 @given(fabrics(back=False))

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from numba.core.dispatcher import Dispatcher
 
 from fabricusd.fabric import Binding
 from fabricusd.reference.start.compile_ahead import compile_kernels
-from fabricusd.reference.start.kernel_tasks import CLOSE_UPS, EVERY_PICTURE, TASKS
+from fabricusd.reference.start.kernel_tasks import (
+    CLOSE_UPS,
+    EVERY_PICTURE,
+    MASKED,
+    PROJECTED,
+    TASKS,
+)
 from fabricusd.scene.scene import FabricSurface, PreviewSurface, Scene
 from fabricusd.schema import load
 from tests.reference.scenes import above, grid, render_scene
@@ -28,12 +35,13 @@ def signatures():
     }
 
 
-def picture(level):
+def picture(level, law="masked"):
     """Cloth and a plain floor, small."""
+    cloth = replace(load("linen_plain"), surface_law=law)
     scene = Scene(
         meshes=[grid(), grid(material=1, size=2.0)],
         materials=[
-            FabricSurface(binding=Binding(fabric=load("linen_plain"), metres_per_uv=1.0)),
+            FabricSurface(binding=Binding(fabric=cloth, metres_per_uv=1.0)),
             PreviewSurface(),
         ],
         camera=above(width=4.0),
@@ -42,10 +50,15 @@ def picture(level):
 
 
 def test_a_picture_compiles_nothing_that_was_not_compiled_ahead():
-    for task in TASKS[EVERY_PICTURE]:
+    for task in (*TASKS[EVERY_PICTURE], *TASKS[MASKED]):
         task()
     before = signatures()
     picture("far")
+    assert signatures() == before
+    for task in TASKS[PROJECTED]:
+        task()
+    before = signatures()
+    picture("far", law="projected")
     assert signatures() == before
     for task in TASKS[CLOSE_UPS]:
         task()
