@@ -7,6 +7,7 @@ from it. Jobs whose worker is lost are given to another one.
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import pickle
 import platform
@@ -16,6 +17,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import cache
 from typing import Any, NamedTuple
@@ -102,6 +104,8 @@ def open_cluster(scheduler: str) -> Iterator[Cluster]:
                     n_workers=count, threads_per_worker=1, memory_limit=0, silence_logs=50,
                     host="127.0.0.1", dashboard_address="127.0.0.1:0",
                 )  # fmt: skip
+            else:
+                _greet(scheduler)
             client = Client(own or scheduler, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError, TypeError, ImportError, KeyError, AttributeError) as error:
             if own is not None:
@@ -122,6 +126,25 @@ def open_cluster(scheduler: str) -> Iterator[Cluster]:
             client.close()
             if own is not None:
                 own.close()
+
+
+def _greet(scheduler: str) -> None:
+    """Connect to `scheduler` and part again.
+
+    A `Client` that finds no scheduler leaves its thread and half of itself behind; when that is
+    collected it waits for seconds, and enough of them keep the next client from starting.
+
+    Raises `OSError` or `ValueError` where no scheduler answers.
+    """
+    from distributed.comm import connect
+
+    async def greet() -> None:
+        comm = await connect(scheduler, timeout=CONNECT)
+        await comm.close()
+
+    # In a thread of its own: a notebook's thread runs a loop already.
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, greet()).result()
 
 
 def cluster_or_threads(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 
 import pytest
 
@@ -102,8 +103,10 @@ def test_another_processor_is_a_note(cluster, monkeypatch):
 def test_a_scheduler_that_is_none_is_refused(address, monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr(module, "CONNECT", 1.0)
+    before = threading.active_count()
     with pytest.raises(FabricError, match="scheduler"), open_cluster(address):
         pass
+    assert threading.active_count() == before  # a client's thread would be left behind
 
 
 def test_without_dask_the_extra_is_named(monkeypatch):
