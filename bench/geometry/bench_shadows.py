@@ -17,7 +17,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.shadow.methods import METHODS, compile_shadow, shadowing
+from fabricusd.appearance.shadow.kinds import METHODS
+from fabricusd.appearance.shadow.methods import compile_shadow, shadowing
 from fabricusd.appearance.weave.compiled import compile_fabric, true_repeat
 from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.fabric import even

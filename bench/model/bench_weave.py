@@ -23,7 +23,8 @@ from bench_thread import microcylinder_in_numpy
 
 from fabricusd.appearance.frame import WARP
 from fabricusd.appearance.published.tables import surface_tables
-from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
+from fabricusd.appearance.shadow.kinds import Shadow
+from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.surface import evaluate, weave_all
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP

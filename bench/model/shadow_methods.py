@@ -15,7 +15,8 @@ from pathlib import Path
 import numba
 import numpy as np
 
-from fabricusd.appearance.shadow.methods import METHODS, compile_shadow, shadowing
+from fabricusd.appearance.shadow.kinds import METHODS
+from fabricusd.appearance.shadow.methods import compile_shadow, shadowing
 from fabricusd.appearance.weave.compiled import compile_fabric
 from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.chart.panels.shadows import (

@@ -38,7 +38,7 @@ from fabricusd.appearance.sampling.mixture import (
     point_direction,
 )
 from fabricusd.appearance.scattering.models import any_conserving, any_published
-from fabricusd.appearance.shadow.methods import Shadow
+from fabricusd.appearance.shadow.kinds import Shadow
 from fabricusd.appearance.weave.quadrature import Rule
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import PART

@@ -46,14 +46,8 @@ from fabricusd.appearance.levels import FAR, LEVELS, THREAD
 from fabricusd.appearance.published.far import far_values
 from fabricusd.appearance.published.levels import POINT_ROWS, point_block, point_values
 from fabricusd.appearance.scattering.models import any_published
-from fabricusd.appearance.shadow.methods import (
-    METHODS,
-    Shadow,
-    compile_shadow,
-    horizon_block,
-    lit_all,
-    mean_block,
-)
+from fabricusd.appearance.shadow.kinds import METHODS, Shadow
+from fabricusd.appearance.shadow.methods import compile_shadow, horizon_block, lit_all, mean_block
 from fabricusd.appearance.shadow.place_blocks import (
     ANGLE,
     INT_ROWS,

@@ -17,7 +17,7 @@ from fabricusd.reference.choice import BOUNDS
 
 def write_table(path: Path, quick: bool = True) -> None:
     """Measure the shadowing methods on every woven preset and the levels on every preset."""
-    from fabricusd.appearance.shadow.methods import METHODS
+    from fabricusd.appearance.shadow.kinds import METHODS
     from fabricusd.chart.level_errors import coarsest
     from fabricusd.chart.panel import Row
     from fabricusd.chart.panels import shadows

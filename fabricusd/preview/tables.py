@@ -24,7 +24,8 @@ from fabricusd.appearance.law import CONSERVING_ONLY, MIXED, PUBLISHED_ONLY
 from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.scattering.models import any_conserving, any_published
-from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
+from fabricusd.appearance.shadow.kinds import Shadow
+from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.surface import fuzz_of
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.yarn.compiled import Yarn, compile_yarn

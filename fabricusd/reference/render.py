@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.shadow.methods import METHODS
+from fabricusd.appearance.shadow.kinds import METHODS
 from fabricusd.appearance.weave.footprint import DEFAULT, Limits
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Binding, Fabric

@@ -13,8 +13,8 @@ from fabricusd.appearance.scattering.columns import LAW
 from fabricusd.appearance.scattering.model import PUBLISHED
 from fabricusd.appearance.scattering.models import model_of
 from fabricusd.appearance.scattering.table import pack_threads
+from fabricusd.appearance.shadow.kinds import Shadow
 from fabricusd.appearance.shadow.mean import node_groups
-from fabricusd.appearance.shadow.methods import Shadow
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.quadrature import Rule, curve_nodes, default_rule
 from fabricusd.errors import FabricError

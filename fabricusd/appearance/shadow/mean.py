@@ -86,7 +86,12 @@ def stretches(fabric: Fabric, longest: int) -> Stretches:
 @njit(**INLINE)
 def stretch_of(R, cloth, shadow, which, thread, s):
     """Number of the stretch at position s on a run of `thread` in set `which`; s must be finite."""
-    p = piece_of(R, cloth, thread, s)
+    return stretch_in(R, cloth, shadow, which, thread, piece_of(R, cloth, thread, s), s)
+
+
+@njit(**INLINE)
+def stretch_in(R, cloth, shadow, which, thread, p, s):
+    """`stretch_of` where `s` is on piece `p` of the curve."""
     part = np.int32((s - cloth.curve_start[thread, p]) * shadow.piece_scale[thread, p])
     part = max(min(part, shadow.piece_last[thread, p]), np.int32(0))
     return shadow.mean_first[which, thread] + shadow.piece_first[thread, p] + part

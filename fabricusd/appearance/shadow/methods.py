@@ -19,17 +19,17 @@ docs/decisions/004 and 017.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
-from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.laws import law_of
-from fabricusd.appearance.laws.lit import GROUPS
+from fabricusd.appearance.laws.lit import GROUPS, column_of, level_of, mean_over
 from fabricusd.appearance.scattering.model import PUBLISHED
 from fabricusd.appearance.scattering.models import model_of
+from fabricusd.appearance.shadow.crests import to_crest
 from fabricusd.appearance.shadow.height import (
     Origin,
     highest_point,
@@ -37,7 +37,6 @@ from fabricusd.appearance.shadow.height import (
 )
 from fabricusd.appearance.shadow.horizon import (
     AZIMUTHS,
-    LOWEST,
     NO_KINDS,
     SOFTNESS,
     TEXELS,
@@ -51,25 +50,39 @@ from fabricusd.appearance.shadow.horizon_lookup import (
     horizon_at,
     soft_edge,
 )
+from fabricusd.appearance.shadow.kinds import (
+    HORIZON,
+    METHODS,
+    NONE,
+    PEAK,
+    TRACED,
+    Shadow,
+)
 from fabricusd.appearance.shadow.mean import (
     groups_of,
     mean_of,
     places_on,
     relative,
+    stretch_in,
     stretch_of,
     stretches,
 )
 from fabricusd.appearance.shadow.place_blocks import (
+    FIRST,
     FREE,
     INT_ROWS,
     LIT,
     OF_SET,
     OF_THREAD,
+    PIECE,
     REAL_ROWS,
+    SECOND,
+    SHARES,
     S,
     X,
     look_up_block,
 )
+from fabricusd.appearance.shadow.towards import horizons_towards
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.curve import crest, peak
@@ -77,17 +90,11 @@ from fabricusd.appearance.weave.lookup import (
     crown_on,
     find,
     height_on,
-    lower_run,
-    upper_run,
-    wrap,
 )
 from fabricusd.appearance.weave.place import Hit
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, index
-
-METHODS = ("none", "peak", "horizon", "traced")
-NONE, PEAK, HORIZON, TRACED = range(4)
 
 TRACED_SOFTNESS = math.radians(1.0)
 """Width [rad] of the soft edge used for the mean of `traced`; the marched `g` has a hard edge."""
@@ -102,50 +109,6 @@ would only alias."""
 
 MEAN_PLACES, FEWER_PLACES = 512, 64
 """Places of each stretch over which the mean of `g` is taken; fewer where each takes a march."""
-
-SEARCH = 64
-"""Radius [cells] in which `peak` searches for the highest point. Beyond it, the horizon of every
-published fabric is below a quarter of a degree."""
-
-
-class Shadow(NamedTuple):
-    """The tables that a shadowing method needs in addition to the compiled fabric.
-
-    method : int - NONE, PEAK, HORIZON or TRACED
-    highest : real - greatest height of the field [m]
-    softness : real - width of the shadow's edge in the light's elevation [rad]; of its mean only
-        for `traced`
-    crest_first, crest_last : (k, q) real - intervals of each type's run that are as high as its
-        peak; an interval is empty if its last position is less than its first
-    crest_height : (k,) real - height there, in run lengths
-    table, kinds : of `horizon.Horizon`; a single zero and (0, 0) for the other methods
-    texels : the same memory as a one-dimensional array
-    mean : (stretches, columns + 1, GROUPS) real, flat - `mean.groups_of`, horizons in softnesses;
-        one entry for `none`
-    mean_columns, groups : int - its azimuths; GROUPS
-    mean_first, piece_first, piece_last, piece_scale : see `mean.Stretches`
-    absolute : (k,) uint8 - whether threads of the type follow a law with an absolute shadow
-    all_absolute : int - whether all do
-    """
-
-    method: int
-    highest: Any
-    softness: Any
-    crest_first: NDArray[Any]
-    crest_last: NDArray[Any]
-    crest_height: NDArray[Any]
-    table: NDArray[np.uint8]
-    kinds: NDArray[np.int32]
-    texels: NDArray[np.uint8]
-    mean: NDArray[Any]
-    mean_columns: int
-    groups: int
-    mean_first: NDArray[np.int32]
-    piece_first: NDArray[np.int32]
-    piece_last: NDArray[np.int32]
-    piece_scale: NDArray[Any]
-    absolute: NDArray[np.uint8]
-    all_absolute: int
 
 
 def compile_shadow(
@@ -232,9 +195,7 @@ def _mean(fabric: Fabric, cloth: CompiledFabric, shadow: Shadow, count: int) -> 
     columns = shadow.mean_columns
     each = FEWER_PLACES if traced else MEAN_PLACES
     uv, number = places_on(cloth, shape_repeat(fabric), shadow, count, each)
-    sine = np.zeros((len(uv), columns))
-    real: Any = np.float64
-    _horizons(real, cloth, shadow, uv, diamond_directions(columns), sine)
+    sine = horizons_towards(cloth, shadow, uv, diamond_directions(columns))
     return groups_of(number, count, np.arcsin(sine) / float(shadow.softness)).reshape(-1)
 
 
@@ -289,7 +250,7 @@ def lit(R, cloth, shadow, u, v, hit, x, y, z):
             return R(1)
         # A horizon lower than this one cannot reach the soft edge of the shadow.
         lowest = max(z / flat - shadow.softness * (R(1) + z * z / (flat * flat)), R(1e-6))
-        distance = R(_to_crest(cloth, shadow, u, v, float(drop / lowest)))
+        distance = R(to_crest(cloth, shadow, u, v, float(drop / lowest)))
         reach = math.sqrt(drop * drop + distance * distance)
         return soft_edge(R, (z * distance - flat * drop) / reach, shadow.softness)
     crown = crown_on(R, cloth, which, thread, hit.w)
@@ -300,68 +261,6 @@ def lit(R, cloth, shadow, u, v, hit, x, y, z):
         float(x) / float(flat), float(y) / float(flat), slope, True,
     )  # fmt: skip
     return R(0) if found > slope else R(1)
-
-
-@njit(**PART)
-def _to_crest(cloth, shadow, u, v, most):
-    """Distance on the cloth [m] to the nearest of the highest points, or `most` if it is
-    farther."""
-    end, pick = np.floor(u), np.floor(v)
-    pitch_u, pitch_v = float(cloth.pitch[WARP]), float(cloth.pitch[WEFT])
-    best = most
-    for ring in range(SEARCH):
-        if (ring - 1) * min(pitch_u, pitch_v) > best:
-            break
-        for di in range(-ring, ring + 1):
-            step = 1 if abs(di) == ring else max(1, 2 * ring)
-            for dj in range(-ring, ring + 1, step):
-                best = _crest_in_cell(cloth, shadow, u, v, end + di, pick + dj, best)
-    return best
-
-
-@njit(**PART)
-def _crest_in_cell(cloth, shadow, u, v, end, pick, best):
-    """The smaller of `best` and the distance [m] to the highest points of one cell."""
-    i, j = wrap(end, cloth.grid.shape[0]), wrap(pick, cloth.grid.shape[1])
-    top = int(cloth.grid[i, j])
-    edge = 0.5 - 0.5 * float(cloth.width[top])
-    for part in range(3 if cloth.runs.shape[2] > 1 else 1):
-        # The thread on top, then the thread underneath before and behind it.
-        which = top if part == 0 else 1 - top
-        if which == WARP:
-            thread = int(cloth.sequence[WARP, wrap(end, cloth.sequence_length[WARP])])
-        else:
-            thread = int(cloth.sequence[WEFT, wrap(pick, cloth.sequence_length[WEFT])])
-        low, high = 0.0, 1.0
-        if part == 0:
-            start, cells = upper_run(np.float64, cloth, i, j, top)
-            rises = 1.0
-        else:
-            start, cells, rises = lower_run(np.float64, cloth, i, j, top, part - 1.0)
-            low, high = (0.0, edge) if part == 1 else (1.0 - edge, 1.0)
-        visible = float(cloth.width[which]) if high > low else 0.0
-        run = rises * cells * float(cloth.pitch[1 - which])
-        half = float(cloth.half_height[which, thread])
-        height = run * float(shadow.crest_height[thread]) + half + float(cloth.lift[which])
-        if visible <= 0.0 or cloth.pile[thread] != 0 or height < 0.999999 * shadow.highest:
-            continue
-        across = 0.5 * visible
-        for q in range(shadow.crest_first.shape[1]):
-            a = max(low, float(shadow.crest_first[thread, q]) * cells - start)
-            b = min(high, float(shadow.crest_last[thread, q]) * cells - start)
-            if a > b:
-                continue
-            if which == WARP:
-                du = max(0.0, abs(u - end - 0.5) - across)
-                dv = max(0.0, a - (v - pick), (v - pick) - b)
-            else:
-                du = max(0.0, a - (u - end), (u - end) - b)
-                dv = max(0.0, abs(v - pick - 0.5) - across)
-            best = min(
-                best,
-                math.hypot(du * float(cloth.pitch[WARP]), dv * float(cloth.pitch[WEFT])),
-            )
-    return best
 
 
 @njit(**PART)
@@ -387,49 +286,33 @@ def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
 
 @njit(**PART)
 def mean_block(R, cloth, shadow, wi, begin, size, ints, reals):
-    """Turn the row LIT from `lit` to `shade`, in loops like those of `horizon_blocks`."""
+    """Turn the row LIT from `lit` to `shade`, in loops like those of `horizon_blocks`.
+
+    The rows FIRST and SHARES, which `horizon_block` no longer needs, hold what goes between the
+    loops.
+    """
     if shadow.all_absolute != 0:
         return
+    columns = np.int32(shadow.mean_columns)
+    for k in range(size):
+        # In gaps and for NaN the stretch is arbitrary: the result is not used.
+        which, s = np.uintp(min(ints[OF_SET + k], 1)), reals[S + k]
+        thread, s = np.uintp(ints[OF_THREAD + k]), s if s >= R(0) else R(0)
+        ints[FIRST + k] = stretch_in(R, cloth, shadow, which, thread, np.uintp(ints[PIECE + k]), s)
+        ints[SECOND + k] = ints[FREE + k] | np.int32(shadow.absolute[thread])
     for k in range(size):
         m = index(begin, k)
-        g, z = reals[LIT + k], wi[2, m]
-        thread = np.uintp(ints[OF_THREAD + k])
-        # Where LIT is NaN it stays NaN, and the NaN must not index the table.
-        if not g >= R(0) or z <= R(0) or ints[FREE + k] != 0 or shadow.absolute[thread] != 0:
-            continue
-        which = np.uintp(ints[OF_SET + k])
-        stretch = stretch_of(R, cloth, shadow, which, thread, reals[S + k])
-        reals[LIT + k] = relative(R, g, mean_of(R, shadow, stretch, wi[0, m], wi[1, m], z))
-
-
-@njit(**KERNEL, parallel=True)
-def _horizons(R, cloth, shadow, uv, directions, out):
-    """Sine of the horizon's elevation at uv (n, 2) in each of `directions` (c, 2): out (n, c)."""
-    for k in prange(uv.shape[0]):
-        _horizons_at(R, cloth, shadow, uv[k, 0], uv[k, 1], directions, out[k])
-
-
-@njit(**KERNEL)
-def _horizons_at(R, cloth, shadow, u, v, directions, out):
-    which, thread, s, w, _, length = find(R, cloth, u, v)
-    if which == GAP or cloth.pile[thread] != 0:
-        return
-    crown = crown_on(R, cloth, which, thread, w)
-    axis = height_on(R, cloth, which, thread, s, length)
-    if shadow.method == PEAK:
-        drop = shadow.highest - axis - cloth.half_height[which, thread]
-        if drop > R(1e-6) * shadow.highest:
-            distance = _to_crest(cloth, shadow, u, v, drop / R(1e-3))
-            out[:] = drop / math.sqrt(drop * drop + distance * distance)
-        return
-    origin = Origin(u, v, which, crown, axis + crown)
-    for c in range(directions.shape[0]):
-        x, y = directions[c, 0], directions[c, 1]
-        if shadow.method == HORIZON:
-            out[c] = horizon_at(R, cloth, shadow.table, shadow.kinds, u, v, which, x, y)
-        else:
-            slope = steepest(cloth, shadow.highest, origin, x, y, LOWEST, False)
-            out[c] = slope / math.sqrt(R(1) + slope * slope) if slope > LOWEST else R(0)
+        column, c = column_of(R, columns, wi[0, m], wi[1, m])
+        reals[SHARES + k] = c
+        reals[SHARES + BLOCK + k] = level_of(R, wi[2, m], shadow.softness)
+        ints[FIRST + k] = (ints[FIRST + k] * (columns + 1) + column) * GROUPS
+        ints[SECOND + k] = ints[SECOND + k] | np.int32(wi[2, m] <= R(0))
+    for k in range(size):
+        first = np.uintp(ints[FIRST + k])
+        c, level = reals[SHARES + k], reals[SHARES + BLOCK + k]
+        mean = mean_over(R, shadow.mean, shadow.groups, first, first + np.uintp(GROUPS), c, level)
+        g = reals[LIT + k]
+        reals[LIT + k] = g if ints[SECOND + k] != 0 else relative(R, g, mean)
 
 
 @njit(**PART)

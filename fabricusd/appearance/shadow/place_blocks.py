@@ -15,13 +15,15 @@ from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.shadow.horizon_lookup import entry_at
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.lookup import (
-    angle_on,
+    angle_of,
     cell_of,
-    lower_run,
+    hidden_run,
+    piece_of,
     place_on,
-    upper_run,
+    seen_run,
     whole_threads,
     wrap,
+    wrapped,
 )
 from fabricusd.kernels.real import BLOCK, INLINE, PART, index
 
@@ -35,15 +37,24 @@ TABLE_I, TABLE_J = 8 * BLOCK, 9 * BLOCK
 FIRST, SECOND = 10 * BLOCK, 11 * BLOCK
 """Filled by `horizon_blocks.choose_texels`."""
 _WARP_THREAD, _WEFT_THREAD = 12 * BLOCK, 13 * BLOCK
-INT_ROWS = 14
+_NEXT_I, _NEXT_J = 14 * BLOCK, 15 * BLOCK
+"""The cell into which the thread underneath goes on."""
+PIECE = 16 * BLOCK
+"""The linear piece of the visible thread's curve."""
+INT_ROWS = 17
 
 X, Y, S, ANGLE = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
 """Rows of reals: the place in the cell, the position on the thread's run, and the tangent angle
 [rad] there."""
 SHARES, LIT = 4 * BLOCK, 6 * BLOCK
 """Two rows filled by `horizon_blocks.choose_texels`; the share of light that reaches the place."""
-_UPPER_START, _UPPER_CELLS, _LOWER_START, _LOWER_CELLS = (row * BLOCK for row in range(7, 11))
-REAL_ROWS = 11
+_UPPER_PLACE, _UPPER_COUNT, _LOWER_PLACE, _LOWER_COUNT, _BEYOND = (
+    row * BLOCK for row in range(7, 12)
+)
+"""What `CompiledFabric.runs` holds for the cell, and the cells of the run beside it."""
+ACROSS, LENGTH = 12 * BLOCK, 13 * BLOCK
+"""The position across the thread, and the length of its visible run [m]."""
+REAL_ROWS = 14
 
 
 @njit(**PART)
@@ -61,8 +72,9 @@ def look_up_block(R, cloth, shadow, uv, begin, size, ints, reals):
     _place(R, cloth, size, ints, reals)
     for k in range(size):
         thread = np.uintp(ints[OF_THREAD + k])
-        reals[ANGLE + k] = angle_on(R, cloth, thread, reals[S + k])
-        ints[FREE + k] = ints[OF_SET + k] == GAP or cloth.pile[thread] != 0
+        ints[PIECE + k] = piece_of(R, cloth, thread, reals[S + k])
+        reals[ANGLE + k] = angle_of(R, cloth, thread, np.uintp(ints[PIECE + k]), reals[S + k])
+        ints[FREE + k] = (ints[OF_SET + k] == GAP) | (cloth.pile[thread] != 0)
 
 
 @njit(**INLINE)
@@ -114,33 +126,60 @@ def _entries(cloth, table, kinds, uv, begin, size, ints):
 @njit(**INLINE)
 def _gather(R, cloth, size, ints, reals):
     """Read what the tables hold for each cell, its end and its pick."""
+    slot = cloth.runs.shape[2] - 1
+    ends, picks = np.int32(cloth.grid.shape[0]), np.int32(cloth.grid.shape[1])
     for k in range(size):
         i, j = np.uintp(ints[CELL_I + k]), np.uintp(ints[CELL_J + k])
-        top = int(cloth.grid[i, j])
-        ints[TOP + k] = top
+        ints[TOP + k] = cloth.grid[i, j]
         ints[_WARP_THREAD + k] = cloth.sequence[WARP, np.uintp(ints[END + k])]
         ints[_WEFT_THREAD + k] = cloth.sequence[WEFT, np.uintp(ints[PICK + k])]
-        over = reals[X + k] if top == WARP else reals[Y + k]
-        reals[_UPPER_START + k], reals[_UPPER_CELLS + k] = upper_run(R, cloth, i, j, top)
-        start, cells, _ = lower_run(R, cloth, i, j, top, over)
-        reals[_LOWER_START + k], reals[_LOWER_CELLS + k] = start, cells
+    # In a loop of its own, LLVM vectorises this; between the gathers it would branch.
+    for k in range(size):
+        warp = ints[TOP + k] == WARP
+        over = reals[X + k] if warp else reals[Y + k]
+        step = np.int32(1) if over > R(0.5) else np.int32(-1)
+        across = step if warp else np.int32(0)
+        ints[_NEXT_I + k] = wrapped(ints[CELL_I + k] + across, ends)
+        ints[_NEXT_J + k] = wrapped(ints[CELL_J + k] + step - across, picks)
+    for k in range(size):
+        i, j = np.uintp(ints[CELL_I + k]), np.uintp(ints[CELL_J + k])
+        reals[_UPPER_PLACE + k] = cloth.runs[i, j, 0, 0]
+        reals[_UPPER_COUNT + k] = cloth.runs[i, j, 0, 1]
+        reals[_LOWER_PLACE + k] = cloth.runs[i, j, slot, 0]
+        reals[_LOWER_COUNT + k] = cloth.runs[i, j, slot, 1]
+        i, j = np.uintp(ints[_NEXT_I + k]), np.uintp(ints[_NEXT_J + k])
+        reals[_BEYOND + k] = cloth.runs[i, j, 0, 1]
 
 
 @njit(**INLINE)
 def _place(R, cloth, size, ints, reals):
     """Compute the visible thread, and the position on its run."""
     weft_width, warp_width = cloth.width[WEFT], cloth.width[WARP]
+    weft_pitch, warp_pitch, nan = cloth.pitch[WEFT], cloth.pitch[WARP], R(np.nan)
+    weft_rim, warp_rim, tiny = cloth.rim[WEFT], cloth.rim[WARP], cloth.tiny
+    ends, picks = cloth.grid.shape
     for k in range(size):
-        top, x = ints[TOP + k], reals[X + k]
-        which, s, _, _ = place_on(
-            R, cloth, top, warp_width if top == WARP else weft_width,
-            weft_width if top == WARP else warp_width,
-            reals[_UPPER_START + k], reals[_UPPER_CELLS + k],
-            reals[_LOWER_START + k], reals[_LOWER_CELLS + k], x, reals[Y + k],
+        top, x, y = ints[TOP + k], reals[X + k], reals[Y + k]
+        warp = top == WARP
+        upper_start, upper_cells = seen_run(
+            R, warp_rim if warp else weft_rim, picks if warp else ends,
+            reals[_UPPER_PLACE + k], reals[_UPPER_COUNT + k],
+        )  # fmt: skip
+        lower_start, lower_cells, rises = hidden_run(
+            R, weft_rim if warp else warp_rim, tiny, ends if warp else picks,
+            (x if warp else y) > R(0.5),
+            reals[_LOWER_PLACE + k], reals[_LOWER_COUNT + k], reals[_BEYOND + k],
+        )  # fmt: skip
+        which, s, w, cells = place_on(
+            R, cloth, top, warp_width if warp else weft_width, weft_width if warp else warp_width,
+            upper_start, upper_cells, lower_start, lower_cells, x, y,
         )  # fmt: skip
         warp_thread, weft_thread = ints[_WARP_THREAD + k], ints[_WEFT_THREAD + k]
         thread = warp_thread if which == WARP else weft_thread
         sound = x >= R(0)
         ints[OF_SET + k] = which if sound else WEFT
         ints[OF_THREAD + k] = thread if sound and which != GAP else 0
-        reals[S + k] = s if sound else R(np.nan)
+        reals[S + k], reals[ACROSS + k] = s if sound else nan, w if sound else nan
+        crossing = weft_pitch if which == WARP else warp_pitch
+        cells *= R(1) if which == top else rises
+        reals[LENGTH + k] = cells * crossing if sound else nan

@@ -143,7 +143,12 @@ def piece_of(R, cloth, thread, s):
 @njit(**INLINE)
 def angle_on(R, cloth, thread, s):
     """Tangent angle [rad] of thread type `thread` at `s`."""
-    k = piece_of(R, cloth, thread, s)
+    return angle_of(R, cloth, thread, piece_of(R, cloth, thread, s), s)
+
+
+@njit(**INLINE)
+def angle_of(R, cloth, thread, k, s):
+    """`angle_on` where `s` is on piece `k` of the curve."""
     return (
         cloth.curve_angle[thread, k]
         + (s - cloth.curve_start[thread, k]) * cloth.curve_slope[thread, k]
@@ -191,11 +196,21 @@ def upper_run(R, cloth, i, j, top):
 
     cells : length of the visible run, its ends beyond its cells included
     """
-    place, count = R(cloth.runs[i, j, 0, 0]), R(cloth.runs[i, j, 0, 1])
-    rim = cloth.rim[top]
-    if count == R(0):
-        return place, R(cloth.grid.shape[1 if top == WARP else 0])
-    return place + rim, count + R(2) * rim
+    return seen_run(
+        R, cloth.rim[top], cloth.grid.shape[1 if top == WARP else 0],
+        R(cloth.runs[i, j, 0, 0]), R(cloth.runs[i, j, 0, 1]),
+    )  # fmt: skip
+
+
+@njit(**INLINE)
+def seen_run(R, rim, around, place, count):
+    """`upper_run` from what the tables hold.
+
+    rim : of the set on top; around : cells of the repeat along it
+    place, count : of the run; a count of 0 says that it has no end
+    """
+    ended = count > R(0)
+    return (place + rim, count + R(2) * rim) if ended else (place, R(around))
 
 
 @njit(**INLINE)
@@ -210,33 +225,43 @@ def lower_run(R, cloth, i, j, top, over):
     rises : 1 on a visible run, 0 on a strip
     """
     which = 1 - top
-    rim, slot = cloth.rim[which], cloth.runs.shape[2] - 1
-    ahead = over > R(0.5)
+    slot, ahead = cloth.runs.shape[2] - 1, over > R(0.5)
     ends, picks = cloth.grid.shape
     step = 1 if ahead else -1
     # A neighbour of the cell, wrapped around the repeat.
     i_next = wrapped(i + (step if which == WEFT else 0), ends)
     j_next = wrapped(j + (step if which == WARP else 0), picks)
-    place, count = int(cloth.runs[i, j, slot, 0]), int(cloth.runs[i, j, slot, 1])
-    beyond = R(cloth.runs[i_next, j_next, 0, 1])
-    if count > 0 and place == (count - 1 if ahead else 0):
-        return (rim - R(1) if ahead else beyond + rim), beyond + R(2) * rim, R(1)
+    return hidden_run(
+        R, cloth.rim[which], cloth.tiny, picks if which == WARP else ends, ahead,
+        R(cloth.runs[i, j, slot, 0]), R(cloth.runs[i, j, slot, 1]),
+        R(cloth.runs[i_next, j_next, 0, 1]),
+    )  # fmt: skip
+
+
+@njit(**INLINE)
+def hidden_run(R, rim, tiny, around, ahead, place, count, beyond):
+    """`lower_run` from what the tables hold.
+
+    rim : of the set underneath; around : cells of the repeat along it
+    ahead : whether the place is beyond the thread on top, not before it
+    place, count : of the hidden run; beyond : cells of the visible run beside it
+
+    The code selects instead of branching, as in `place_on`.
+    """
+    ended = count > R(0)
+    on_run = ended and place == (count - R(1) if ahead else R(0))
     # Strips 2 rim wide: of a run with an end, the first is that behind the first cell.
-    strip = R(place)
-    if count > 0:
-        start = R(2) * rim * strip - (R(1) - rim) if ahead else R(2) * rim * strip - rim
-        strips = count - 1
-    else:
-        start = R(2) * rim * strip + (R(2) * rim - R(1) if ahead else R(0))
-        strips = picks if which == WARP else ends
-    return start, max(R(2) * rim * R(strips), cloth.tiny), R(0)
+    endless_start = R(2) * rim - R(1) if ahead else R(0)
+    first = (rim - R(1) if ahead else -rim) if ended else endless_start
+    strips = max(R(2) * rim * (count - R(1) if ended else R(around)), tiny)
+    start = (rim - R(1) if ahead else beyond + rim) if on_run else R(2) * rim * place + first
+    return start, beyond + R(2) * rim if on_run else strips, R(1) if on_run else R(0)
 
 
 @njit(**INLINE)
 def wrapped(k, count):
     """`k` from -1 to `count` as an index of a ring of `count`."""
-    if k < 0:
-        return count - 1
+    k = count - 1 if k < 0 else k
     return 0 if k >= count else k
 
 

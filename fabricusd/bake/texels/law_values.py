@@ -23,8 +23,9 @@ from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.laws.lit import column_of, level_of, mean_over
 from fabricusd.appearance.levels import WEAVE
 from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.shadow.kinds import Shadow
 from fabricusd.appearance.shadow.mean import angle_groups
-from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
+from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.surface import evaluate, fuzz_of, places_of, points_all
 from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
 from fabricusd.appearance.weave.place import Places, place_at

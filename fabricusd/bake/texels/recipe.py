@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.scattering.models import translucent
-from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
+from fabricusd.appearance.shadow.kinds import Shadow
+from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.lookup import back_of
 from fabricusd.appearance.weave.yarn.compiled import Yarn, compile_yarn

@@ -10,7 +10,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.shadow.methods import METHODS, Shadow, compile_shadow, shadowing
+from fabricusd.appearance.shadow.kinds import METHODS, Shadow
+from fabricusd.appearance.shadow.methods import compile_shadow, shadowing
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.chart.panel import Panel, Row

@@ -18,8 +18,9 @@ from fabricusd.appearance.published.tables import has_cell_lobes
 from fabricusd.appearance.scattering.columns import LAW
 from fabricusd.appearance.scattering.model import PUBLISHED
 from fabricusd.appearance.scattering.table import pack_threads
+from fabricusd.appearance.shadow.kinds import Shadow
 from fabricusd.appearance.shadow.mean import node_groups
-from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
+from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.surface import far_all
 from fabricusd.appearance.weave.coverage import coverage as cover
 from fabricusd.appearance.weave.quadrature import CELLS, POINTS, Rule, curve_nodes

@@ -1429,29 +1429,39 @@ T_fff k_conserving_level_value(Place place, float ix, float iy, float iz, float 
 
 struct T_iiffff { int m0_; int m1_; float m2_; float m3_; float m4_; float m5_; };
 
+T_ff k_seen_run(float rim, int around, float place, float count) {
+  bool ended;
+  ended = (count > 0.0);
+  return (ended ? T_ff((place + rim), (count + (2.0 * rim))) : T_ff(place, float(around)));
+}
+
 T_ff k_upper_run(int i, int j, int top) {
-  float place;
-  float count;
-  float rim;
-  place = float(I(cloth_runs_at + (((i) * cloth_runs_n1 + j) * cloth_runs_n2 + 0) * cloth_runs_n3 + 0));
-  count = float(I(cloth_runs_at + (((i) * cloth_runs_n1 + j) * cloth_runs_n2 + 0) * cloth_runs_n3 + 1));
-  rim = F(cloth_rim_at + top);
-  if ((count == 0.0)) {
-    return T_ff(place, float(((top == 1) ? cloth_grid_n1 : cloth_grid_n0)));
-  }
-  return T_ff((place + rim), (count + (2.0 * rim)));
+  return k_seen_run(F(cloth_rim_at + top), ((top == 1) ? cloth_grid_n1 : cloth_grid_n0), float(I(cloth_runs_at + (((i) * cloth_runs_n1 + j) * cloth_runs_n2 + 0) * cloth_runs_n3 + 0)), float(I(cloth_runs_at + (((i) * cloth_runs_n1 + j) * cloth_runs_n2 + 0) * cloth_runs_n3 + 1)));
 }
 
 int k_wrapped(int k, int count) {
-  if ((k < 0)) {
-    return (count - 1);
-  }
+  k = ((k < 0) ? (count - 1) : k);
   return ((k >= count) ? 0 : k);
+}
+
+T_fff k_hidden_run(float rim, float tiny, int around, bool ahead, float place, float count, float beyond) {
+  bool ended;
+  bool on_run;
+  float endless_start;
+  float first;
+  float strips;
+  float start;
+  ended = (count > 0.0);
+  on_run = (ended && (place == mix(0.0, (count - 1.0), ahead)));
+  endless_start = mix(0.0, ((2.0 * rim) - 1.0), ahead);
+  first = mix(endless_start, mix((-rim), (rim - 1.0), ahead), ended);
+  strips = max(((2.0 * rim) * mix(float(around), (count - 1.0), ended)), tiny);
+  start = mix((((2.0 * rim) * place) + first), mix((beyond + rim), (rim - 1.0), ahead), on_run);
+  return T_fff(start, mix(strips, (beyond + (2.0 * rim)), on_run), mix(0.0, 1.0, on_run));
 }
 
 T_fff k_lower_run(int i, int j, int top, float over) {
   int which;
-  float rim;
   int slot;
   bool ahead;
   int ends;
@@ -1459,14 +1469,7 @@ T_fff k_lower_run(int i, int j, int top, float over) {
   int step_;
   int i_next;
   int j_next;
-  int place;
-  int count;
-  float beyond;
-  float strip;
-  float start;
-  int strips;
   which = (1 - top);
-  rim = F(cloth_rim_at + which);
   slot = (cloth_runs_n2 - 1);
   ahead = (over > 0.5);
   ends = cloth_grid_n0;
@@ -1474,21 +1477,7 @@ T_fff k_lower_run(int i, int j, int top, float over) {
   step_ = (ahead ? 1 : -1);
   i_next = k_wrapped((i + ((which == 0) ? step_ : 0)), ends);
   j_next = k_wrapped((j + ((which == 1) ? step_ : 0)), picks);
-  place = I(cloth_runs_at + (((i) * cloth_runs_n1 + j) * cloth_runs_n2 + slot) * cloth_runs_n3 + 0);
-  count = I(cloth_runs_at + (((i) * cloth_runs_n1 + j) * cloth_runs_n2 + slot) * cloth_runs_n3 + 1);
-  beyond = float(I(cloth_runs_at + (((i_next) * cloth_runs_n1 + j_next) * cloth_runs_n2 + 0) * cloth_runs_n3 + 1));
-  if (((count > 0) && (place == (ahead ? (count - 1) : 0)))) {
-    return T_fff(mix((beyond + rim), (rim - 1.0), ahead), (beyond + (2.0 * rim)), 1.0);
-  }
-  strip = float(place);
-  if ((count > 0)) {
-    start = mix((((2.0 * rim) * strip) - rim), (((2.0 * rim) * strip) - (1.0 - rim)), ahead);
-    strips = (count - 1);
-  } else {
-    start = (((2.0 * rim) * strip) + mix(0.0, ((2.0 * rim) - 1.0), ahead));
-    strips = ((which == 1) ? picks : ends);
-  }
-  return T_fff(start, max(((2.0 * rim) * float(strips)), cloth_tiny), 0.0);
+  return k_hidden_run(F(cloth_rim_at + which), cloth_tiny, ((which == 1) ? picks : ends), ahead, float(I(cloth_runs_at + (((i) * cloth_runs_n1 + j) * cloth_runs_n2 + slot) * cloth_runs_n3 + 0)), float(I(cloth_runs_at + (((i) * cloth_runs_n1 + j) * cloth_runs_n2 + slot) * cloth_runs_n3 + 1)), float(I(cloth_runs_at + (((i_next) * cloth_runs_n1 + j_next) * cloth_runs_n2 + 0) * cloth_runs_n3 + 1)));
 }
 
 struct T_ifff { int m0_; float m1_; float m2_; float m3_; };
@@ -1542,10 +1531,12 @@ int k_piece_of(int thread, float s) {
   return k;
 }
 
-float k_angle_on(int thread, float s) {
-  int k;
-  k = k_piece_of(thread, s);
+float k_angle_of(int thread, int k, float s) {
   return (F(cloth_curve_angle_at + (thread) * cloth_curve_angle_n1 + k) + ((s - F(cloth_curve_start_at + (thread) * cloth_curve_start_n1 + k)) * F(cloth_curve_slope_at + (thread) * cloth_curve_slope_n1 + k)));
+}
+
+float k_angle_on(int thread, float s) {
+  return k_angle_of(thread, k_piece_of(thread, s), s);
 }
 
 T_iiffff k_thread_at(int i, int j, int end, int pick, float x, float y) {
@@ -1700,13 +1691,15 @@ float k_lit(float u, float v, Hit hit, float x, float y, float z) {
   return k_soft_edge(k_above_horizon(sine, flat_, z), shadow_softness);
 }
 
-int k_stretch_of(int which, int thread, float s) {
-  int p;
+int k_stretch_in(int which, int thread, int p, float s) {
   int part;
-  p = k_piece_of(thread, s);
   part = int(((s - F(cloth_curve_start_at + (thread) * cloth_curve_start_n1 + p)) * F(shadow_piece_scale_at + (thread) * shadow_piece_scale_n1 + p)));
   part = max(min(part, I(shadow_piece_last_at + (thread) * shadow_piece_last_n1 + p)), 0);
   return ((I(shadow_mean_first_at + (which) * shadow_mean_first_n1 + thread) + I(shadow_piece_first_at + (thread) * shadow_piece_first_n1 + p)) + part);
+}
+
+int k_stretch_of(int which, int thread, float s) {
+  return k_stretch_in(which, thread, k_piece_of(thread, s), s);
 }
 
 float k_mean_of(int stretch, float x, float y, float z) {

@@ -19,7 +19,8 @@ from fabricusd.appearance.published.tables import SurfaceTables, surface_tables
 from fabricusd.appearance.sampling.blocks import Drawn, sample_points
 from fabricusd.appearance.sampling.fit import no_mixture
 from fabricusd.appearance.scattering.models import any_conserving
-from fabricusd.appearance.shadow.methods import Shadow, compile_shadow
+from fabricusd.appearance.shadow.kinds import Shadow
+from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.place import Places
 from fabricusd.appearance.weave.yarn.compiled import compile_yarn
@@ -44,17 +45,17 @@ from fabricusd.reference.stages.arrivals import Settings, arrive, sort_lanes
 from fabricusd.reference.stages.departures import depart
 from fabricusd.reference.stages.hits import prepare
 from fabricusd.reference.stages.shadow_rays import settle, thin_out
-from fabricusd.reference.surfaces.fabric import (
-    NOWHERE_ELSE,
+from fabricusd.reference.surfaces.fabric import NOWHERE_ELSE, Scattering, finish_point
+from fabricusd.reference.surfaces.fabric_far import shade_far
+from fabricusd.reference.surfaces.fabric_gap import TABLE, pass_published
+from fabricusd.reference.surfaces.fabric_near import (
+    Lit,
     Points,
-    Scattering,
-    finish_point,
     look_up,
     look_up_uneven,
     places_of,
+    shadows_by_horizon,
 )
-from fabricusd.reference.surfaces.fabric_far import shade_far
-from fabricusd.reference.surfaces.fabric_gap import TABLE, pass_published
 from fabricusd.reference.surfaces.preview import build_surfaces, shade_preview
 from fabricusd.scene.scene import Camera, Mesh, PreviewSurface, Scene
 
@@ -188,7 +189,7 @@ def _shadow_table() -> None:
 
 
 def _look_up() -> None:
-    look_up(R, _woven()[0], R(1), _sample().wave.hits.rows, 0, _points())
+    look_up(R, *_woven(), R(1), _sample().wave.hits.rows, 0, _points())
 
 
 def _look_up_uneven() -> None:
@@ -212,12 +213,23 @@ def _point_values() -> None:
     point_values(R, _cloth()[1], False, _places(), vectors, vectors, vectors, 0, 0)
 
 
+def _lit() -> Lit:
+    return Lit(*[np.zeros(0, np.float32)] * 2)
+
+
 def _finish_point() -> None:
     scattering = Scattering(*[np.zeros((3, 0), np.float32)] * 5)
     finish_point(
-        R, *_woven(), R(1), True, 1, _sample().wave.hits.rows, 0, scattering, _points(),
-        np.zeros(0, np.float32),
+        R, True, 1, _sample().wave.hits.rows, 0, scattering, _points(), np.zeros(0, np.float32),
+        _lit(),
     )  # fmt: skip
+
+
+def _shadows() -> None:
+    vectors = np.zeros((3, 0), np.float32)
+    shadows_by_horizon(
+        R, *_woven(), R(1), _sample().wave.hits.rows, 0, (vectors, vectors), _points(), _lit()
+    )
 
 
 EVERY_PICTURE, CLOSE_UPS, MASKED, PROJECTED = (
@@ -230,7 +242,8 @@ TASKS: dict[str, tuple[Callable[[], None], ...]] = {
     MASKED: (_shade_far, _share_lobes),
     PROJECTED: (_shadow_table, _share_lobes_projected, _shade_far_projected),
     CLOSE_UPS: (
-        _finish_point, _look_up_uneven, _look_up, _sample_points, _point_values, _shadow_table,
+        _sample_points, _look_up_uneven, _shadows, _finish_point, _look_up, _shadow_table,
+        _point_values,
     ),
 }  # fmt: skip
 """The tasks of each list. Tasks that take longest stand at both ends, next to those with which they
@@ -247,7 +260,7 @@ def of_law(fabric: Fabric) -> str | None:
 
 
 LONGEST = {
-    EVERY_PICTURE: prepare, CLOSE_UPS: finish_point, MASKED: shade_far, PROJECTED: pass_published
+    EVERY_PICTURE: prepare, CLOSE_UPS: sample_points, MASKED: shade_far, PROJECTED: pass_published
 }  # fmt: skip
 """A kernel of each list that takes long to compile, or comes last: if it is cached, so are the
 others."""

@@ -31,35 +31,24 @@ from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.sampling.blocks import Drawn, sample_points, sample_points_both
 from fabricusd.appearance.sampling.mixture import density, direction
 from fabricusd.appearance.scattering.models import translucent
-from fabricusd.appearance.shadow.methods import NONE, Shadow, compile_shadow, shade
+from fabricusd.appearance.shadow.kinds import Shadow
+from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.surface import fuzz_of
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
-from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
-from fabricusd.appearance.weave.lookup import back_of, find, move_along
-from fabricusd.appearance.weave.place import Hit, Places, place_at
+from fabricusd.appearance.weave.coverage import GAP, WARP
+from fabricusd.appearance.weave.lookup import back_of
+from fabricusd.appearance.weave.place import place_at
 from fabricusd.appearance.weave.yarn.compiled import compile_yarn
-from fabricusd.appearance.weave.yarn.lay import (
-    DOUBLE_ROWS,
-    IN_CELL,
-    INT_ROWS,
-    REAL_ROWS,
-    TONE,
-    lay_block,
-    sound,
-    strand,
-)
 from fabricusd.fabric import Fabric
-from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, LEAN
+from fabricusd.kernels.real import INLINE, KERNEL, LEAN
 from fabricusd.reference.rays.embree import aligned_empty
 from fabricusd.reference.rays.wave import (
     CHANCE,
     F_PDF,
     FAR_LEVEL,
-    FOOTPRINT,
     GO,
     GO_PDF,
     KEEP,
-    PLACE,
     PRIMITIVE,
     THREAD,
     THREAD_LEVEL,
@@ -75,34 +64,19 @@ from fabricusd.reference.surfaces.fabric_far import (
 )
 from fabricusd.reference.surfaces.fabric_fuzz import lay_fuzz
 from fabricusd.reference.surfaces.fabric_gap import gap_table, pass_far, pass_gaps, pass_places
+from fabricusd.reference.surfaces.fabric_near import (
+    Lit,
+    Points,
+    look_up,
+    look_up_uneven,
+    places_of,
+    shadows,
+)
 
 R = np.float32
 _ONE_AT_A_TIME = threading.Lock()
 NOWHERE_ELSE = np.zeros((0, 2), np.int64)
 """`TriangleTables.home` of a scene without uneven threads."""
-
-
-class Points(NamedTuple):
-    """The thread under each of n hits, as `weave.lookup.find` gives it.
-
-    sets : (n,) uint8; threads : (n,) int32; along, across, psi0, length : (n,) float32
-    strand : (n,) float32 - position across the strand of plies; `across` itself where none shows
-    shade : (n,) float32 - factor of the albedo; (0,) for even threads
-    """
-
-    sets: NDArray[np.uint8]
-    threads: NDArray[np.int32]
-    along: NDArray[np.float32]
-    across: NDArray[np.float32]
-    psi0: NDArray[np.float32]
-    length: NDArray[np.float32]
-    strand: NDArray[np.float32]
-    shade: NDArray[np.float32]
-
-
-def places_of(points: Points) -> Places:
-    """What the surface laws read of `points`."""
-    return Places(points.sets, points.threads, points.psi0, points.strand, points.shade)
 
 
 class Scattering(NamedTuple):
@@ -133,6 +107,8 @@ class _Scratch:
         self.length = aligned_empty((capacity,))
         self.strand = aligned_empty((capacity,))
         self.shade = aligned_empty((capacity,))
+        self.light = aligned_empty((capacity,))
+        self.bounce = aligned_empty((capacity,))
 
     def scattering(self, count: int) -> Scattering:
         """C-contiguous arrays for `count` hits."""
@@ -248,7 +224,8 @@ class FabricShader:
             self._shade_by_law(side, hits, first, scattering, passes)
         else:
             points = scratch.points(last - first, uneven=side.yarn is not None)
-            self._shade_near(side, level, back, wave, first, scattering, points, passes)
+            lit = Lit(scratch.light[: last - first], scratch.bounce[: last - first])
+            self._shade_near(side, level, back, wave, first, scattering, points, passes, lit)
 
     def _shade_by_law(
         self,
@@ -276,6 +253,7 @@ class FabricShader:
         scattering: Scattering,
         points: Points,
         passes: NDArray[np.float32],
+        lit: Lit,
     ) -> None:
         wo, wi, go, towards, onwards = scattering
         hits = wave.hits.rows
@@ -284,7 +262,7 @@ class FabricShader:
         places = places_of(points)
         v_sign = R(-1) if back else R(1)
         if side.yarn is None:
-            look_up(R, cloth, v_sign, hits, first, points)
+            look_up(R, cloth, shadow, v_sign, hits, first, points)
         else:
             look_up_uneven(
                 R, cloth, side.yarn, self.home, v_sign, wave.hits.tags[PRIMITIVE], hits, first,
@@ -318,9 +296,9 @@ class FabricShader:
             else:
                 _by_law(R, law, level, hits, first, scattering, places)
             pass_places(R, law.conserving, self.is_open, points.sets, wo, passes)
+        shadows(cloth, shadow, v_sign, hits, first, (wi, go), points, lit)
         finish_point(
-            R, cloth, shadow, v_sign, law.kind == PUBLISHED_ONLY, side.types, hits, first,
-            scattering, points, passes,
+            R, law.kind == PUBLISHED_ONLY, side.types, hits, first, scattering, points, passes, lit
         )  # fmt: skip
 
 
@@ -398,86 +376,15 @@ def finish_by_law(R, hits, first, passes, scattering):
 
 
 @njit(**LEAN)
-def look_up(R, cloth, v_sign, hits, first, points):
-    """Look up the thread under each hit."""
-    sets, threads, along, across, psi0, length, _, _ = points
-    for k in range(sets.shape[0]):
-        h = first + k
-        which, thread, s, w, angle, run = find(
-            R, cloth, float(hits[PLACE, h]), float(v_sign * hits[PLACE + 1, h])
-        )
-        sets[k], threads[k], along[k], across[k] = which, thread, s, w
-        psi0[k], length[k] = angle, run
-
-
-@njit(**KERNEL)
-def look_up_uneven(R, cloth, yarn, home, v_sign, triangles, hits, first, points):
-    """Look up the uneven thread under each hit; PLACE becomes the place of the even cloth at which
-    that thread lies, for the shadows.
-
-    home : `TriangleTables.home`; triangles : (n,) of each hit
-    """
-    u, v, blur = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, R)
-    doubles, reals = np.empty(DOUBLE_ROWS * BLOCK), np.empty(REAL_ROWS * BLOCK, R)
-    ints = np.empty(INT_ROWS * BLOCK, np.int32)
-    count, metres = points.sets.shape[0], R(yarn.cell[WEFT])
-    for start in range(0, count, BLOCK):
-        size = min(BLOCK, count - start)
-        for x in range(size):
-            h = first + start + x
-            u[x] = float(hits[PLACE, h]) + home[triangles[h], 0]
-            v[x] = float(hits[PLACE + 1, h]) + home[triangles[h], 1]
-            blur[x] = hits[FOOTPRINT, h] * metres
-        lay_block(R, yarn, u, v, blur, size, doubles, reals, ints)
-        for x in range(size):
-            _look_up_laid(
-                R, cloth, yarn, home[triangles[first + start + x]], v_sign, u[x], v[x], x, reals,
-                ints, hits, first + start + x, start + x, points,
-            )  # fmt: skip
-
-
-@njit(**INLINE)
-def _look_up_laid(R, cloth, yarn, home, v_sign, u, v, x, reals, ints, hits, h, k, points):
-    """Look up hit `h`, entry x of what `lay_block` found at (u, v), into entry k of `points`."""
-    sets, threads, along, across, psi0, length, strands, shades = points
-    place_u, place_v = u, v
-    laid = sound(u, v)
-    if laid:
-        place_u = float(ints[WARP * BLOCK + x]) + float(reals[IN_CELL + WARP * BLOCK + x])
-        place_v = float(ints[WEFT * BLOCK + x]) + float(reals[IN_CELL + WEFT * BLOCK + x])
-    near_u, near_v = place_u - home[0], place_v - home[1]
-    which, thread, s, w, angle, run = find(R, cloth, near_u, v_sign * near_v)
-    sets[k], threads[k], along[k], across[k] = which, thread, s, w
-    psi0[k], length[k], strands[k], shades[k] = angle, run, w, R(1)
-    if which != GAP and laid:
-        number = ints[which * BLOCK + x]
-        shades[k] = reals[TONE + which * BLOCK + x]
-        if yarn.plies != 0:
-            at = v_sign * v if which == WARP else u
-            strands[k] = strand(R, yarn, which, thread, number, w, at * yarn.cell[which])
-        if run > R(0):
-            # Along the thread as this side counts it: from the back, V runs the other way.
-            place = v_sign * place_v if which == WARP else place_u
-            moved, along[k], psi0[k] = move_along(
-                R, cloth, yarn, which, thread, number, s, run, place
-            )
-            near_u = near_u if which == WARP else moved - home[0]
-            near_v = v_sign * moved - home[1] if which == WARP else near_v
-    hits[PLACE, h], hits[PLACE + 1, h] = R(near_u), R(near_v)
-
-
-@njit(**LEAN)
-def finish_point(
-    R, cloth, shadow, v_sign, published, types, hits, first, scattering, points, passes
-):  # fmt: skip
-    """Apply the shadowing of neighbouring threads, and let paths through.
+def finish_point(R, published, types, hits, first, scattering, points, passes, lit):
+    """Apply the shadows of neighbouring threads, and let paths through.
 
     passes : (n,) probability with which a path goes straight on at its place; of `published` cloth
         in gaps alone, where what does not pass ends
     """
-    _, wi, go, towards, onwards = scattering
-    sets, threads, along, across, _, length, _, _ = points
-    for k in range(wi.shape[1]):
+    _, _, go, towards, onwards = scattering
+    sets, threads = points.sets, points.threads
+    for k in range(go.shape[1]):
         h = first + k
         keep = R(1) if published else R(1) - passes[k]
         if sets[k] == GAP and published:
@@ -492,17 +399,7 @@ def finish_point(
             hits[KEEP, h], hits[THREAD, h] = keep, R(-1)
             _finish(hits, h, keep, k, go, onwards)
             continue
-        u, v = float(hits[PLACE, h]), float(v_sign * hits[PLACE + 1, h])
-        light, bounce = R(1), R(1)
-        hit = Hit(sets[k], threads[k], along[k], across[k], length[k])
-        if shadow.method != NONE:
-            # Light from behind the cloth is shadowed by the threads on that side.
-            light = R(1) if wi[2, k] <= R(0) else shade(
-                R, cloth, shadow, u, v, hit, wi[0, k], wi[1, k], wi[2, k],
-            )  # fmt: skip
-            bounce = R(1) if go[2, k] <= R(0) else shade(
-                R, cloth, shadow, u, v, hit, go[0, k], go[1, k], go[2, k],
-            )  # fmt: skip
+        light, bounce = lit.light[k], lit.bounce[k]
         for row in range(3):
             hits[F + row, h] = light * towards[row, k]
             onwards[row, k] = bounce * onwards[row, k]

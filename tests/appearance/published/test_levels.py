@@ -17,8 +17,9 @@ from fabricusd.appearance.published.levels import point_value, point_values
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.scattering import models
 from fabricusd.appearance.scattering.model import PUBLISHED as LAW
+from fabricusd.appearance.shadow.kinds import METHODS
 from fabricusd.appearance.shadow.mean import LEAST_LIGHT
-from fabricusd.appearance.shadow.methods import METHODS, compile_shadow, mean_lit, shadowing
+from fabricusd.appearance.shadow.methods import compile_shadow, mean_lit, shadowing
 from fabricusd.appearance.weave.compiled import compile_fabric
 from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
 from fabricusd.appearance.weave.lookup import lookup

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fabricusd.appearance.shadow import horizon
-from fabricusd.appearance.shadow.methods import METHODS, compile_shadow, shadowing
+from fabricusd.appearance.shadow.kinds import METHODS
+from fabricusd.appearance.shadow.methods import compile_shadow, shadowing
 from fabricusd.appearance.shadow.neighbourhoods import neighbourhoods
 from fabricusd.appearance.weave.compiled import compile_fabric
 from fabricusd.bake.texels.recipe import recipe, repeat_mean

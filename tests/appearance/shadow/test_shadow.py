@@ -13,14 +13,8 @@ from hypothesis import strategies as st
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.shadow.height import highest_point
 from fabricusd.appearance.shadow.horizon import shape_repeat
-from fabricusd.appearance.shadow.methods import (
-    METHODS,
-    Shadow,
-    compile_shadow,
-    lit_all,
-    mean_lit,
-    shadowing,
-)
+from fabricusd.appearance.shadow.kinds import METHODS, Shadow
+from fabricusd.appearance.shadow.methods import compile_shadow, lit_all, mean_lit, shadowing
 from fabricusd.appearance.weave.bands import seen_length
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import coverage
