@@ -165,8 +165,8 @@ from fabricusd.cli.main import main
 from fabricusd.steps import watched
 
 def say(name, total, done):
-    if name.startswith("horizon table") and done == 1:
-        print("table", flush=True)
+    if name.startswith("horizon table") and 0 < done < total:
+        print("table" if done == 1 else f"{done} of {total}", flush=True)
 
 with watched(listener=say):
     sys.exit(main(["render", *sys.argv[1:]]))
@@ -176,7 +176,7 @@ with watched(listener=say):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", often(SIGNALS, SIGNALS[:1]))
 @pytest.mark.parametrize("worn", ["published", "nearest"])
-def test_the_tables_of_a_large_repeat_are_broken_off_within_two_seconds(number, worn, tmp_path):
+def test_the_tables_of_a_large_repeat_are_broken_off(number, worn, tmp_path):
     i, j = np.mgrid[0:240, 0:240]
     figure = np.hypot(i - 120, j - 120) < 80 + 30 * np.sin(5 * np.arctan2(j - 120, i - 120))
     satin = (5 * i + j) % 8 == 0
@@ -196,10 +196,12 @@ def test_the_tables_of_a_large_repeat_are_broken_off_within_two_seconds(number, 
         "x.exr", "--width", "64", "--height", "64", "--level", "weave", "--spp", "4",
     ]  # fmt: skip
     process = started(command, tmp_path, "table")
-    begun = time.perf_counter()
     process.send_signal(number)
-    assert "interrupted" in end(process, 130)
-    assert time.perf_counter() - begun < 2.0
+    said, err = process.communicate(timeout=120)
+    assert process.returncode == 130, err
+    assert "interrupted" in err
+    for done, _, total in map(str.split, said.splitlines()):
+        assert int(done) < int(total) - 1
     # Pixels that look past the cloth may have been sampled by then, and are kept.
     if (tmp_path / "x.exr").exists():
         assert read_exr_layers(tmp_path / "x.exr")[1]["fabricusd:complete"] == 0

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import sys
 import threading
-import time
 
 import numpy as np
 import OpenEXR
@@ -172,12 +172,12 @@ def test_a_setting_that_makes_no_sense_is_refused_with_its_value(scene, name):
         render(scene, **{"width": 8, "height": 8, "spp": 1, **settings})
 
 
-def test_an_output_that_cannot_be_written_is_refused_before_the_work(tmp_path, scene):
+def test_an_output_that_cannot_be_written_is_refused_before_the_work(tmp_path, scene, monkeypatch):
+    module = sys.modules[render.__module__]  # as an attribute, its package has the function
+    monkeypatch.setattr(module, "render_scene", lambda *_, **__: pytest.fail("work was begun"))
     for name, words in (("no/such/x.exr", "not a directory"), ("x.jpeg2", "picture format")):
-        begun = time.perf_counter()
         with pytest.raises(FabricError, match=words):
-            render(scene, tmp_path / name, width=4000, height=4000, spp=1000)
-        assert time.perf_counter() - begun < 1.0
+            render(scene, tmp_path / name, width=8, height=8, spp=1)
 
 
 def test_a_scene_without_triangles_shows_its_lights_and_says_so():
