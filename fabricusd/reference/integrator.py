@@ -26,7 +26,9 @@ from fabricusd.reference.rays.embree import (
     ROWS,
     TFAR,
     Accelerator,
+    has_instances,
 )
+from fabricusd.reference.rays.placed import Carried, room_for, scene_triangles, to_world
 from fabricusd.reference.rays.sobol import new_numbers
 from fabricusd.reference.rays.triangles import Triangles, build_tables
 from fabricusd.reference.rays.wave import (
@@ -59,6 +61,7 @@ from fabricusd.reference.surfaces.preview import (
     shade_preview,
 )
 from fabricusd.reference.surfaces.thin import is_thin, shade_thin, shade_thin_mapped
+from fabricusd.scene.copies import with_copies
 from fabricusd.scene.scene import FabricSurface, Material, Scene
 
 LEVELS = {
@@ -140,8 +143,10 @@ class Tracer:
         # Some laws need a table of shadows, a long step: whoever watches this thread watches it.
         shaders = beside.submit(copy_context().run, _shaders, scene, shadow)
         beside.shutdown(wait=False)
-        self.tables = build_tables(scene)
-        self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
+        self.tables = build_tables(scene if has_instances() else with_copies(scene))
+        self.accelerator = Accelerator(
+            self.tables.points, self.tables.triangles, self.tables.groups, self.tables.placements
+        )
         self.shaders = shaders.result()
         for cloth in filter(None, self.shaders):
             cloth.home = self.tables.home
@@ -228,12 +233,14 @@ class Tracer:
         tags[1:, :count] = 0
         counts = np.zeros(QUEUES * len(self.shaders), np.int64)
         result = np.zeros(3, np.int64)
+        triangles, uv = self._triangles_of(wave)
         for step in range(self.steps):
             self.accelerator.intersect(wave.lanes.rays, (count + 15) // 16, coherent=step == 0)
+            self._carry(wave, wave.lanes.rays, count)
             counters[0] += count
             arrive(
                 step, self.settings, count, wave.lanes, wave.paths, self.numbers, self.lights,
-                self.triangles, self._limits, wave.film, wave.queues, counts, lost,
+                triangles, self._limits, wave.film, wave.queues, counts, lost,
             )  # fmt: skip
             ends = np.cumsum(counts)
             hits = int(ends[-1])
@@ -242,7 +249,7 @@ class Tracer:
             sort_lanes(count, wave.queues, ends - counts)
             prepare(
                 step, self.settings, ends, wave.lanes, wave.queues, wave.paths, self.numbers,
-                self.triangles, self.lights, self.epsilon, wave.hits,
+                triangles, self.lights, self.epsilon, wave.hits,
             )  # fmt: skip
             if self.shines:
                 add_emission(hits, self.surfaces, wave.hits, wave.film)
@@ -250,7 +257,7 @@ class Tracer:
                 start, end = int(ends[queue] - counts[queue]), int(ends[queue])
                 self._shade(wave, int(queue), start, end)
             if aovs and step <= MOST_LAYERS:
-                record_first(hits, lens.eye, lens.axis, wave.hits, self.tables.uv, wave.film)
+                record_first(hits, lens.eye, lens.axis, wave.hits, uv, wave.film)
             depart(
                 step, self.settings, hits, self.translucent, wave.hits, wave.film, wave.shadows,
                 wave.next_lanes, result,
@@ -264,6 +271,23 @@ class Tracer:
                 break
         else:
             lost[0] += wave.lanes.rows[LANE_BETA : LANE_BETA + 3, :count].mean(axis=0).sum()
+
+    def _triangles_of(self, wave: Wave) -> tuple[Triangles, NDArray[np.float32]]:
+        """The triangles, and their UVs, that PRIMITIVE numbers after `_carry`."""
+        if not self.tables.groups:
+            return self.triangles, self.tables.uv
+        if wave.carried is None:
+            wave.carried = room_for(wave.capacity, self._source(wave))
+        return wave.carried.triangles, wave.carried.uv
+
+    def _source(self, wave: Wave) -> Carried:
+        return scene_triangles(self.tables, layers=wave.aovs)
+
+    def _carry(self, wave: Wave, rays: NDArray[np.float32], count: int) -> None:
+        """Bring the triangles that rays hit to where their instances stand."""
+        if self.tables.groups:
+            places = self.tables.placements.reshape(-1, 12)
+            to_world(count, rays, self.accelerator.begins, places, self._source(wave), wave.carried)
 
     def _shade(self, wave: Wave, queue: int, start: int, end: int) -> None:
         """Shade the hits from `start` to before `end`, all of one queue, by their material."""
@@ -282,11 +306,13 @@ class Tracer:
         # meets, which matters for the others alone.
         self.accelerator.occluded(wave.shadows.rays, (count + 15) // 16)
         count = settle(count, wave.shadows, wave.film, aovs, self.blocked_go_on)
+        triangles, _ = self._triangles_of(wave)
         for _ in range(MOST_LAYERS):
             if count == 0:
                 break
             self.accelerator.intersect(wave.shadows.rays, (count + 15) // 16)
+            self._carry(wave, wave.shadows.rays, count)
             count = thin_out(
-                count, wave.shadows, self.opacity, self.gaps, self.surfaces, self.triangles,
+                count, wave.shadows, self.opacity, self.gaps, self.surfaces, triangles,
                 self.epsilon, aovs, wave.film,
             )  # fmt: skip

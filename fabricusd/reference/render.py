@@ -160,7 +160,7 @@ def render(
         time_code = None if staging.orbit else targets[number][0]
         loaded = scene if isinstance(scene, Scene) else read_scene(
             scene, fabric=fabric, camera=camera, time_code=time_code, complexity=complexity,
-            width=width, units=units,
+            width=width, units=units, instanced=True,
         )  # fmt: skip
         loaded = _staged(loaded, staging, width / height, number)
         stops[number] = exposure + (loaded.camera.exposure if loaded.camera else 0.0)

@@ -1,0 +1,304 @@
+"""Places the meshes of a stage: those that instances share once, all others each where it stands.
+
+What an instance does not share with the others, it has for itself: another fabric or material, the
+pose of its own skeleton, or the size that a fabric without a stated scale is measured by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Tf, Usd, UsdGeom
+
+from fabricusd.scene.placements import Placements
+from fabricusd.scene.scene import FabricSurface, Mesh, Scene
+from fabricusd.scene.surface.fineness import Fineness
+from fabricusd.scene.usd.instances import MOST_TRIANGLES, as_matrix
+from fabricusd.scene.usd.light import is_light
+from fabricusd.scene.usd.material import Materials
+from fabricusd.scene.usd.mesh import FARTHEST, Placed, is_mirrored, read_mesh
+from fabricusd.scene.usd.skeleton import Pose, Skeletons
+from fabricusd.scene.usd.value import usd_words, value_of
+
+_FLAT = 1e-6
+"""Determinant of a transform over the cube of its norm below which it is not inverted."""
+
+_ALIKE = 5
+"""Decimals to which the stretches of two instances agree that share a measured fabric's weave."""
+
+_TOGETHER = 1e-9
+"""Difference of two meshes' placements, relative to their extent, that is rounding."""
+
+_DETAIL = 1e-5
+"""Ratio of a mesh's size to the scene's below which the steps of 32-bit coordinates are visible."""
+
+_SMALLEST = 1e-6
+"""Width of a scene [m] below which its unit must be wrong."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Waiting:
+    """A prim and its places; a mesh waits until the camera is known.
+
+    own : (4, 4) - from the prim to the parent of `base`'s space
+    base, before : a prim, and the (k, 4, 4) matrices that take it and all below it to the world
+    """
+
+    prim: Usd.Prim
+    own: NDArray[np.float64]
+    base: Usd.Prim
+    before: NDArray[np.float64]
+
+    @property
+    def matrices(self) -> NDArray[np.float64]:
+        """(k, 4, 4) from the prim to the world."""
+        return np.asarray(self.before @ self.own)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Standing:
+    """A mesh that is read once, and all the places where it stands.
+
+    prims : of each place's path, the first of which is read; path_of : (k,) - of each place
+    matrices : (k, 4, 4) - from its points to the world; mirrored : whether the first place mirrors
+    """
+
+    prims: list[Usd.Prim]
+    path_of: NDArray[np.int32]
+    matrices: NDArray[np.float64]
+    mirrored: bool
+    pose: Pose | None
+
+    def part(self, chosen: NDArray[np.int64]) -> _Standing:
+        """Some of the places, given by their numbers."""
+        first = self.path_of[chosen[0]]
+        prims = self.prims
+        if first:
+            prims = [prims[first], *prims[:first], *prims[first + 1 :]]
+        order = np.arange(len(prims), dtype=np.int32)
+        order[:first] += 1
+        order[first] = 0
+        flips = is_mirrored(self.matrices[0]) != is_mirrored(self.matrices[chosen[0]])
+        return replace(
+            self, prims=prims, path_of=order[self.path_of[chosen]],
+            matrices=self.matrices[chosen], mirrored=self.mirrored != flips,
+        )  # fmt: skip
+
+
+class Meshes:
+    """Adds meshes to a scene.
+
+    metres : in one scene unit; one_sided : paths of those that are authored as one-sided
+    """
+
+    def __init__(
+        self,
+        materials: Materials,
+        scene: Scene,
+        time: Usd.TimeCode,
+        metres: float,
+        fineness: Fineness,
+    ) -> None:
+        self.materials, self.scene, self.time = materials, scene, time
+        self.metres, self.fineness = metres, fineness
+        self.skeletons = Skeletons(time, scene)
+        self.one_sided: list[str] = []
+        self._transforms: list[NDArray[np.float64]] = []
+        self._copied = 0
+
+    def add(self, waiting: list[Waiting], *, instanced: bool) -> None:
+        """Add the meshes of `waiting`; those that are alike once, if they are to be instanced."""
+        alike: dict[Hashable, list[Waiting]] = {}
+        for k, one in enumerate(waiting):
+            try:
+                key = self._key(one) if instanced else k
+                alike.setdefault(key, []).append(one)
+            except Tf.ErrorException as error:
+                left_out(one.prim, error, self.scene)
+        for together in alike.values():
+            try:
+                self._add_alike(together)
+            except Tf.ErrorException as error:
+                left_out(together[0].prim, error, self.scene)
+
+    def _key(self, one: Waiting) -> Hashable:
+        """What two prims have in common that are one mesh at several places."""
+        prim = one.prim
+        if not prim.IsInstanceProxy():
+            return prim.GetPath()
+        if self.skeletons.pose(prim) is not None:
+            return prim.GetPath()
+        return prim.GetPrimInPrototype().GetPath(), self.materials.look(prim)
+
+    def _add_alike(self, together: list[Waiting]) -> None:
+        standing = self._standing(together)
+        if standing is None:
+            return
+        if len(standing.matrices) == 1:
+            self._add_one(standing)
+            return
+        shared, alone = self._parts(standing)
+        for part in shared:
+            self._add_shared(part)
+        for part in alone:
+            if self._copied > MOST_TRIANGLES:
+                where = str(part.prims[0].GetPath())
+                self.scene.note(
+                    where, f"is left out: copies of instances have {self._copied:.3g} triangles"
+                )
+                return
+            mesh = self._add_one(part)
+            self._copied += 0 if mesh is None else len(mesh.triangles)
+
+    def _standing(self, together: list[Waiting]) -> _Standing | None:
+        """All places of prims that are alike; None, with a note, where a skeleton has no place."""
+        first = together[0]
+        pose = self.skeletons.pose(first.prim)
+        stacks = []
+        for one in together:
+            matrices = one.matrices
+            if pose is not None and pose.skeleton is not None:
+                matrices = one.before @ self._relative(pose.skeleton, one.base)
+                if not np.isfinite(matrices).all():
+                    where = str(one.prim.GetPath())
+                    self.scene.note(where, "has a skeleton whose place is not finite, left out")
+                    return None
+            stacks.append(matrices)
+        counts = [len(stack) for stack in stacks]
+        return _Standing(
+            prims=[one.prim for one in together],
+            path_of=np.repeat(np.arange(len(stacks), dtype=np.int32), counts),
+            matrices=np.concatenate(stacks) if len(stacks) > 1 else stacks[0],
+            mirrored=is_mirrored(first.before[0] @ first.own),
+            pose=pose,
+        )
+
+    def _relative(self, prim: Usd.Prim, base: Usd.Prim) -> NDArray[np.float64]:
+        """(4, 4) from a skeleton to `base`, or to the world where it does not lie below `base`."""
+        cache = UsdGeom.XformCache(self.time)
+        if not prim.GetPath().HasPrefix(base.GetPath()):
+            return as_matrix(cache.GetLocalToWorldTransform(prim))
+        return as_matrix(cache.ComputeRelativeTransform(prim, base)[0])
+
+    def _parts(self, standing: _Standing) -> tuple[list[_Standing], list[_Standing]]:
+        """The places that share one mesh, for each such mesh; and those that stand alone."""
+        linear = standing.matrices[:, :3, :3]
+        size = np.linalg.norm(linear, axis=(1, 2))
+        solid = np.abs(np.linalg.det(linear)) > _FLAT * size**3
+        group = np.where(solid, 0, -1)
+        if self._is_measured(standing.prims[0]):
+            # The weave of a fabric without a stated scale depends on the mesh's size and shape.
+            stretch = (
+                np.swapaxes(linear, 1, 2) @ linear / np.maximum(size, 1e-300)[:, None, None] ** 2
+            )
+            decimals = np.concatenate(
+                (stretch.reshape(-1, 9), np.log(np.maximum(size, 1e-300))[:, None]), 1
+            )
+            _, same = np.unique(np.round(decimals, _ALIKE), axis=0, return_inverse=True)
+            group = np.where(solid, same.reshape(-1), -1)
+        shared: list[_Standing] = []
+        alone = [standing.part(np.array([k])) for k in np.flatnonzero(~solid)]
+        for number in np.unique(group[solid]):
+            chosen = np.flatnonzero(group == number)
+            (shared if len(chosen) > 1 else alone).append(standing.part(chosen))
+        return shared, alone
+
+    def _is_measured(self, prim: Usd.Prim) -> bool:
+        """Whether a fabric of the mesh is as large as its UVs are on the mesh."""
+        for number in self.materials.worn(prim):
+            surface = self.scene.materials[number]
+            if isinstance(surface, FabricSurface):
+                binding = surface.binding
+                if not (binding.threads_per_uv[0] or binding.metres_per_uv):
+                    return True
+        return False
+
+    def _add_one(self, standing: _Standing) -> Mesh | None:
+        """Add a mesh at the first of its places."""
+        mesh = self._read(standing)
+        if mesh is not None:
+            self.scene.meshes.append(mesh)
+        return mesh
+
+    def _add_shared(self, standing: _Standing) -> None:
+        mesh = self._read(standing)
+        if mesh is None:
+            return
+        matrices = standing.matrices
+        transforms = (matrices @ np.linalg.inv(matrices[0]))[:, :3]
+        transforms[:, :, 3] *= self.metres
+        transforms[0] = np.eye(4)[:3]
+        points = mesh.points[np.isfinite(mesh.points).all(axis=1)]
+        reach = np.abs(transforms[:, :, :3]) @ np.abs(points).max(axis=0, initial=0.0)
+        near = (reach + np.abs(transforms[:, :, 3]) < FARTHEST).all(axis=1)
+        path_of = standing.path_of
+        if not near.all():
+            words = f"has {int((~near).sum())} instances beyond {FARTHEST:g} m, left out"
+            self.scene.note(mesh.path, words)
+            transforms, path_of = transforms[near], path_of[near]
+        placements = Placements(
+            transforms=self._known(transforms),
+            paths=tuple(str(prim.GetPath()) for prim in standing.prims),
+            path_of=path_of,
+        )
+        self.scene.meshes.append(replace(mesh, placements=placements))
+
+    def _known(self, transforms: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same transforms as those of meshes that stand together with this one."""
+        extent = np.abs(transforms).max(initial=1.0)
+        for other in self._transforms:
+            if other.shape == transforms.shape and (
+                np.abs(other - transforms).max(initial=0.0) < _TOGETHER * extent
+            ):
+                return other
+        self._transforms.append(transforms)
+        return transforms
+
+    def _read(self, standing: _Standing) -> Mesh | None:
+        """The mesh at the first of its places; None, with a note, where it has no faces."""
+        prim = standing.prims[0]
+        where = str(prim.GetPath())
+        if is_light(prim):
+            self.scene.note(
+                where, "is a light as well, which is left out: it is rendered as a mesh"
+            )
+        mesh = read_mesh(
+            Placed(
+                prim=prim, matrix=standing.matrices[0], mirrored=standing.mirrored,
+                pose=standing.pose, places=standing.matrices,
+            ),
+            self.time, self.metres, self.materials, self.scene, self.fineness,
+        )  # fmt: skip
+        if mesh is None:
+            return None
+        sides = UsdGeom.Mesh(prim).GetDoubleSidedAttr()
+        if sides.HasAuthoredValue() and value_of(sides, self.time, self.scene) is False:
+            self.one_sided.append(where)
+        return mesh
+
+
+def left_out(prim: Usd.Prim, error: Tf.ErrorException, scene: Scene) -> None:
+    """Note that USD cannot read a prim."""
+    scene.note(str(prim.GetPath()), f"is left out: {usd_words(error)}")
+
+
+def note_small_meshes(scene: Scene) -> None:
+    """Note each mesh that is too small for the size of its scene."""
+    found = [(m, m.points[np.isfinite(m.points).all(axis=1)]) for m in scene.meshes]
+    boxes = [(mesh, p.min(axis=0), p.max(axis=0)) for mesh, p in found if len(p)]
+    if not boxes:
+        return
+    low, high = np.min([b[1] for b in boxes], axis=0), np.max([b[2] for b in boxes], axis=0)
+    whole = float(np.linalg.norm(high - low))
+    if 0 < whole < _SMALLEST:
+        scene.note("the scene", f"is {whole:.3g} m wide; is metersPerUnit right?")
+    for mesh, low, high in boxes:
+        size = float(np.linalg.norm(high - low))
+        if 0 < size < _DETAIL * whole:
+            scene.note(
+                mesh.path,
+                f"is {size:.3g} m wide in a scene of {whole:.3g} m; 32-bit coordinates show there",
+            )
