@@ -91,10 +91,7 @@ def measure(path: str, *, instanced: bool) -> None:
     read = time.perf_counter()
     put(Staging(frame="/"), scene, SIZE[0] / SIZE[1])
     result = render_scene(scene, width=SIZE[0], height=SIZE[1], spp=SAMPLES)
-    placed = sum(
-        len(mesh.triangles) * (1 if mesh.placements is None else len(mesh.placements))
-        for mesh in scene.meshes
-    )
+    placed = sum(len(mesh.triangles) * mesh.times for mesh in scene.meshes)
     print(json.dumps({
         "shown": placed, "stored": sum(len(mesh.triangles) for mesh in scene.meshes),
         "read": read - begun, "prepared": float(result.metadata["fabricusd:preparationSeconds"]),

@@ -28,9 +28,9 @@ from fabricusd.reference.rays.embree import (
     Accelerator,
     has_instances,
 )
-from fabricusd.reference.rays.placed import Carried, room_for, scene_triangles, to_world
+from fabricusd.reference.rays.placed import Carrier
 from fabricusd.reference.rays.sobol import new_numbers
-from fabricusd.reference.rays.triangles import Triangles, build_tables
+from fabricusd.reference.rays.triangles import build_tables
 from fabricusd.reference.rays.wave import (
     BEAUTY_ROWS,
     FAR_LEVEL,
@@ -150,7 +150,7 @@ class Tracer:
         self.shaders = shaders.result()
         for cloth in filter(None, self.shaders):
             cloth.home = self.tables.home
-        self.triangles = Triangles(self.tables.records, self.tables.material)
+        self.carrier = Carrier(self.tables, self.accelerator.begins)
         self.lights = build_lights(scene.lights, self.tables.centre)
         self.surfaces = build_surfaces(scene)
         shining = self.surfaces.table[:, [EMISSIVE, EMISSIVE + 1, EMISSIVE + 2]].any(axis=1)
@@ -233,10 +233,10 @@ class Tracer:
         tags[1:, :count] = 0
         counts = np.zeros(QUEUES * len(self.shaders), np.int64)
         result = np.zeros(3, np.int64)
-        triangles, uv = self._triangles_of(wave)
+        triangles, uv = self.carrier.triangles(wave)
         for step in range(self.steps):
             self.accelerator.intersect(wave.lanes.rays, (count + 15) // 16, coherent=step == 0)
-            self._carry(wave, wave.lanes.rays, count)
+            self.carrier.carry(wave, wave.lanes.rays, count)
             counters[0] += count
             arrive(
                 step, self.settings, count, wave.lanes, wave.paths, self.numbers, self.lights,
@@ -272,23 +272,6 @@ class Tracer:
         else:
             lost[0] += wave.lanes.rows[LANE_BETA : LANE_BETA + 3, :count].mean(axis=0).sum()
 
-    def _triangles_of(self, wave: Wave) -> tuple[Triangles, NDArray[np.float32]]:
-        """The triangles, and their UVs, that PRIMITIVE numbers after `_carry`."""
-        if not self.tables.groups:
-            return self.triangles, self.tables.uv
-        if wave.carried is None:
-            wave.carried = room_for(wave.capacity, self._source(wave))
-        return wave.carried.triangles, wave.carried.uv
-
-    def _source(self, wave: Wave) -> Carried:
-        return scene_triangles(self.tables, layers=wave.aovs)
-
-    def _carry(self, wave: Wave, rays: NDArray[np.float32], count: int) -> None:
-        """Bring the triangles that rays hit to where their instances stand."""
-        if self.tables.groups:
-            places = self.tables.placements.reshape(-1, 12)
-            to_world(count, rays, self.accelerator.begins, places, self._source(wave), wave.carried)
-
     def _shade(self, wave: Wave, queue: int, start: int, end: int) -> None:
         """Shade the hits from `start` to before `end`, all of one queue, by their material."""
         shader = self.shaders[queue // QUEUES]
@@ -306,12 +289,12 @@ class Tracer:
         # meets, which matters for the others alone.
         self.accelerator.occluded(wave.shadows.rays, (count + 15) // 16)
         count = settle(count, wave.shadows, wave.film, aovs, self.blocked_go_on)
-        triangles, _ = self._triangles_of(wave)
+        triangles, _ = self.carrier.triangles(wave)
         for _ in range(MOST_LAYERS):
             if count == 0:
                 break
             self.accelerator.intersect(wave.shadows.rays, (count + 15) // 16)
-            self._carry(wave, wave.shadows.rays, count)
+            self.carrier.carry(wave, wave.shadows.rays, count)
             count = thin_out(
                 count, wave.shadows, self.opacity, self.gaps, self.surfaces, triangles,
                 self.epsilon, aovs, wave.film,

@@ -392,6 +392,7 @@ def render_scene(
     note_losses(scene, tracer, lens, not_finite, cut, met, (width, height))
     max_translucent = tracer.max_translucent
     embree, triangles = tracer.accelerator.version, len(tracer.tables.triangles)
+    instances = len(tracer.tables.placements)
     # Free the triangles and their acceleration structure before the layers are made.
     del tracer
     error = film.relative_error()
@@ -404,6 +405,7 @@ def render_scene(
         "fabricusd:cut": cut, "fabricusd:level": level, "fabricusd:shadow": shadow,
         "fabricusd:seed": seed, "fabricusd:workers": count, "fabricusd:pixelFilter": pixel_filter,
         "fabricusd:camera": camera.path, "fabricusd:triangles": triangles,
+        "fabricusd:instances": instances,
         "fabricusd:rays": str(rays + shadow_rays), "fabricusd:seconds": round(seconds, 3),
         "fabricusd:preparationSeconds": round(built - begun, 3),
         "fabricusd:notFinite": not_finite, "fabricusd:complete": int(complete),

@@ -94,6 +94,16 @@ class Mesh:
     origin: str = ""
     placements: Placements | None = None
 
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The paths of the prims that are this mesh."""
+        return (self.path,) if self.placements is None else self.placements.paths
+
+    @property
+    def times(self) -> int:
+        """How often the mesh appears."""
+        return 1 if self.placements is None else len(self.placements)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Light:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
+from fabricusd.reference import integrator
 from fabricusd.reference.render import render_scene
 from fabricusd.scene.scene import Camera, Scene
 from fabricusd.scene.studio import looking
@@ -178,6 +179,8 @@ CASES = {
     "nested": (nested, 1, 24),
 }
 
+STRETCHED = ("stretched", "sheared")
+
 
 def drawn(scene: Scene, **settings):
     """A picture from obliquely above."""
@@ -211,5 +214,44 @@ def test_a_picture_of_instances_is_that_of_copies(tmp_path, name):
     a, b = (drawn(scene) for scene in (placed, copied))
     assert (b.layers["beauty"][..., 3] > 0).mean() > 0.1
     # A path that meets an edge on the other side goes elsewhere: few do.
-    assert max(off(a, b, layer) for layer in LAYERS) < 0.02
+    # Grain is smoothed over the corners of a prototype before an instance stretches it.
+    rounded = [layer for layer in LAYERS if layer != "tangent" or name not in STRETCHED]
+    assert max(off(a, b, layer) for layer in rounded) < 0.02
+    assert np.abs(a.layers["tangent"] - b.layers["tangent"]).mean() < 1e-3
     assert a.layers["beauty"].mean() == pytest.approx(b.layers["beauty"].mean(), rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["the first is mirrored", "nested"])
+def test_close_to_uneven_threads_and_through_gaps_it_is_the_same(tmp_path, name):
+    stage = new_stage(tmp_path)
+    CASES[name][0](stage)
+    placed, copied = (
+        drawn(read(stage, instanced=instanced), level="thread", max_bounces=3)
+        for instanced in (True, False)
+    )
+    # The place within a thread is a thousandth of a UV: rounding moves it across an edge at times.
+    assert off(placed, copied, "beauty") < 0.1
+    assert placed.layers["beauty"].mean() == pytest.approx(copied.layers["beauty"].mean(), rel=2e-3)
+
+
+def test_light_falls_through_instances_as_through_copies(tmp_path):
+    stage = new_stage(tmp_path)
+    tile = square(stage, "/Protos/tile")
+    tile.CreateDisplayOpacityAttr([0.4])
+    hidden(stage, "/Protos")
+    scattered(stage, prototypes=("/Protos/tile",))
+    UsdGeom.XformCommonAPI(square(stage, "/floor")).SetTranslate((0, -1.2, 0))
+    placed, copied = (drawn(read(stage, instanced=instanced)) for instanced in (True, False))
+    assert off(placed, copied, "beauty") < 0.02
+    assert placed.layers["beauty"].mean() == pytest.approx(copied.layers["beauty"].mean(), rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["the first is mirrored", "sheared", "nested"])
+def test_instances_become_copies_where_embree_cannot_place_them(tmp_path, monkeypatch, name):
+    stage = new_stage(tmp_path)
+    CASES[name][0](stage)
+    placed = read(stage, instanced=True)
+    monkeypatch.setattr(integrator, "has_instances", lambda: False)
+    a, b = drawn(placed), drawn(read(stage))
+    assert a.metadata["fabricusd:instances"] == 0
+    assert max(off(a, b, layer) for layer in LAYERS) < 0.02

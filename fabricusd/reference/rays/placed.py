@@ -42,6 +42,7 @@ from fabricusd.reference.rays.triangles import (
 )
 from fabricusd.reference.rays.triangles import N as NORMALS
 from fabricusd.reference.rays.triangles import T as TANGENTS
+from fabricusd.reference.rays.wave import Wave
 
 R = np.float32
 
@@ -58,19 +59,36 @@ class Carried(NamedTuple):
     home: NDArray[np.int64]
     uv: NDArray[np.float32]
 
-    @property
-    def triangles(self) -> Triangles:
-        """What the stages of every picture read."""
-        return Triangles(self.records, self.material)
+
+class Carrier:
+    """Gives the stages of a batch the triangles that its rays hit."""
+
+    def __init__(self, tables: TriangleTables, begins: NDArray[np.int64]) -> None:
+        self._tables, self._begins = tables, begins
+        self._places = tables.placements.reshape(-1, 12)
+        self._every = Triangles(tables.records, tables.material)
+
+    def triangles(self, wave: Wave) -> tuple[Triangles, NDArray[np.float32]]:
+        """The triangles, and their UVs, that PRIMITIVE numbers after `carry`."""
+        if not self._tables.groups:
+            return self._every, self._tables.uv
+        if wave.carried is None:
+            wave.carried = _room_for(wave.capacity, self._source(wave))
+        return Triangles(wave.carried.records, wave.carried.material), wave.carried.uv
+
+    def carry(self, wave: Wave, rays: NDArray[np.float32], count: int) -> None:
+        """Bring the triangles that the first `count` rays hit to where their instances stand."""
+        if self._tables.groups:
+            source = self._source(wave)
+            to_world(count, rays, self._begins, self._places, source, wave.carried)
+
+    def _source(self, wave: Wave) -> Carried:
+        tables = self._tables
+        uv = tables.uv if wave.aovs else np.zeros((0, 6), np.float32)
+        return Carried(tables.records, tables.material, tables.home, uv)
 
 
-def scene_triangles(tables: TriangleTables, *, layers: bool) -> Carried:
-    """The triangles of a scene, for `to_world`."""
-    uv = tables.uv if layers else np.zeros((0, 6), np.float32)
-    return Carried(tables.records, tables.material, tables.home, uv)
-
-
-def room_for(capacity: int, source: Carried) -> Carried:
+def _room_for(capacity: int, source: Carried) -> Carried:
     """A buffer for the triangles that `capacity` rays hit."""
     return Carried(
         aligned_empty((capacity, RECORD)),

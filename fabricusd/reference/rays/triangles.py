@@ -82,11 +82,6 @@ class TriangleTables:
     groups: tuple[Group, ...] = ()
     placements: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3, 4), np.float32))
 
-    @property
-    def ordinary(self) -> int:
-        """Number of triangles that are not instanced."""
-        return len(self.triangles) - sum(group.count for group in self.groups)
-
 
 def build_tables(scene: Scene) -> TriangleTables:
     """Build the tables of the scene's meshes; triangles that cannot be traced are left out with a

@@ -16,6 +16,7 @@ from pxr import Tf, Usd, UsdGeom
 from fabricusd.scene.placements import Placements
 from fabricusd.scene.scene import FabricSurface, Mesh, Scene
 from fabricusd.scene.surface.fineness import Fineness
+from fabricusd.scene.surface.normals import group_numbers
 from fabricusd.scene.usd.instances import MOST_TRIANGLES, as_matrix
 from fabricusd.scene.usd.light import is_light
 from fabricusd.scene.usd.material import Materials
@@ -26,8 +27,8 @@ from fabricusd.scene.usd.value import usd_words, value_of
 _FLAT = 1e-6
 """Determinant of a transform over the cube of its norm below which it is not inverted."""
 
-_ALIKE = 5
-"""Decimals to which the stretches of two instances agree that share a measured fabric's weave."""
+_ALIKE = 1e-5
+"""Relative difference in stretch of two instances that share the weave of a measured fabric."""
 
 _TOGETHER = 1e-9
 """Difference of two meshes' placements, relative to their extent, that is rounding."""
@@ -190,15 +191,7 @@ class Meshes:
         solid = np.abs(np.linalg.det(linear)) > _FLAT * size**3
         group = np.where(solid, 0, -1)
         if self._is_measured(standing.prims[0]):
-            # The weave of a fabric without a stated scale depends on the mesh's size and shape.
-            stretch = (
-                np.swapaxes(linear, 1, 2) @ linear / np.maximum(size, 1e-300)[:, None, None] ** 2
-            )
-            decimals = np.concatenate(
-                (stretch.reshape(-1, 9), np.log(np.maximum(size, 1e-300))[:, None]), 1
-            )
-            _, same = np.unique(np.round(decimals, _ALIKE), axis=0, return_inverse=True)
-            group = np.where(solid, same.reshape(-1), -1)
+            group = np.where(solid, _alike(linear, size), -1)
         shared: list[_Standing] = []
         alone = [standing.part(np.array([k])) for k in np.flatnonzero(~solid)]
         for number in np.unique(group[solid]):
@@ -280,6 +273,16 @@ class Meshes:
         return mesh
 
 
+def _alike(linear: NDArray[np.float64], size: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(k,) equal numbers for transforms that stretch alike, and differ by a rotation or mirror."""
+    size = np.maximum(size, 1e-300)[:, None]
+    stretch = (np.swapaxes(linear, 1, 2) @ linear).reshape(-1, 9) / size**2
+    columns = np.concatenate((stretch[:, [0, 1, 2, 4, 5, 8]], np.log(size)), axis=1)
+    if np.ptp(columns, axis=0).max() < _ALIKE:
+        return np.zeros(len(columns), np.int64)
+    return group_numbers(*np.round(columns / _ALIKE).astype(np.int64).T)
+
+
 def left_out(prim: Usd.Prim, error: Tf.ErrorException, scene: Scene) -> None:
     """Note that USD cannot read a prim."""
     scene.note(str(prim.GetPath()), f"is left out: {usd_words(error)}")
@@ -291,7 +294,7 @@ def note_small_meshes(scene: Scene) -> None:
     boxes = [(mesh, p.min(axis=0), p.max(axis=0)) for mesh, p in found if len(p)]
     if not boxes:
         return
-    low, high = np.min([b[1] for b in boxes], axis=0), np.max([b[2] for b in boxes], axis=0)
+    low, high = scene.bounds()
     whole = float(np.linalg.norm(high - low))
     if 0 < whole < _SMALLEST:
         scene.note("the scene", f"is {whole:.3g} m wide; is metersPerUnit right?")
