@@ -4,7 +4,7 @@ Prints, for each number of skirts, the seconds and the peak memory of reading an
 run in a process of its own; then the same of a million placements of one small mesh.
 
     python bench/scene/bench_instances.py [--counts 1 10 1000] [--copies 1 10] [--million 1000000]
-        [--native]
+        [--native] [--compare]
 """
 
 from __future__ import annotations
@@ -25,7 +25,14 @@ SIZE = (480, 270)
 SAMPLES = 16
 
 
-def write_stage(folder: Path, count: int, *, small: bool, native: bool) -> Path:
+def write_stage(
+    folder: Path,
+    count: int,
+    *,
+    small: bool,
+    native: bool,
+    scale: tuple[float, float, float] | None = None,
+) -> Path:
     """A stage on which a point instancer, or native instances, place a mesh `count` times."""
     from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
@@ -76,6 +83,10 @@ def write_stage(folder: Path, count: int, *, small: bool, native: bool) -> Path:
         quaternions = np.zeros((count, 4), np.float32)
         quaternions[:, 1], quaternions[:, 3] = np.sin(turn / 2), np.cos(turn / 2)
         many.CreateOrientationsfAttr(Vt.QuatfArray.FromNumpy(quaternions))
+        if scale is not None:
+            # Those of odd numbers; a fabric without a stated scale would be measured on each size.
+            mesh.GetPrim().GetAttribute("fabric:binding:threadsPerUnit").Set(Gf.Vec2d(4000, 1000))
+            many.CreateScalesAttr([scale if k % 2 else (1, 1, 1) for k in range(count)])
     stage.GetRootLayer().Save()
     return folder / "scene.usdc"
 
@@ -118,6 +129,33 @@ def told(count: int, *, small: bool = False, native: bool = False, copies: bool 
     )  # fmt: skip
 
 
+def compare(name: str, scale: tuple[float, float, float]) -> None:
+    """Print how far a picture of ten placed skirts is from one of ten copies."""
+    from fabricusd.reference.render import render_scene
+    from fabricusd.scene.read import read_scene
+    from fabricusd.scene.staging import Staging, put
+
+    pictures = []
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_stage(Path(folder), 10, small=False, native=False, scale=scale)
+        for instanced in (True, False):
+            scene = read_scene(path, instanced=instanced)
+            put(Staging(frame="/"), scene, SIZE[0] / SIZE[1])
+            layers = ("beauty", "normal", "tangent")
+            pictures.append(
+                render_scene(scene, width=SIZE[0], height=SIZE[1], spp=SAMPLES, aovs=layers).layers
+            )
+    placed, copied = pictures
+    seen = copied["beauty"][..., 3] > 0
+    for layer in placed:
+        off = np.abs(placed[layer] - copied[layer])[seen]
+        mean = np.abs(copied[layer][seen]).mean()
+        print(f"{name}, {layer}: mean {off.mean():.2g}, most {off.max():.2g}, of {mean:.2g}")
+    # Of the whole picture, in which single paths average out.
+    ratio = placed["beauty"][seen].mean(dtype=float) / copied["beauty"][seen].mean(dtype=float)
+    print(f"{name}, brightness: {ratio - 1:+.1e}", flush=True)
+
+
 def main() -> None:
     """Run all sizes."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -125,10 +163,17 @@ def main() -> None:
     options.add_argument("--copies", type=int, nargs="*", default=[1, 10])
     options.add_argument("--million", type=int, nargs="*", default=[1_000_000])
     options.add_argument("--native", action="store_true", help="native instances of the skirt")
+    options.add_argument("--compare", action="store_true", help="pictures, with those of copies")
     options.add_argument("--measure", nargs=2, help=argparse.SUPPRESS)
     given = options.parse_args()
     if given.measure:
         measure(given.measure[0], instanced=given.measure[1] == "placed")
+        return
+    if given.compare:
+        compare("turned", (1.0, 1.0, 1.0))
+        compare("mirrored", (-1.0, 1.0, 1.0))
+        compare("half as large", (0.5, 0.5, 0.5))
+        compare("stretched", (0.6, 1.5, 1.0))
         return
     print(f"{platform.processor() or platform.machine()}, {SIZE[0]} x {SIZE[1]}, {SAMPLES} samples")
     for count in given.counts:

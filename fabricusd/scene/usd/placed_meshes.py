@@ -1,7 +1,8 @@
 """Places the meshes of a stage: those that instances share once, all others each where it stands.
 
 What an instance does not share with the others, it has for itself: another fabric or material, the
-pose of its own skeleton, or the size that a fabric without a stated scale is measured by.
+pose of its own skeleton, a shape that an uneven scale gave it, or the size that a fabric without a
+stated scale is measured by.
 """
 
 from __future__ import annotations
@@ -28,7 +29,10 @@ _FLAT = 1e-6
 """Determinant of a transform over the cube of its norm below which it is not inverted."""
 
 _ALIKE = 1e-5
-"""Relative difference in stretch of two instances that share the weave of a measured fabric."""
+"""Relative difference in stretch, and in size, of two instances that count as the same."""
+
+MOST_SHAPED = 3_000_000
+"""Most corners of all meshes together that are made of one mesh for instances of other shapes."""
 
 _TOGETHER = 1e-9
 """Difference of two meshes' placements, relative to their extent, that is rounding."""
@@ -189,9 +193,16 @@ class Meshes:
         linear = standing.matrices[:, :3, :3]
         size = np.linalg.norm(linear, axis=(1, 2))
         solid = np.abs(np.linalg.det(linear)) > _FLAT * size**3
-        group = np.where(solid, 0, -1)
-        if self._is_measured(standing.prims[0]):
-            group = np.where(solid, _alike(linear, size), -1)
+        prim = standing.prims[0]
+        # The weave of a fabric without a stated scale depends on the mesh's size and shape; smooth
+        # normals and grain, on its shape.
+        measured = self._is_measured(prim)
+        same = _alike(linear, size, sized=measured)
+        if not measured and (int(same.max()) + 1) * _corner_count(prim, self.time) > MOST_SHAPED:
+            where = str(prim.GetPath())
+            self.scene.note(where, "is smoothed before its instances stretch it: they are too many")
+            same = np.zeros_like(same)
+        group = np.where(solid, same, -1)
         shared: list[_Standing] = []
         alone = [standing.part(np.array([k])) for k in np.flatnonzero(~solid)]
         for number in np.unique(group[solid]):
@@ -273,14 +284,24 @@ class Meshes:
         return mesh
 
 
-def _alike(linear: NDArray[np.float64], size: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(k,) equal numbers for transforms that stretch alike, and differ by a rotation or mirror."""
+def _alike(
+    linear: NDArray[np.float64], size: NDArray[np.float64], *, sized: bool
+) -> NDArray[np.int64]:
+    """(k,) equal numbers for transforms that differ by a rotation or mirror, and, unless `sized`,
+    by an even scale."""
     size = np.maximum(size, 1e-300)[:, None]
     stretch = (np.swapaxes(linear, 1, 2) @ linear).reshape(-1, 9) / size**2
-    columns = np.concatenate((stretch[:, [0, 1, 2, 4, 5, 8]], np.log(size)), axis=1)
+    columns = stretch[:, [0, 1, 2, 4, 5, 8]]
+    if sized:
+        columns = np.concatenate((columns, np.log(size)), axis=1)
     if np.ptp(columns, axis=0).max() < _ALIKE:
         return np.zeros(len(columns), np.int64)
     return group_numbers(*np.round(columns / _ALIKE).astype(np.int64).T)
+
+
+def _corner_count(prim: Usd.Prim, time: Usd.TimeCode) -> int:
+    indices = UsdGeom.Mesh(prim).GetFaceVertexIndicesAttr().Get(time)
+    return 0 if indices is None else len(indices)
 
 
 def left_out(prim: Usd.Prim, error: Tf.ErrorException, scene: Scene) -> None:
