@@ -7,18 +7,18 @@ stated scale is measured by.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Tf, Usd, UsdGeom
+from pxr import Sdf, Tf, Usd, UsdGeom
 
 from fabricusd.scene.placements import Placements
 from fabricusd.scene.scene import FabricSurface, Mesh, Scene
 from fabricusd.scene.surface.fineness import Fineness
 from fabricusd.scene.surface.normals import group_numbers
-from fabricusd.scene.usd.instances import MOST_TRIANGLES, as_matrix
+from fabricusd.scene.usd.instances import MOST_COPIES, MOST_TRIANGLES, as_matrix
 from fabricusd.scene.usd.light import is_light
 from fabricusd.scene.usd.material import Materials
 from fabricusd.scene.usd.mesh import FARTHEST, Placed, is_mirrored, read_mesh
@@ -79,17 +79,16 @@ class _Standing:
 
     def part(self, chosen: NDArray[np.int64]) -> _Standing:
         """Some of the places, given by their numbers."""
-        first = self.path_of[chosen[0]]
-        prims = self.prims
-        if first:
-            prims = [prims[first], *prims[:first], *prims[first + 1 :]]
-        order = np.arange(len(prims), dtype=np.int32)
-        order[:first] += 1
-        order[first] = 0
+        used, path_of = np.unique(self.path_of[chosen], return_inverse=True)
+        prims = [self.prims[number] for number in used.tolist()]
+        # The prim of the first place is the one that is read.
+        first = int(path_of[0])
+        prims[0], prims[first] = prims[first], prims[0]
+        path_of = np.where(path_of == first, 0, np.where(path_of == 0, first, path_of))
         flips = is_mirrored(self.matrices[0]) != is_mirrored(self.matrices[chosen[0]])
         return replace(
-            self, prims=prims, path_of=order[self.path_of[chosen]],
-            matrices=self.matrices[chosen], mirrored=self.mirrored != flips,
+            self, prims=prims, path_of=path_of.astype(np.int32), matrices=self.matrices[chosen],
+            mirrored=self.mirrored != flips,
         )  # fmt: skip
 
 
@@ -111,8 +110,9 @@ class Meshes:
         self.metres, self.fineness = metres, fineness
         self.skeletons = Skeletons(time, scene)
         self.one_sided: list[str] = []
-        self._transforms: list[NDArray[np.float64]] = []
-        self._copied = 0
+        self._transforms: dict[Hashable, list[NDArray[np.float64]]] = {}
+        self._read_once: set[Sdf.Path] = set()
+        self._copied = (0, 0)
 
     def add(self, waiting: list[Waiting], *, instanced: bool) -> None:
         """Add the meshes of `waiting`; those that are alike once, if they are to be instanced."""
@@ -132,31 +132,37 @@ class Meshes:
     def _key(self, one: Waiting) -> Hashable:
         """What two prims have in common that are one mesh at several places."""
         prim = one.prim
-        if not prim.IsInstanceProxy():
+        if not prim.IsInstanceProxy() or self.skeletons.pose(prim) is not None:
             return prim.GetPath()
-        if self.skeletons.pose(prim) is not None:
-            return prim.GetPath()
-        return prim.GetPrimInPrototype().GetPath(), self.materials.look(prim)
+        return _source(prim), self.materials.look(prim)
 
     def _add_alike(self, together: list[Waiting]) -> None:
         standing = self._standing(together)
         if standing is None:
             return
         if len(standing.matrices) == 1:
-            self._add_one(standing)
+            if not self._is_full(standing.prims[0]):
+                self._add_one(standing)
             return
-        shared, alone = self._parts(standing)
-        for part in shared:
-            self._add_shared(part)
-        for part in alone:
-            if self._copied > MOST_TRIANGLES:
-                where = str(part.prims[0].GetPath())
-                self.scene.note(
-                    where, f"is left out: copies of instances have {self._copied:.3g} triangles"
-                )
+        for chosen in self._parts(standing):
+            if self._is_full(standing.prims[0]):
                 return
-            mesh = self._add_one(part)
-            self._copied += 0 if mesh is None else len(mesh.triangles)
+            part = standing.part(chosen)
+            if len(chosen) > 1:
+                self._add_shared(part)
+            else:
+                self._add_one(part)
+
+    def _is_full(self, prim: Usd.Prim) -> bool:
+        """Whether no further copy of a mesh has room, with a note."""
+        copies, triangles = self._copied
+        if _source(prim) not in self._read_once:
+            return False
+        if copies < MOST_COPIES and triangles < MOST_TRIANGLES:
+            return False
+        words = f"{copies} of them have {triangles:.3g} triangles"
+        self.scene.note(str(prim.GetPath()), f"has copies of instances that are left out: {words}")
+        return True
 
     def _standing(self, together: list[Waiting]) -> _Standing | None:
         """All places of prims that are alike; None, with a note, where a skeleton has no place."""
@@ -188,8 +194,8 @@ class Meshes:
             return as_matrix(cache.GetLocalToWorldTransform(prim))
         return as_matrix(cache.ComputeRelativeTransform(prim, base)[0])
 
-    def _parts(self, standing: _Standing) -> tuple[list[_Standing], list[_Standing]]:
-        """The places that share one mesh, for each such mesh; and those that stand alone."""
+    def _parts(self, standing: _Standing) -> Iterator[NDArray[np.int64]]:
+        """The numbers of the places that share one mesh, for each such mesh."""
         linear = standing.matrices[:, :3, :3]
         size = np.linalg.norm(linear, axis=(1, 2))
         solid = np.abs(np.linalg.det(linear)) > _FLAT * size**3
@@ -203,12 +209,13 @@ class Meshes:
             self.scene.note(where, "is smoothed before its instances stretch it: they are too many")
             same = np.zeros_like(same)
         group = np.where(solid, same, -1)
-        shared: list[_Standing] = []
-        alone = [standing.part(np.array([k])) for k in np.flatnonzero(~solid)]
-        for number in np.unique(group[solid]):
-            chosen = np.flatnonzero(group == number)
-            (shared if len(chosen) > 1 else alone).append(standing.part(chosen))
-        return shared, alone
+        order = np.argsort(group, kind="stable")
+        starts = np.flatnonzero(np.diff(group[order], prepend=-2))
+        for chosen in np.split(order, starts[1:]):
+            if group[chosen[0]] >= 0:
+                yield chosen
+            else:
+                yield from chosen[:, None]
 
     def _is_measured(self, prim: Usd.Prim) -> bool:
         """Whether a fabric of the mesh is as large as its UVs are on the mesh."""
@@ -220,12 +227,11 @@ class Meshes:
                     return True
         return False
 
-    def _add_one(self, standing: _Standing) -> Mesh | None:
+    def _add_one(self, standing: _Standing) -> None:
         """Add a mesh at the first of its places."""
         mesh = self._read(standing)
         if mesh is not None:
             self.scene.meshes.append(mesh)
-        return mesh
 
     def _add_shared(self, standing: _Standing) -> None:
         mesh = self._read(standing)
@@ -253,12 +259,12 @@ class Meshes:
     def _known(self, transforms: NDArray[np.float64]) -> NDArray[np.float64]:
         """The same transforms as those of meshes that stand together with this one."""
         extent = np.abs(transforms).max(initial=1.0)
-        for other in self._transforms:
-            if other.shape == transforms.shape and (
-                np.abs(other - transforms).max(initial=0.0) < _TOGETHER * extent
-            ):
+        last = np.round(transforms[-1:] / extent, 6) + 0.0
+        alike = self._transforms.setdefault((len(transforms), last.tobytes()), [])
+        for other in alike:
+            if np.abs(other - transforms).max(initial=0.0) < _TOGETHER * extent:
                 return other
-        self._transforms.append(transforms)
+        alike.append(transforms)
         return transforms
 
     def _read(self, standing: _Standing) -> Mesh | None:
@@ -278,6 +284,10 @@ class Meshes:
         )  # fmt: skip
         if mesh is None:
             return None
+        if _source(prim) in self._read_once:
+            copies, triangles = self._copied
+            self._copied = copies + 1, triangles + len(mesh.triangles)
+        self._read_once.add(_source(prim))
         sides = UsdGeom.Mesh(prim).GetDoubleSidedAttr()
         if sides.HasAuthoredValue() and value_of(sides, self.time, self.scene) is False:
             self.one_sided.append(where)
@@ -297,6 +307,12 @@ def _alike(
     if np.ptp(columns, axis=0).max() < _ALIKE:
         return np.zeros(len(columns), np.int64)
     return group_numbers(*np.round(columns / _ALIKE).astype(np.int64).T)
+
+
+def _source(prim: Usd.Prim) -> Sdf.Path:
+    """The path of the prim that holds a mesh, for an instance that of its prototype."""
+    own = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+    return own.GetPath()
 
 
 def _corner_count(prim: Usd.Prim, time: Usd.TimeCode) -> int:

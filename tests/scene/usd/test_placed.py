@@ -67,8 +67,8 @@ def test_copies_of_instances_have_a_bound(tmp_path, monkeypatch):
     for prim in copies(stage, 4):
         UsdGeom.XformCommonAPI(prim).SetScale((1, 0, 1))
     scene = read(stage, instanced=True)
-    assert len(scene.meshes) == 2
-    assert any("is left out: copies of instances have 4 triangles" in n for n in scene.notes)
+    assert len(scene.meshes) == 3
+    assert any("are left out: 2 of them have 4 triangles" in n for n in scene.notes)
 
 
 def test_a_mesh_on_the_stage_may_be_a_prototype_as_well(tmp_path):
