@@ -37,12 +37,6 @@ MOST_SHAPED = 3_000_000
 _TOGETHER = 1e-9
 """Difference of two meshes' placements, relative to their extent, that is rounding."""
 
-_DETAIL = 1e-5
-"""Ratio of a mesh's size to the scene's below which the steps of 32-bit coordinates are visible."""
-
-_SMALLEST = 1e-6
-"""Width of a scene [m] below which its unit must be wrong."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Waiting:
@@ -323,22 +317,3 @@ def _corner_count(prim: Usd.Prim, time: Usd.TimeCode) -> int:
 def left_out(prim: Usd.Prim, error: Tf.ErrorException, scene: Scene) -> None:
     """Note that USD cannot read a prim."""
     scene.note(str(prim.GetPath()), f"is left out: {usd_words(error)}")
-
-
-def note_small_meshes(scene: Scene) -> None:
-    """Note each mesh that is too small for the size of its scene."""
-    found = [(m, m.points[np.isfinite(m.points).all(axis=1)]) for m in scene.meshes]
-    boxes = [(mesh, p.min(axis=0), p.max(axis=0)) for mesh, p in found if len(p)]
-    if not boxes:
-        return
-    low, high = scene.bounds()
-    whole = float(np.linalg.norm(high - low))
-    if 0 < whole < _SMALLEST:
-        scene.note("the scene", f"is {whole:.3g} m wide; is metersPerUnit right?")
-    for mesh, low, high in boxes:
-        size = float(np.linalg.norm(high - low))
-        if 0 < size < _DETAIL * whole:
-            scene.note(
-                mesh.path,
-                f"is {size:.3g} m wide in a scene of {whole:.3g} m; 32-bit coordinates show there",
-            )

@@ -30,8 +30,8 @@ from fabricusd.scene.usd.instances import (
 )
 from fabricusd.scene.usd.light import is_light, read_light
 from fabricusd.scene.usd.material import Materials
-from fabricusd.scene.usd.placed_meshes import Meshes, Waiting, left_out, note_small_meshes
-from fabricusd.scene.usd.units import note_units, stage_units
+from fabricusd.scene.usd.placed_meshes import Meshes, Waiting, left_out
+from fabricusd.scene.usd.units import note_small_meshes, note_units, stage_units
 from fabricusd.scene.usd.value import note_types
 from fabricusd.scene.usd.worn import names_fabric
 from fabricusd.schema.rules.binding import place_problem
