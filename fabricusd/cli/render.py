@@ -219,14 +219,18 @@ def run(options: argparse.Namespace) -> int:
             complexity=options.complexity,
             width=options.width,
             units=options.units,
+            instanced=True,
         )
         put(staging, scene, options.width / options.height)
         _tell(scene.notes, options)
-        triangles = sum(len(mesh.triangles) for mesh in scene.meshes)
+        triangles = sum(len(mesh.triangles) * mesh.times for mesh in scene.meshes)
         words = f"{len(scene.meshes)} meshes, {triangles} triangles, {len(scene.lights)} lights"
+        if scene.instances:
+            words += f", {scene.instances} instances"
         print(f"fabricusd: would render {words} to {output}", file=sys.stderr)
         for mesh in scene.meshes[:MOST_TOLD]:
-            print(f"fabricusd: {mesh.path}: {mesh_words(scene, mesh)}", file=sys.stderr)
+            often = "" if mesh.placements is None else f", {mesh.times} times"
+            print(f"fabricusd: {mesh.path}{often}: {mesh_words(scene, mesh)}", file=sys.stderr)
         if len(scene.meshes) > MOST_TOLD:
             print(f"fabricusd: and {len(scene.meshes) - MOST_TOLD} more", file=sys.stderr)
         return 0 if triangles else 1

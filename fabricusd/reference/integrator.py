@@ -26,9 +26,11 @@ from fabricusd.reference.rays.embree import (
     ROWS,
     TFAR,
     Accelerator,
+    has_instances,
 )
+from fabricusd.reference.rays.placed import Carrier
 from fabricusd.reference.rays.sobol import new_numbers
-from fabricusd.reference.rays.triangles import Triangles, build_tables
+from fabricusd.reference.rays.triangles import build_tables
 from fabricusd.reference.rays.wave import (
     BEAUTY_ROWS,
     FAR_LEVEL,
@@ -59,6 +61,7 @@ from fabricusd.reference.surfaces.preview import (
     shade_preview,
 )
 from fabricusd.reference.surfaces.thin import is_thin, shade_thin, shade_thin_mapped
+from fabricusd.scene.copies import with_copies
 from fabricusd.scene.scene import FabricSurface, Material, Scene
 
 LEVELS = {
@@ -140,12 +143,14 @@ class Tracer:
         # Some laws need a table of shadows, a long step: whoever watches this thread watches it.
         shaders = beside.submit(copy_context().run, _shaders, scene, shadow)
         beside.shutdown(wait=False)
-        self.tables = build_tables(scene)
-        self.accelerator = Accelerator(self.tables.points, self.tables.triangles)
+        self.tables = build_tables(scene if has_instances() else with_copies(scene))
+        self.accelerator = Accelerator(
+            self.tables.points, self.tables.triangles, self.tables.groups, self.tables.placements
+        )
         self.shaders = shaders.result()
         for cloth in filter(None, self.shaders):
             cloth.home = self.tables.home
-        self.triangles = Triangles(self.tables.records, self.tables.material)
+        self.carrier = Carrier(self.tables, self.accelerator.begins)
         self.lights = build_lights(scene.lights, self.tables.centre)
         self.surfaces = build_surfaces(scene)
         shining = self.surfaces.table[:, [EMISSIVE, EMISSIVE + 1, EMISSIVE + 2]].any(axis=1)
@@ -228,12 +233,14 @@ class Tracer:
         tags[1:, :count] = 0
         counts = np.zeros(QUEUES * len(self.shaders), np.int64)
         result = np.zeros(3, np.int64)
+        triangles, uv = self.carrier.triangles(wave)
         for step in range(self.steps):
             self.accelerator.intersect(wave.lanes.rays, (count + 15) // 16, coherent=step == 0)
+            self.carrier.carry(wave, wave.lanes.rays, count)
             counters[0] += count
             arrive(
                 step, self.settings, count, wave.lanes, wave.paths, self.numbers, self.lights,
-                self.triangles, self._limits, wave.film, wave.queues, counts, lost,
+                triangles, self._limits, wave.film, wave.queues, counts, lost,
             )  # fmt: skip
             ends = np.cumsum(counts)
             hits = int(ends[-1])
@@ -242,7 +249,7 @@ class Tracer:
             sort_lanes(count, wave.queues, ends - counts)
             prepare(
                 step, self.settings, ends, wave.lanes, wave.queues, wave.paths, self.numbers,
-                self.triangles, self.lights, self.epsilon, wave.hits,
+                triangles, self.lights, self.epsilon, wave.hits,
             )  # fmt: skip
             if self.shines:
                 add_emission(hits, self.surfaces, wave.hits, wave.film)
@@ -250,7 +257,7 @@ class Tracer:
                 start, end = int(ends[queue] - counts[queue]), int(ends[queue])
                 self._shade(wave, int(queue), start, end)
             if aovs and step <= MOST_LAYERS:
-                record_first(hits, lens.eye, lens.axis, wave.hits, self.tables.uv, wave.film)
+                record_first(hits, lens.eye, lens.axis, wave.hits, uv, wave.film)
             depart(
                 step, self.settings, hits, self.translucent, wave.hits, wave.film, wave.shadows,
                 wave.next_lanes, result,
@@ -282,11 +289,13 @@ class Tracer:
         # meets, which matters for the others alone.
         self.accelerator.occluded(wave.shadows.rays, (count + 15) // 16)
         count = settle(count, wave.shadows, wave.film, aovs, self.blocked_go_on)
+        triangles, _ = self.carrier.triangles(wave)
         for _ in range(MOST_LAYERS):
             if count == 0:
                 break
             self.accelerator.intersect(wave.shadows.rays, (count + 15) // 16)
+            self.carrier.carry(wave, wave.shadows.rays, count)
             count = thin_out(
-                count, wave.shadows, self.opacity, self.gaps, self.surfaces, self.triangles,
+                count, wave.shadows, self.opacity, self.gaps, self.surfaces, triangles,
                 self.epsilon, aovs, wave.film,
             )  # fmt: skip

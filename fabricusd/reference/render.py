@@ -160,7 +160,7 @@ def render(
         time_code = None if staging.orbit else targets[number][0]
         loaded = scene if isinstance(scene, Scene) else read_scene(
             scene, fabric=fabric, camera=camera, time_code=time_code, complexity=complexity,
-            width=width, units=units,
+            width=width, units=units, instanced=True,
         )  # fmt: skip
         loaded = _staged(loaded, staging, width / height, number)
         stops[number] = exposure + (loaded.camera.exposure if loaded.camera else 0.0)
@@ -392,6 +392,7 @@ def render_scene(
     note_losses(scene, tracer, lens, not_finite, cut, met, (width, height))
     max_translucent = tracer.max_translucent
     embree, triangles = tracer.accelerator.version, len(tracer.tables.triangles)
+    instances = len(tracer.tables.placements)
     # Free the triangles and their acceleration structure before the layers are made.
     del tracer
     error = film.relative_error()
@@ -404,6 +405,7 @@ def render_scene(
         "fabricusd:cut": cut, "fabricusd:level": level, "fabricusd:shadow": shadow,
         "fabricusd:seed": seed, "fabricusd:workers": count, "fabricusd:pixelFilter": pixel_filter,
         "fabricusd:camera": camera.path, "fabricusd:triangles": triangles,
+        "fabricusd:instances": instances,
         "fabricusd:rays": str(rays + shadow_rays), "fabricusd:seconds": round(seconds, 3),
         "fabricusd:preparationSeconds": round(built - begun, 3),
         "fabricusd:notFinite": not_finite, "fabricusd:complete": int(complete),

@@ -25,6 +25,7 @@ def read_scene(
     complexity: str = "low",
     width: int = 960,
     units: str | None = None,
+    instanced: bool = False,
 ) -> Scene:
     """Read the scene of a USD or mesh file, in metres.
 
@@ -35,6 +36,8 @@ def read_scene(
         are baked and materials are bound on the faces for which the UVs were laid out
     units : unit of length of an .obj or .ply: "m", "cm", "mm" or "in"; None assumes metres and adds
         a note with the resulting size
+    instanced : read a mesh that instances share once, with its placements, instead of a copy for
+        each; for who can render that
 
     Raises `FabricError` if the file cannot be read as a scene.
     """
@@ -61,8 +64,9 @@ def read_scene(
     from fabricusd.scene.usd.stage import read_usd_scene
 
     return read_usd_scene(
-        path, binding=binding, camera=camera, time_code=time_code, fineness=fineness
-    )
+        path, binding=binding, camera=camera, time_code=time_code, fineness=fineness,
+        instanced=instanced,
+    )  # fmt: skip
 
 
 def as_binding(fabric: str | Fabric | Binding | None) -> Binding | None:

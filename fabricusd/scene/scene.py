@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.fabric import Binding
+from fabricusd.scene.placements import Placements, bounds_of
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,6 +81,7 @@ class Mesh:
     material : (m,) int - index into `Scene.materials`
     origin : str - identifies the mesh of which this may be a copy; only meshes of the same origin
         are baked as one
+    placements : where the mesh appears, if it is instanced; None where it appears as it is
     """
 
     path: str
@@ -90,6 +92,17 @@ class Mesh:
     uv: NDArray[np.float64] | None = None
     material: NDArray[Any]
     origin: str = ""
+    placements: Placements | None = None
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The paths of the prims that are this mesh."""
+        return (self.path,) if self.placements is None else self.placements.paths
+
+    @property
+    def times(self) -> int:
+        """How often the mesh appears."""
+        return 1 if self.placements is None else len(self.placements)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -171,11 +184,26 @@ class Scene:
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The bounding box (low, high) [m] of all triangles with finite corners; zeros if there are
         none."""
-        used = [p for p in map(_corners, self.meshes) if len(p)]
-        if not used:
+        boxes = [box for box in map(_box, self.meshes) if box is not None]
+        if not boxes:
             return np.zeros(3), np.zeros(3)
-        low = np.min([p.min(axis=0) for p in used], axis=0)
-        return low, np.max([p.max(axis=0) for p in used], axis=0)
+        return np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+
+    @property
+    def instances(self) -> int:
+        """Number of places at which instanced meshes appear, several meshes at one place as one."""
+        found = [m.placements.transforms for m in self.meshes if m.placements is not None]
+        return sum(len(one) for one in {id(one): one for one in found}.values())
+
+
+def _box(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """The mesh's bounding box, at all of its places; None where it has no finite corner."""
+    corners = _corners(mesh)
+    if not len(corners):
+        return None
+    if mesh.placements is not None:
+        return bounds_of(corners, mesh.placements.transforms)
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 def _corners(mesh: Mesh) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +77,7 @@ def note_size(scene: Scene, path: Path, units: str | None) -> None:
 
 def mesh_words(scene: Scene, mesh: Mesh) -> str:
     """The size of a mesh in words, with the number of threads of each of its fabrics across it."""
-    one = Scene(meshes=[mesh])
+    one = Scene(meshes=[replace(mesh, placements=None)])
     words = size_words(*one.bounds())
     if mesh.uv is None:
         return words

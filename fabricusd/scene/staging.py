@@ -119,18 +119,19 @@ def framed_meshes(scene: Scene, frame: str) -> Sequence[Mesh]:
     """The meshes of the prim `frame`, by its path or by a name that no other prim has."""
     if frame in ("", "/"):
         return scene.meshes
-    inside = [m for m in scene.meshes if m.path == frame or m.path.startswith(f"{frame}/")]
+    inside = _meshes_at(scene, frame)
     if inside:
         return inside
     # By name: the prim may be a mesh, or anything above one.
-    found: dict[str, list[Mesh]] = {}
+    found: dict[str, str] = {}
     names: set[str] = set()
-    for mesh in scene.meshes:
-        parts = mesh.path.replace(":", "/").split("/")
+    for path in (path for mesh in scene.meshes for path in mesh.paths):
+        parts = path.replace(":", "/").split("/")
         names.update(part for part in parts if part)
         for k, part in enumerate(parts):
             if part == frame:
-                found.setdefault("/".join(parts[: k + 1]), []).append(mesh)
+                place = "/".join(parts[: k + 1])
+                found[place] = path[: len(place)]
     if len(found) > 1:
         several = ", ".join(list(found)[:8])
         raise FabricError(f"--frame '{frame}'", f"is the name of several prims: {several}")
@@ -140,7 +141,24 @@ def framed_meshes(scene: Scene, frame: str) -> Sequence[Mesh]:
             f"is no mesh of the scene, or prim above one{did_you_mean(frame, names)}; meshes are: "
             + (", ".join(mesh.path for mesh in scene.meshes[:8]) or "none"),
         )
-    return next(iter(found.values()))
+    return _meshes_at(scene, next(iter(found.values())))
+
+
+def _meshes_at(scene: Scene, place: str) -> list[Mesh]:
+    """The meshes whose path is `place` or lies below it, instances without those elsewhere."""
+
+    def is_inside(path: str) -> bool:
+        return path == place or path.startswith((f"{place}/", f"{place}:"))
+
+    found = []
+    for mesh in scene.meshes:
+        placements = mesh.placements
+        if placements is None:
+            if is_inside(mesh.path):
+                found.append(mesh)
+        elif (inside := placements.where(is_inside)) is not None:
+            found.append(replace(mesh, placements=inside))
+    return found
 
 
 def over_background(beauty: NDArray[np.float32], background: Place) -> NDArray[np.float32]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import random
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from fabricusd.reference.film import Film
 from fabricusd.reference.passes import Pass, Sampling, passes
 from fabricusd.reference.render import render, render_scene
 from fabricusd.scene.light_kinds import DISTANT, DOME
+from fabricusd.scene.placements import Placements
 from fabricusd.scene.scene import FabricSurface, Light, Scene
 from fabricusd.scene.staging import Staging
 from fabricusd.schema import load
@@ -39,6 +41,18 @@ def cloth() -> Scene:
     )
 
 
+def instances() -> Scene:
+    """The square at three places, one of them mirrored."""
+    scene = cloth()
+    transforms = np.tile(np.eye(4)[:3], (3, 1, 1))
+    transforms[1, 0, 0], transforms[1, 0, 3], transforms[2, 1, 3] = -1, 0.7, -0.5
+    placements = Placements(
+        transforms=transforms, paths=("/square",), path_of=np.zeros(3, np.int32)
+    )
+    scene.meshes = [replace(mesh, placements=placements) for mesh in scene.meshes]
+    return scene
+
+
 def same(a: Any, b: Any) -> None:
     assert a.layers.keys() == b.layers.keys()
     for name, layer in a.layers.items():
@@ -57,6 +71,14 @@ def test_the_picture_is_the_same_to_the_bit(cluster, how):
     size = {"width": 48, "height": 40, "level": "far"}
     one = render_scene(cloth(), workers=1, **size, **how)
     many = render_scene(cloth(), cluster=cluster, **size, **how)
+    same(one, many)
+
+
+def test_a_picture_of_instances_is_the_same_to_the_bit(cluster):
+    settings = {"width": 48, "height": 40, "spp": 20, "aovs": ("beauty", "normal", "uv")}
+    one = render_scene(instances(), workers=1, **settings)
+    many = render_scene(instances(), cluster=cluster, **settings)
+    assert one.metadata["fabricusd:instances"] == 3
     same(one, many)
     assert many.complete
     assert (one.rays, one.not_finite, one.met) == (many.rays, many.not_finite, many.met)

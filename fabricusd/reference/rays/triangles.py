@@ -7,7 +7,7 @@ float32 resolves the position inside a thread however large the UVs are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,9 +41,23 @@ class Triangles(NamedTuple):
     material: NDArray[np.int32]
 
 
+@dataclass(frozen=True)
+class Group:
+    """Meshes that are instanced together.
+
+    first, count : of their triangles; first_place, places : of their placements
+    """
+
+    first: int
+    count: int
+    first_place: int
+    places: int
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TriangleTables:
-    """All triangles of a scene, relative to `centre`.
+    """All triangles of a scene, relative to `centre`; those of instances, relative to the middle of
+    their group, behind all others.
 
     centre : (3,) float64 [m] - subtracted from every point, so that float32 resolves the shape
     points : (n, 3) float32 [m], triangles : (m, 3) uint32 - the geometry for ray tracing
@@ -53,6 +67,8 @@ class TriangleTables:
     home : (m, 2) int64 - ends and picks between the corner of the cloth and the repeat in which a
         triangle's weave coordinates begin; (0, 2) if no fabric of the scene has uneven threads
     radius : float [m] - of the scene around `centre`
+    groups : of instanced meshes; placements : (k, 3, 4) float32 - from a group's triangles to the
+        scene's, both relative to their middle
     """
 
     centre: NDArray[np.float64]
@@ -63,6 +79,8 @@ class TriangleTables:
     material: NDArray[np.int32]
     home: NDArray[np.int64]
     radius: float
+    groups: tuple[Group, ...] = ()
+    placements: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3, 4), np.float32))
 
 
 def build_tables(scene: Scene) -> TriangleTables:
@@ -74,8 +92,9 @@ def build_tables(scene: Scene) -> TriangleTables:
         every = np.concatenate([p for p in finite if len(p)] or [np.zeros((1, 3))])
         low, high = every.min(axis=0), every.max(axis=0)
     centre = 0.5 * (low + high)
-    kept = [(mesh, _sound_triangles(scene, mesh)) for mesh in scene.meshes]
+    kept = [(m, _sound_triangles(scene, m)) for m in scene.meshes if m.placements is None]
     parts = [_mesh_tables(scene, mesh, keep, centre) for mesh, keep in kept if keep.any()]
+    groups, placements = _groups(scene, centre, parts)
     counts = np.cumsum([0] + [len(p[0]) for p in parts])
     return TriangleTables(
         centre=centre,
@@ -88,7 +107,36 @@ def build_tables(scene: Scene) -> TriangleTables:
         material=_stack([p[4] for p in parts], (0,), np.int32),
         home=_stack([p[5] for p in parts if p[5] is not None], (0, 2), np.int64),
         radius=float(np.linalg.norm(high - low) / 2),
+        groups=groups,
+        placements=_stack(placements, (0, 3, 4), np.float32),
     )
+
+
+def _groups(
+    scene: Scene, centre: NDArray[np.float64], parts: list[tuple[Any, ...]]
+) -> tuple[tuple[Group, ...], list[NDArray[np.float64]]]:
+    """The groups of instanced meshes, whose tables are added to `parts`, and their placements."""
+    together: dict[int, list[Mesh]] = {}
+    for mesh in scene.meshes:
+        if mesh.placements is not None:
+            together.setdefault(id(mesh.placements.transforms), []).append(mesh)
+    groups, placements = [], []
+    first, first_place = sum(len(p[1]) for p in parts), 0
+    for meshes in together.values():
+        kept = [(mesh, _sound_triangles(scene, mesh)) for mesh in meshes]
+        alone = Scene(meshes=[replace(mesh, placements=None) for mesh in meshes])
+        middle = 0.5 * np.add(*alone.bounds())
+        own = [_mesh_tables(scene, mesh, keep, middle) for mesh, keep in kept if keep.any()]
+        if not own or meshes[0].placements is None:
+            continue
+        parts += own
+        moved = meshes[0].placements.transforms.copy()
+        moved[:, :, 3] += moved[:, :, :3] @ middle - centre
+        placements.append(moved)
+        count = sum(len(p[1]) for p in own)
+        groups.append(Group(first, count, first_place, len(moved)))
+        first, first_place = first + count, first_place + len(moved)
+    return tuple(groups), placements
 
 
 def _stack(parts: list[NDArray[Any]], empty: tuple[int, ...], kind: Any) -> NDArray[Any]:

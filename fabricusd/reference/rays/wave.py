@@ -123,7 +123,10 @@ class ShadowRays(NamedTuple):
 
 
 class Wave:
-    """The buffers of one worker, for up to `capacity` paths."""
+    """The buffers of one worker, for up to `capacity` paths.
+
+    carried : the triangles that rays hit, see `placed.to_world`; None in a scene without instances
+    """
 
     def __init__(self, capacity: int, *, aovs: bool) -> None:
         self.capacity = capacity
@@ -140,7 +143,9 @@ class Wave:
             new_packets(capacity), aligned_empty((4, row)), aligned_empty((capacity,), np.int32)
         )
         self.film = aligned_empty((FILM_ROWS if aovs else BEAUTY_ROWS, row))
+        self.aovs = aovs
         self.scratch: Any = None
+        self.carried: Any = None
 
     def swap(self) -> None:
         """Make the rays that the last step spawned the current rays."""

@@ -264,8 +264,9 @@ class FabricShader:
         if side.yarn is None:
             look_up(R, cloth, shadow, v_sign, hits, first, points)
         else:
+            home = self.home if wave.carried is None else wave.carried.home
             look_up_uneven(
-                R, cloth, side.yarn, self.home, v_sign, wave.hits.tags[PRIMITIVE], hits, first,
+                R, cloth, side.yarn, home, v_sign, wave.hits.tags[PRIMITIVE], hits, first,
                 points,
             )  # fmt: skip
         if law.kind == PUBLISHED_ONLY:

@@ -55,6 +55,7 @@ def _declare_scene(library: ctypes.CDLL) -> None:
         ("rtcReleaseDevice", None, pointer),
         ("rtcGetDeviceProperty", ctypes.c_ssize_t, pointer, ctypes.c_int),
         ("rtcGetDeviceError", ctypes.c_int, pointer),
+        ("rtcSetGeometryInstancedScene", None, pointer, pointer),
     ))  # fmt: skip
 
 

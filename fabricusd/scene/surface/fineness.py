@@ -24,6 +24,8 @@ sharp edges, as at a hem, thus do not force the whole mesh to be refined, and a 
 coarse does not stay coarse."""
 _LAST = 6
 """Highest level that `auto` chooses; a cage of few large faces may need more than `veryhigh`."""
+_LOOKED = 16
+"""Places of an instanced mesh, those where it may look largest, at which its level is found."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,6 +69,36 @@ class Fineness:
         if bend <= 6.0:
             return 0
         return min(max(math.ceil(math.log(bend / 8.0, 4.0)), 1), _LAST)
+
+    def finest(
+        self,
+        points: NDArray[np.float64],
+        places: NDArray[np.float64],
+        counts: NDArray[Any],
+        indices: NDArray[Any],
+    ) -> int:
+        """The highest level of (n, 3) `points` at the (k, 3, 4) `places` [m] that look largest."""
+        if not self.is_auto:
+            places = places[:1]
+        if len(places) > _LOOKED:
+            places = places[np.argsort(-self._largeness(points, places))[:_LOOKED]]
+        return max(
+            self.level(points @ place[:, :3].T + place[:, 3], counts, indices) for place in places
+        )
+
+    def _largeness(
+        self, points: NDArray[np.float64], places: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(k,) how large a mesh may look at its nearest point, for each of its places."""
+        known = points[np.isfinite(points).all(axis=1)]
+        stretch = np.linalg.norm(places[:, :, :3], axis=(1, 2))
+        if self.camera is None or self.camera.orthographic or not len(known):
+            return np.asarray(stretch)
+        middle = 0.5 * (known.min(axis=0) + known.max(axis=0))
+        radius = float(np.linalg.norm(known - middle, axis=1).max())
+        centre = places[:, :, :3] @ middle + places[:, :, 3] - self.camera.frame[:3, 3]
+        away = np.linalg.norm(centre, axis=1) - radius * stretch
+        return np.asarray(stretch / np.maximum(away, max(self.camera.clipping[0], 1e-9)))
 
     def _pixel(self, points: NDArray[np.float64]) -> float:
         """Width [m] of a pixel at the nearest of `points`; without a camera, the points are assumed

@@ -7,7 +7,7 @@ multiply to a thousand billion triangles.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,13 +18,18 @@ from fabricusd.scene.scene import Scene
 from fabricusd.scene.usd.value import array_of, type_problem, value_of
 
 MOST_COPIES = 100_000
-"""Most instances in a scene, including those inside others: reading takes some minutes."""
+"""Most copies, and most native instances, in a scene, including those inside others: reading takes
+some minutes."""
 
-_MOST_NAMED = 10 * MOST_COPIES
-"""Instances of one instancer above which hidden ones are not looked for."""
+MOST_PLACED = 10_000_000
+"""Most instances in a scene that are not copied."""
+
+_MOST_NAMED = 10
+"""Instances of one instancer over the most that are placed, above which hidden ones are not looked
+for."""
 
 MOST_TRIANGLES = 10_000_000
-"""Most triangles of all instances together: some 8 GB when rendered."""
+"""Most triangles of all copies together: some 8 GB when rendered."""
 
 OF_PROTOTYPES = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
 """Which prims of a prototype are read: it often lies below an `over`, whose prims are undefined."""
@@ -38,25 +43,51 @@ _PER_INSTANCE = (
 
 @dataclass(frozen=True, kw_only=True)
 class Count:
-    """Numbers of instances and triangles; infinite where an instance contains itself."""
+    """Numbers of instances and triangles; infinite where an instance contains itself.
+
+    walked : native instances whose prims are visited one by one, once for all that an instancer
+        places
+    """
 
     copies: float = 0
     triangles: float = 0
+    walked: float = 0
 
     def __add__(self, other: Count) -> Count:
-        return Count(copies=self.copies + other.copies, triangles=self.triangles + other.triangles)
+        return Count(
+            copies=self.copies + other.copies,
+            triangles=self.triangles + other.triangles,
+            walked=self.walked + other.walked,
+        )
 
     def times(self, number: int) -> Count:
-        """The count of `number` copies, each of which is an instance as well."""
+        """The count of `number` copies that an instancer places, each of which is an instance."""
         if not number:
             return Count()
-        return Count(copies=number * (1 + self.copies), triangles=number * self.triangles)
+        return Count(
+            copies=number * (1 + self.copies),
+            triangles=number * self.triangles,
+            walked=self.walked,
+        )
 
-    @property
-    def too_many(self) -> str:
-        """Which count exceeds its bound, in words; an empty string where none does."""
-        if self.copies > MOST_COPIES:
-            return f"{_told(self.copies)} instances; at most {MOST_COPIES} are placed"
+    def native(self) -> Count:
+        """The count of one native instance of this."""
+        one = self.times(1)
+        return replace(one, walked=one.walked + 1)
+
+    def too_many(self, *, instanced: bool) -> str:
+        """Which count exceeds its bound, in words; an empty string where none does.
+
+        instanced : whether instances are placed, or copied
+        """
+        most = MOST_PLACED if instanced else MOST_COPIES
+        if self.copies > most:
+            return f"{_told(self.copies)} instances; at most {_told(most)} are placed"
+        if instanced:
+            if self.walked > MOST_COPIES:
+                words = f"{_told(self.walked)} native instances"
+                return f"{words}; at most {MOST_COPIES} are placed"
+            return ""
         if self.triangles > MOST_TRIANGLES:
             words = f"{_told(self.triangles)} triangles"
             return f"{words}; instances may have {_told(MOST_TRIANGLES)} together"
@@ -70,8 +101,11 @@ def _told(number: float) -> str:
 class Copies:
     """Counts prims together with everything that they instance."""
 
-    def __init__(self, stage: Usd.Stage, time: Usd.TimeCode, scene: Scene) -> None:
+    def __init__(
+        self, stage: Usd.Stage, time: Usd.TimeCode, scene: Scene, *, instanced: bool
+    ) -> None:
         self.stage, self.time, self.scene = stage, time, scene
+        self._most_named = _MOST_NAMED * (MOST_PLACED if instanced else MOST_COPIES)
         self._known: dict[Sdf.Path, Count] = {}
         self._open: set[Sdf.Path] = set()
 
@@ -97,7 +131,7 @@ class Copies:
             if is_invisible(prim, self.time):
                 walk.PruneChildren()
             elif prim.IsInstance() and prim != root:
-                total += self.below(prim).times(1)
+                total += self.below(prim).native()
             elif prim.IsA(UsdGeom.PointInstancer):
                 walk.PruneChildren()
                 total += self.of_instancer(UsdGeom.PointInstancer(prim))
@@ -111,7 +145,7 @@ class Copies:
         targets = instancer.GetPrototypesRel().GetForwardedTargets()
         if not named or not targets or array_problem(instancer, self.time):
             return Count()
-        if len(named) > _MOST_NAMED:
+        if len(named) > self._most_named:
             return Count(copies=len(named))
         indices = np.array(named, np.int64)
         shown = shown_instances(instancer, self.time, len(indices))
@@ -166,11 +200,11 @@ def shown_instances(
 
 def placed(
     prim: Usd.Prim, time: Usd.TimeCode, scene: Scene
-) -> list[tuple[Usd.Prim, NDArray[np.float64]]]:
-    """(prototype, matrix) of each visible instance; none, with a note, where the instancer makes no
-    sense.
+) -> list[tuple[Usd.Prim, NDArray[np.int64], NDArray[np.float64]]]:
+    """(prototype, numbers of its visible instances, their matrices) of each prototype; none, with a
+    note, where the instancer makes no sense.
 
-    The (4, 4) matrix leads from the space of the prototype's parent to that of the instancer.
+    The (n, 4, 4) matrices lead from the space of the prototype's parent to that of the instancer.
     """
     where = str(prim.GetPath())
     instancer = UsdGeom.PointInstancer(prim)
@@ -190,19 +224,23 @@ def placed(
     if len(moves) != len(indices):
         scene.note(where, "has arrays of different lengths, left out")
         return []
-    roots = [prim.GetStage().GetPrimAtPath(target) for target in targets]
+    # Gf matrices transform row vectors.
+    places = np.array(moves, np.float64).reshape(-1, 4, 4).transpose(0, 2, 1)
+    shown = shown_instances(instancer, time, len(indices))
+    finite = np.isfinite(places[shown]).all(axis=(1, 2))
+    if not finite.all():
+        scene.note(where, "has instances whose place is not finite, left out")
+        shown = shown[finite]
     found = []
-    for k in shown_instances(instancer, time, len(indices)).tolist():
-        number = int(indices[k])
-        root = roots[number] if 0 <= number < len(roots) else None
-        place = as_matrix(moves[k])
+    for number in np.unique(indices[shown]).tolist():
+        known = 0 <= number < len(targets)
+        root = prim.GetStage().GetPrimAtPath(targets[number]) if known else None
         if not root or root.IsAbstract():
             scene.note(where, f"names prototype {number}, which is not a prim that can be seen")
-        elif not np.isfinite(place).all():
-            scene.note(where, "has instances whose place is not finite, left out")
-        else:
-            # A prototype keeps its own transform, but not those of its parents.
-            found.append((root, place))
+            continue
+        own = shown[indices[shown] == number]
+        # A prototype keeps its own transform, but not those of its parents.
+        found.append((root, own, places[own]))
     return found
 
 

@@ -71,6 +71,25 @@ class Materials:
             self._known[path] = self._add(surface, uv_set)
         return self._known[path]
 
+    def look(self, prim: Usd.Prim) -> tuple[Any, ...]:
+        """What decides the surfaces of a mesh, equal for instances that look alike."""
+        own = self.of(prim)
+        shown: Any = own.index if own is not None else None
+        if own is None and self.binding is None:
+            shown = self._display(prim, "displayColor", 3), self._display(prim, "displayOpacity", 1)
+        return shown, self._of_subsets(prim)
+
+    def worn(self, prim: Usd.Prim) -> list[int]:
+        """Indices of the surfaces that a mesh and its subsets may wear."""
+        own = self.of(prim) or (None if self.binding is None else self.fallback(prim))
+        found = [None if own is None else own.index, *self._of_subsets(prim)]
+        return [number for number in found if number is not None]
+
+    def _of_subsets(self, prim: Usd.Prim) -> tuple[int | None, ...]:
+        subsets = UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(prim))
+        own = [self.of(subset.GetPrim()) for subset in subsets]
+        return tuple(None if one is None else one.index for one in own)
+
     def _note_what_is_left_out(self, prim: Usd.Prim, found: Bound) -> None:
         """One line for each binding of `prim`, or of one above it, that binds nothing."""
         for owner in (prim, *_ancestors(prim)):

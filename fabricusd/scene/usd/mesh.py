@@ -36,7 +36,7 @@ _OF_UVS = (
 )
 """Types of primvars that are taken as UVs whatever their name is."""
 
-_FARTHEST = 1e9
+FARTHEST = 1e9
 """Largest distance from the origin [m]: beyond it squares of areas leave the range of 32-bit
 numbers."""
 
@@ -48,12 +48,14 @@ class Placed:
     matrix : (4, 4) from the mesh's points to the world, in scene units
     mirrored : whether the prim's own transform mirrors the mesh
     pose : the points that a skeleton has moved; None where the prim's own points count
+    places : (k, 4, 4) - `matrix` at each place where the mesh stands, None for only that one
     """
 
     prim: Usd.Prim
     matrix: NDArray[np.float64]
     mirrored: bool
     pose: Pose | None = None
+    places: NDArray[np.float64] | None = None
 
 
 def is_mirrored(matrix: NDArray[np.float64]) -> bool:
@@ -91,8 +93,8 @@ def read_mesh(
     scheme = str(value_of(mesh.GetSubdivisionSchemeAttr(), time, scene) or "none")
     level = None
     if scheme not in ("none", "bilinear"):
-        world = (points @ matrix[:3, :3].T + matrix[:3, 3]) * metres
-        level = fineness.level(world, counts, indices)
+        places = matrix[None] if placed.places is None else placed.places
+        level = fineness.finest(points, places[:, :3] * metres, counts, indices)
         if scheme == "catmullClark" and fineness.is_auto and not level:
             # No edge would be halved: the cage is as good.
             level = None
@@ -130,11 +132,11 @@ def _near(
 ) -> NDArray[np.float64]:
     """The points, with NaN, and a note, for those that lie too far away to be traced."""
     world = (points @ matrix[:3, :3].T + matrix[:3, 3]) * metres
-    beyond = (np.abs(world) > _FARTHEST).any(axis=1)
+    beyond = (np.abs(world) > FARTHEST).any(axis=1)
     far = np.asarray(np.isfinite(world).all(axis=1) & beyond)
     if not far.any():
         return points
-    scene.note(where, f"has {int(far.sum())} points beyond {_FARTHEST:g} m, which do not count")
+    scene.note(where, f"has {int(far.sum())} points beyond {FARTHEST:g} m, which do not count")
     return np.where(far[:, None], np.nan, points)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -30,10 +30,9 @@ from fabricusd.scene.usd.instances import (
 )
 from fabricusd.scene.usd.light import is_light, read_light
 from fabricusd.scene.usd.material import Materials
-from fabricusd.scene.usd.mesh import Placed, is_mirrored, read_mesh
-from fabricusd.scene.usd.skeleton import Skeletons
-from fabricusd.scene.usd.units import note_units, stage_units
-from fabricusd.scene.usd.value import note_types, usd_words, value_of
+from fabricusd.scene.usd.placed_meshes import Meshes, Waiting, left_out
+from fabricusd.scene.usd.units import note_small_meshes, note_units, stage_units
+from fabricusd.scene.usd.value import note_types
 from fabricusd.scene.usd.worn import names_fabric
 from fabricusd.schema.rules.binding import place_problem
 from fabricusd.schema.source import compose_stage, usd_errors
@@ -45,12 +44,6 @@ _DEEPEST = 8
 _READ_BY_USD = "xformOp.*|visibility|purpose|invisibleIds|exposure(:.*)?"
 """Attributes that USD's own functions read, and no reader here: transforms and the like."""
 
-_DETAIL = 1e-5
-"""Ratio of a mesh's size to the scene's below which the steps of 32-bit coordinates are visible."""
-
-_SMALLEST = 1e-6
-"""Width of a scene [m] below which its unit must be wrong."""
-
 assert fabricusd.schema.PLUGIN_PATH
 
 
@@ -61,6 +54,7 @@ def read_usd_scene(
     camera: str | None = None,
     time_code: float | None = None,
     fineness: Fineness = Fineness(),  # noqa: B008
+    instanced: bool = False,
 ) -> Scene:
     """Everything that is visible on the stage at `time_code`, or at its earliest time for None.
 
@@ -68,6 +62,7 @@ def read_usd_scene(
     camera : path of the camera's prim, or its name where no other camera has it; None takes the
         first camera on the stage
     fineness : of subdivision surfaces; its camera is set to the one that is found
+    instanced : whether meshes that instances share are read once, with their placements
     """
     stage, notes = _open(path)
     # USD would print several lines about a prim to standard error.
@@ -75,7 +70,8 @@ def read_usd_scene(
     try:
         # Notes tell of values that are not finite; NumPy would warn of them as well.
         with np.errstate(all="ignore"):
-            scene = _Reader(stage, notes, binding, time_code, fineness).read(path, camera)
+            reader = _Reader(stage, notes, binding, time_code, fineness, instanced=instanced)
+            scene = reader.read(path, camera)
         for warning in warnings.TakeUncoalescedDiagnostics():
             scene.note(str(path), f"USD: {one_line(warning.commentary, 300)}")
     finally:
@@ -89,20 +85,6 @@ def _open(path: Path) -> tuple[Usd.Stage, list[str]]:
     return stage, [f"{path} {one_line(str(e), 200)}" for e in stage.GetCompositionErrors()]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Waiting:
-    """A prim and its place; a mesh waits until the camera is known.
-
-    matrix : (4, 4) - from the prim to the world
-    base, before : a prim, and the (4, 4) matrix that takes it and all below it to the world
-    """
-
-    prim: Usd.Prim
-    matrix: NDArray[np.float64]
-    base: Usd.Prim
-    before: NDArray[np.float64]
-
-
 class _Reader:
     def __init__(
         self,
@@ -111,31 +93,30 @@ class _Reader:
         binding: Binding | None,
         time_code: float | None,
         fineness: Fineness,
+        *,
+        instanced: bool,
     ) -> None:
         self.stage = stage
         self.fineness = fineness
-        self.waiting: list[_Waiting] = []
+        self.instanced = instanced
+        self.waiting: list[Waiting] = []
         self.time = Usd.TimeCode.EarliestTime() if time_code is None else Usd.TimeCode(time_code)
         self.scene = Scene(notes=notes)
         self.metres, self.scene.up_axis = stage_units(stage, self.scene)
         self.materials = Materials(self.scene, binding, self.time)
-        self.skeletons = Skeletons(self.time, self.scene)
-        self.copies = Copies(stage, self.time, self.scene)
+        self.copies = Copies(stage, self.time, self.scene, instanced=instanced)
         self.placed, self.refused = Count(), 0
         self.cameras: list[Usd.Prim] = []
-        self.one_sided: list[str] = []
 
     def read(self, path: Path, camera: str | None) -> Scene:
         root = self.stage.GetPseudoRoot()
-        self._visit(root, UsdGeom.XformCache(self.time), np.eye(4), ())
+        self._visit(root, UsdGeom.XformCache(self.time), np.eye(4)[None], ())
         self.scene.camera = self._camera(path, camera)
         # The camera may decide how finely a mesh is refined.
-        self.fineness = replace(self.fineness, camera=self.scene.camera)
-        for one in self.waiting:
-            try:
-                self._mesh(one)
-            except Tf.ErrorException as error:
-                self._left_out(one.prim, error)
+        fineness = replace(self.fineness, camera=self.scene.camera)
+        meshes = Meshes(self.materials, self.scene, self.time, self.metres, fineness)
+        meshes.add(self.waiting, instanced=self.instanced)
+        self.one_sided = meshes.one_sided
         if not self.scene.meshes:
             self.scene.note(str(path), "holds no visible mesh with faces")
         self._note_the_whole()
@@ -150,10 +131,7 @@ class _Reader:
             self.scene.note(f"{first}{others}", "doubleSided = false; both sides are rendered")
         if self.refused > 1:
             self.scene.note("the scene", f"has {self.refused - 1} more prims left out for that")
-        _note_small_meshes(self.scene)
-
-    def _left_out(self, prim: Usd.Prim, error: Tf.ErrorException) -> None:
-        self.scene.note(str(prim.GetPath()), f"is left out: {usd_words(error)}")
+        note_small_meshes(self.scene)
 
     def _visit(
         self,
@@ -162,17 +140,20 @@ class _Reader:
         before: NDArray[np.float64],
         inside: tuple[Sdf.Path, ...],
     ) -> None:
-        """Add all that is visible under `root`; `before` leads from its parent to the world."""
+        """Add all that is visible under `root`.
+
+        before : (k, 4, 4) - from its parent to the world, for each time that it is placed
+        """
         base = root if root.IsPseudoRoot() else root.GetParent()
         for prim in self._visible(root, bool(inside)):
             note_types(prim, _READ_BY_USD, self.time, self.scene)
             try:
-                matrix = before @ as_matrix(cache.ComputeRelativeTransform(prim, base)[0])
-                self._add(_Waiting(prim=prim, matrix=matrix, base=base, before=before), inside)
+                own = as_matrix(cache.ComputeRelativeTransform(prim, base)[0])
+                self._add(Waiting(prim=prim, own=own, base=base, before=before), inside)
             except Tf.ErrorException as error:
-                self._left_out(prim, error)
+                left_out(prim, error, self.scene)
 
-    def _add(self, one: _Waiting, inside: tuple[Sdf.Path, ...]) -> None:
+    def _add(self, one: Waiting, inside: tuple[Sdf.Path, ...]) -> None:
         """Add one visible prim of any type."""
         prim, where = one.prim, str(one.prim.GetPath())
         # A mesh tells of its own subsets.
@@ -183,49 +164,19 @@ class _Reader:
                 self.scene.note(where, f"binds a fabric, left out: fabric:binding {problem}")
         if prim.IsA(UsdGeom.Camera):
             self.cameras.append(prim)
-        elif not np.isfinite(one.matrix).all():
+        elif not np.isfinite(one.own).all():
             self.scene.note(where, "has a transform that is not finite, left out")
         elif prim.IsA(UsdGeom.PointInstancer):
-            self._instances(prim, one.matrix, inside)
+            self._instances(prim, one.matrices, inside)
         elif prim.IsA(UsdGeom.Mesh):
             self.waiting.append(one)
         elif is_light(prim):
-            light = read_light(prim, self.time, one.matrix, self.metres, self.scene)
-            if light is not None:
-                self.scene.lights.append(light)
+            for matrix in one.matrices:
+                light = read_light(prim, self.time, matrix, self.metres, self.scene)
+                if light is not None:
+                    self.scene.lights.append(light)
         elif prim.IsA(UsdGeom.Gprim) or prim.GetTypeName() == "Volume":
             self.scene.note(where, f"is a {prim.GetTypeName()}, left out; only meshes are rendered")
-
-    def _mesh(self, one: _Waiting) -> None:
-        prim, where = one.prim, str(one.prim.GetPath())
-        if is_light(prim):
-            self.scene.note(
-                where, "is a light as well, which is left out: it is rendered as a mesh"
-            )
-        pose = self.skeletons.pose(prim)
-        matrix = one.matrix
-        if pose is not None and pose.skeleton is not None:
-            matrix = one.before @ self._relative(pose.skeleton, one.base)
-            if not np.isfinite(matrix).all():
-                self.scene.note(where, "has a skeleton whose place is not finite, left out")
-                return
-        mesh = read_mesh(
-            Placed(prim=prim, matrix=matrix, mirrored=is_mirrored(one.matrix), pose=pose),
-            self.time, self.metres, self.materials, self.scene, self.fineness,
-        )  # fmt: skip
-        if mesh is None:
-            return
-        self.scene.meshes.append(mesh)
-        sides = UsdGeom.Mesh(prim).GetDoubleSidedAttr()
-        if sides.HasAuthoredValue() and value_of(sides, self.time, self.scene) is False:
-            self.one_sided.append(where)
-
-    def _relative(self, prim: Usd.Prim, base: Usd.Prim) -> NDArray[np.float64]:
-        """(4, 4) from a skeleton to `base`, or to the world where it does not lie below `base`."""
-        cache = UsdGeom.XformCache(self.time)
-        if not prim.GetPath().HasPrefix(base.GetPath()):
-            return as_matrix(cache.GetLocalToWorldTransform(prim))
-        return as_matrix(cache.ComputeRelativeTransform(prim, base)[0])
 
     def _visible(self, root: Usd.Prim, inside: bool) -> Iterator[Usd.Prim]:
         """The prims under `root` in order, without invisible ones, guides and proxies.
@@ -250,7 +201,7 @@ class _Reader:
         """False for a native instance that, with inner ones, would exceed the bounds."""
         if not prim.IsInstance() or prim.IsInstanceProxy():
             return True
-        return self._can_place(prim, self.copies.below(prim).times(1))
+        return self._can_place(prim, self.copies.below(prim).native())
 
     def _can_place(self, prim: Usd.Prim, count: Count) -> bool:
         """Whether so many more instances stay within the bounds; a note tells where they do not."""
@@ -258,9 +209,10 @@ class _Reader:
             self.scene.note(str(prim.GetPath()), "instances itself, left out")
             return False
         total = self.placed + count
-        if total.too_many:
+        too_many = total.too_many(instanced=self.instanced)
+        if too_many:
             if not self.refused:
-                self.scene.note(str(prim.GetPath()), f"is left out: it leads to {total.too_many}")
+                self.scene.note(str(prim.GetPath()), f"is left out: it leads to {too_many}")
             self.refused += 1
             return False
         self.placed = total
@@ -269,7 +221,7 @@ class _Reader:
     def _instances(
         self, prim: Usd.Prim, world: NDArray[np.float64], inside: tuple[Sdf.Path, ...]
     ) -> None:
-        """Add the prims of each instance of a point instancer that lies at `world`."""
+        """Add the prims of each instance of a point instancer that lies at each of `world`."""
         if len(inside) >= _DEEPEST or prim.GetPath() in inside:
             self.scene.note(str(prim.GetPath()), "instances itself, left out")
             return
@@ -278,8 +230,20 @@ class _Reader:
             if not self._can_place(prim, count):
                 return
         cache = UsdGeom.XformCache(self.time)
-        for root, place in placed(prim, self.time, self.scene):
-            self._visit(root, cache, world @ place, (*inside, prim.GetPath()))
+        found, within = placed(prim, self.time, self.scene), (*inside, prim.GetPath())
+        if self.instanced:
+            for root, _, places in found:
+                every = (world[:, None] @ places).reshape(-1, 4, 4)
+                self._visit(root, cache, every, within)
+            return
+        # Copies come in the order of the instances.
+        one_by_one = [
+            (number, root, place)
+            for root, numbers, places in found
+            for number, place in zip(numbers.tolist(), places, strict=True)
+        ]
+        for _, root, place in sorted(one_by_one, key=lambda one: one[0]):
+            self._visit(root, cache, world @ place, within)
 
     def _camera_prim(self, path: Path, name: str) -> Usd.Prim:
         """The camera at the path `name`, or the only camera whose prim has that name."""
@@ -322,24 +286,5 @@ class _Reader:
         try:
             return read_camera(prim, self.time, self.metres, self.scene)
         except Tf.ErrorException as error:
-            self._left_out(prim, error)
+            left_out(prim, error, self.scene)
             return None
-
-
-def _note_small_meshes(scene: Scene) -> None:
-    """Note each mesh that is too small for the size of its scene."""
-    found = [(m, m.points[np.isfinite(m.points).all(axis=1)]) for m in scene.meshes]
-    boxes = [(mesh, p.min(axis=0), p.max(axis=0)) for mesh, p in found if len(p)]
-    if not boxes:
-        return
-    low, high = np.min([b[1] for b in boxes], axis=0), np.max([b[2] for b in boxes], axis=0)
-    whole = float(np.linalg.norm(high - low))
-    if 0 < whole < _SMALLEST:
-        scene.note("the scene", f"is {whole:.3g} m wide; is metersPerUnit right?")
-    for mesh, low, high in boxes:
-        size = float(np.linalg.norm(high - low))
-        if 0 < size < _DETAIL * whole:
-            scene.note(
-                mesh.path,
-                f"is {size:.3g} m wide in a scene of {whole:.3g} m; 32-bit coordinates show there",
-            )

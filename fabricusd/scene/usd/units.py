@@ -13,6 +13,12 @@ from pxr import Pcp, Sdf, Tf, Usd, UsdGeom
 from fabricusd.scene.scene import Scene
 from fabricusd.scene.usd.instances import as_matrix
 
+_DETAIL = 1e-5
+"""Ratio of a mesh's size to the scene's below which the steps of 32-bit coordinates are visible."""
+
+_SMALLEST = 1e-6
+"""Width of a scene [m] below which its unit must be wrong."""
+
 _ALIKE = 1e-3
 """Relative difference below which two units count as the same."""
 
@@ -153,3 +159,22 @@ def _made_up_for(
         return False
     turned = matrix @ _AXES[_up(layer) or up]
     return float(turned @ _AXES[up]) > 0.5 * float(np.linalg.norm(turned))
+
+
+def note_small_meshes(scene: Scene) -> None:
+    """Note each mesh that is too small for the size of its scene."""
+    found = [(m, m.points[np.isfinite(m.points).all(axis=1)]) for m in scene.meshes]
+    boxes = [(mesh, p.min(axis=0), p.max(axis=0)) for mesh, p in found if len(p)]
+    if not boxes:
+        return
+    low, high = scene.bounds()
+    whole = float(np.linalg.norm(high - low))
+    if 0 < whole < _SMALLEST:
+        scene.note("the scene", f"is {whole:.3g} m wide; is metersPerUnit right?")
+    for mesh, low, high in boxes:
+        size = float(np.linalg.norm(high - low))
+        if 0 < size < _DETAIL * whole:
+            scene.note(
+                mesh.path,
+                f"is {size:.3g} m wide in a scene of {whole:.3g} m; 32-bit coordinates show there",
+            )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
+from fabricusd.scene.copies import with_copies
 from fabricusd.scene.read import read_scene
 from tests.conftest import CHECKOUT
 from tests.reference.stages import new_stage, read
@@ -195,10 +196,11 @@ def test_a_skeleton_that_is_instanced_poses_each_instance(tmp_path):
         copy = stage.DefinePrim(f"/copy{k}/Body")
         copy.GetReferences().AddInternalReference("/Body")
         copy.SetInstanceable(True)
-    scene = read(stage, time_code=2.0)
     expected = world(baked(stage), "/Body/Sleeve", 2.0)
-    for k, mesh in enumerate(sorted(scene.meshes, key=lambda m: m.points[:, 0].mean())):
-        assert mesh.points == pytest.approx(expected + np.array([10.0 * k, 0, 0]), abs=1e-5)
+    for instanced in (False, True):
+        scene = with_copies(read(stage, time_code=2.0, instanced=instanced))
+        for k, mesh in enumerate(sorted(scene.meshes, key=lambda m: m.points[:, 0].mean())):
+            assert mesh.points == pytest.approx(expected + np.array([10.0 * k, 0, 0]), abs=1e-5)
 
 
 def test_a_skeleton_in_a_prototype_of_an_instancer_poses_each_instance(tmp_path):
@@ -210,9 +212,10 @@ def test_a_skeleton_in_a_prototype_of_an_instancer_poses_each_instance(tmp_path)
     instancer.CreatePrototypesRel().SetTargets(["/Protos/Body"])
     instancer.CreatePositionsAttr([(0, 0, 0), (0, 0, 7)])
     instancer.CreateProtoIndicesAttr([0, 0])
-    first, second = read(stage, time_code=2.0).meshes
-    assert first.points == pytest.approx(expected, abs=1e-5)
-    assert second.points == pytest.approx(expected + np.array([0, 0, 7]), abs=1e-5)
+    for instanced in (False, True):
+        first, second = with_copies(read(stage, time_code=2.0, instanced=instanced)).meshes
+        assert first.points == pytest.approx(expected, abs=1e-5)
+        assert second.points == pytest.approx(expected + np.array([0, 0, 7]), abs=1e-5)
 
 
 def test_the_skinned_panel_moves_from_frame_1_to_2_and_between():
