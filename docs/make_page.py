@@ -16,11 +16,11 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
-from fabricusd.preview.lights import Lights
-from fabricusd.preview.serve.session import Session
-from fabricusd.schema import load
-from tests.preview.browser import CHROMIUM, Shown, chromium
-from tests.preview.serve.requests import serving
+from fabricusd.preview.lights import Lights  # noqa: E402
+from fabricusd.preview.serve.session import Session  # noqa: E402
+from fabricusd.schema import load  # noqa: E402
+from tests.preview.browser import CHROMIUM, Shown, chromium  # noqa: E402
+from tests.preview.serve.requests import serving  # noqa: E402
 
 WINDOW = (1100, 860)
 """Width and height [pixels]."""
@@ -33,7 +33,7 @@ PATIENCE = 900.0
 
 
 def shoot(target: Path, frames: int) -> None:
-    """Trace the view that the page begins with, wait for `frames` of its own, and take a picture."""
+    """Trace the first view, wait for `frames` of the page, and take a picture."""
     session = Session(load("denim"), lights=Lights())
     with chromium() as browser, serving(session) as server:
         shown = Shown(browser, server.url, WINDOW)
