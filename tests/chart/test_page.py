@@ -48,7 +48,7 @@ def test_the_pages_in_docs_are_those_of_its_figures(remade):
 
 
 def test_no_page_is_long_and_every_link_leads_somewhere(remade):
-    shutil.copy(DOCS / "materials.md", remade / "materials.md")
+    shutil.copy(DOCS / "blender.md", remade / "blender.md")
     for name, text in pages(remade).items():
         assert len(text.split()) <= MOST_WORDS, name
         for target in re.findall(r"\]\(([^)#]+)\)", text):

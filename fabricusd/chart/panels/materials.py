@@ -123,7 +123,7 @@ PANEL = Panel(
         "`far` over pairs of directions of the hemisphere. `preview` is UsdPreviewSurface. "
         "`principled` is Blender's Principled BSDF. The cost of a surface is the cost of its "
         "formulas in NumPy, and the cost of the law is the cost of its float64 kernels. A "
-        "renderer's own costs differ. [materials.md](materials.md) compares pictures of the "
+        "renderer's own costs differ. [blender.md](blender.md) compares pictures of the "
         "surfaces in Cycles."
     ),
     run=run,

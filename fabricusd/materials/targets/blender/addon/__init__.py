@@ -23,7 +23,7 @@ from __future__ import annotations
 bl_info = {
     "name": "fabricusd looks",
     "author": "fabricusd authors",
-    "version": (1, 3, 0),
+    "version": (1, 3, 1),
     "blender": (4, 2, 0),
     "location": "File > Import > fabricusd look (.usda, .usdz)",
     "category": "Import-Export",

@@ -50,7 +50,7 @@ ALONE = f"(o/{PIXELS} if t==1 else 0)"
 def afar(group: Group) -> Any:
     """Return how much of the cloth from afar shows: the input `Afar`, or more by the distance."""
     least = group.input("Afar", 0.0, low=0.0, high=1.0)
-    width = group.input(WIDTH, 0.0, low=0.0)
+    width = group.input(WIDTH, 0.0, low=0.0, length=True)
     node = group.add("ShaderNodeGroup")
     node.node_tree = _pixel()
     span = group.math("DIVIDE", node.outputs[0], group.math("MAXIMUM", width, 1e-9))

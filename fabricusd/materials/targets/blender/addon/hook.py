@@ -11,6 +11,9 @@ import bpy
 from .build import build, materials_by_path
 from .looks import LookError, read
 
+HAS_USD = hasattr(bpy.types, "USDHook")
+"""Whether this Blender was built with USD. Those that Linux distributions build may not be."""
+
 _waiting: list[dict[str, Any]] = []
 """What an import of ours is told, instead of the hook's own work."""
 
@@ -44,7 +47,7 @@ def rebuild_all(stage: Any, prim_map: Any = None) -> int:
     return sum(map(len, made.groups.values()))
 
 
-class FabricLooks(bpy.types.USDHook):  # type: ignore[misc]
+class FabricLooks(bpy.types.USDHook if HAS_USD else object):  # type: ignore[misc]
     """Rebuilds fabric materials after an import."""
 
     bl_idname = "fabricusd_looks"
@@ -72,10 +75,12 @@ class FabricLooks(bpy.types.USDHook):  # type: ignore[misc]
 
 
 def register() -> None:
-    """Register the hook."""
-    bpy.utils.register_class(FabricLooks)
+    """Register the hook, where there is an import to hook into."""
+    if HAS_USD:
+        bpy.utils.register_class(FabricLooks)
 
 
 def unregister() -> None:
     """Unregister the hook."""
-    bpy.utils.unregister_class(FabricLooks)
+    if HAS_USD:
+        bpy.utils.unregister_class(FabricLooks)

@@ -122,14 +122,19 @@ class Group(Nodes):
 
     def input(
         self, name: str, default: Any, *, low: float | None = None, high: float | None = None,
-        panel: Any = None, color: bool = False,
+        panel: Any = None, color: bool = False, length: bool = False,
     ) -> Any:  # fmt: skip
-        """Add an input of the group; return the socket that has its value inside."""
+        """Add an input of the group; return the socket that has its value inside.
+
+        length : whether a number is one of metres, which Blender shows in a unit that fits it
+        """
         is_number = isinstance(default, int | float)
         kind = "Color" if color else "Float" if is_number else "Vector"
         made = self.tree.interface.new_socket(
             name, in_out="INPUT", socket_type=f"NodeSocket{kind}", parent=panel
         )
+        if length:
+            made.subtype = "DISTANCE"
         made.default_value = default if not color else (*default, 1.0)
         if is_number:
             made.min_value = made.min_value if low is None else low

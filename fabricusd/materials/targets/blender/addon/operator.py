@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from .build import BEST, LOBES, PRINCIPLED, build, materials_by_path
-from .hook import told
+from .hook import HAS_USD, told
 from .looks import Look, LookError, read
 from .world import bring_dome
 
@@ -34,8 +34,16 @@ class ImportFabricusd(bpy.types.Operator, ImportHelper):  # type: ignore[misc]
         ),
         default=BEST,
     )
-    lights: BoolProperty(name="Lights", default=True)  # type: ignore[valid-type]
-    cameras: BoolProperty(name="Cameras", default=True)  # type: ignore[valid-type]
+    lights: BoolProperty(  # type: ignore[valid-type]
+        name="Lights",
+        description="Bring the lights of the look, its dome light as the world",
+        default=True,
+    )
+    cameras: BoolProperty(  # type: ignore[valid-type]
+        name="Cameras",
+        description="Bring the cameras; the first becomes the scene's where it has none",
+        default=True,
+    )
     subdivision: BoolProperty(  # type: ignore[valid-type]
         name="Subdivision",
         description="Subdivide meshes whose subdivision scheme is Catmull-Clark",
@@ -92,6 +100,8 @@ class ImportFabricusd(bpy.types.Operator, ImportHelper):  # type: ignore[misc]
 
 def _stage(path: str) -> tuple[Any, str]:
     """Open a stage; return it, or why there is none."""
+    if not HAS_USD:
+        return None, "cannot be read: this Blender was built without USD; blender.org's has it"
     if not path.lower().endswith(ENDS):
         return None, f"is not the name of a USD file; it must end in {', '.join(ENDS)}"
     try:

@@ -40,6 +40,11 @@ def bring(path, **options):
         return {"error": str(error).strip()}
 
 
+def without_usd():
+    """As in a Blender that was built without USD."""
+    importlib.import_module("fabricusd_looks.operator").HAS_USD = False
+
+
 def said():
     """What imports have reported: all that Blender printed."""
     sys.stdout.flush()

@@ -122,14 +122,17 @@ def test_what_cannot_be_imported_is_said_in_one_line(folder, tmp_path):
     (tmp_path / "less.usda").write_text(lobes.replace("inputs:cycles:lobe0:color", "inputs:other"))
     names = ("none.usda", "broken.usda", "bare.usda", "a.obj", "less.usda")
     paths = [str(tmp_path / name) for name in names]
+    last = str(folder / "lobes.usda")
     told = in_blender(
-        tmp_path, *({"do": "bring", "path": path} for path in paths), {"do": "counts"}
-    )
-    for path, one in zip(paths, told, strict=False):
+        tmp_path, *({"do": "bring", "path": path} for path in paths), {"do": "without_usd"},
+        {"do": "bring", "path": last}, {"do": "counts"},
+    )  # fmt: skip
+    for path, one in zip((*paths, last), (*told[:5], told[6]), strict=True):
         assert one["error"].startswith(f"Error: {path} ")
         assert "\n" not in one["error"]
     assert "write one with 'fabricusd material'" in told[2]["error"]
     assert "lacks /Garment/FabricLooks/Body_0.inputs:cycles:lobe0:color;" in told[4]["error"]
+    assert "this Blender was built without USD" in told[6]["error"]
     assert not any(told[-1].values())
 
 
