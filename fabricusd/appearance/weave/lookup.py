@@ -210,7 +210,7 @@ def seen_run(R, rim, around, place, count):
     place, count : of the run; a count of 0 says that it has no end
     """
     ended = count > R(0)
-    return (place + rim, count + R(2) * rim) if ended else (place, R(around))
+    return place + (rim if ended else R(0)), count + R(2) * rim if ended else R(around)
 
 
 @njit(**INLINE)

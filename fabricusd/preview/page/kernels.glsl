@@ -1432,7 +1432,7 @@ struct T_iiffff { int m0_; int m1_; float m2_; float m3_; float m4_; float m5_; 
 T_ff k_seen_run(float rim, int around, float place, float count) {
   bool ended;
   ended = (count > 0.0);
-  return (ended ? T_ff((place + rim), (count + (2.0 * rim))) : T_ff(place, float(around)));
+  return T_ff((place + mix(0.0, rim, ended)), mix(float(around), (count + (2.0 * rim)), ended));
 }
 
 T_ff k_upper_run(int i, int j, int top) {
