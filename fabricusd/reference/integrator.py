@@ -47,7 +47,12 @@ from fabricusd.reference.stages.arrivals import AUTO_LEVEL, QUEUES, Settings, ar
 from fabricusd.reference.stages.departures import depart, record_first
 from fabricusd.reference.stages.hits import add_emission, prepare
 from fabricusd.reference.stages.shadow_rays import settle, share_that_goes_on, thin_out
-from fabricusd.reference.start.compile_ahead import CLOSE_UPS, EVERY_PICTURE, compile_ahead, of_law
+from fabricusd.reference.start.compile_ahead import (
+    EVERY_PICTURE,
+    close_ups_of,
+    compile_ahead,
+    of_law,
+)
 from fabricusd.reference.surfaces.fabric import FabricShader
 from fabricusd.reference.surfaces.fabric_gap import BY_DIRECTION, TABLE
 from fabricusd.reference.surfaces.normal_map import shade_mapped
@@ -87,10 +92,13 @@ MOST_TRANSLUCENT = 64
 paths before: light that cloth of albedo .9 scattered 64 times is a thousandth of what it was."""
 
 
-def _shaders(scene: Scene, shadow: str) -> list[FabricShader | None]:
+def _shaders(scene: Scene, shadow: str, level: str) -> list[FabricShader | None]:
     """The shaders of all materials, made once the kernels that they need are ready."""
     cloths = [one.binding.fabric for one in scene.materials if isinstance(one, FabricSurface)]
     waiting = [compile_ahead(of) for of in dict.fromkeys(map(of_law, cloths)) if of is not None]
+    if level in ("weave", "thread"):
+        for cloth in cloths:
+            close_ups_of(cloth)
     for one in (compile_ahead(EVERY_PICTURE), *waiting):
         one.wait()
     return [_shader(surface, shadow) for surface in scene.materials] or [None]
@@ -100,7 +108,13 @@ def _shader(surface: Material, shadow: str) -> FabricShader | None:
     """The shader of a cloth; None for a plain surface, which needs no shader of its own."""
     if not isinstance(surface, FabricSurface):
         return None
-    return FabricShader(surface.binding.fabric, shadow, lambda: compile_ahead(CLOSE_UPS).wait())
+    fabric = surface.binding.fabric
+
+    def make_ready() -> None:
+        for kernels in close_ups_of(fabric):
+            kernels.wait()
+
+    return FabricShader(fabric, shadow, make_ready)
 
 
 class Tracer:
@@ -141,7 +155,7 @@ class Tracer:
         # thread's heap is not returned to the system.
         beside = ThreadPoolExecutor(1)
         # Some laws need a table of shadows, a long step: whoever watches this thread watches it.
-        shaders = beside.submit(copy_context().run, _shaders, scene, shadow)
+        shaders = beside.submit(copy_context().run, _shaders, scene, shadow, level)
         beside.shutdown(wait=False)
         self.tables = build_tables(scene if has_instances() else with_copies(scene))
         self.accelerator = Accelerator(

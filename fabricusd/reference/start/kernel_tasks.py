@@ -46,8 +46,8 @@ from fabricusd.reference.stages.departures import depart
 from fabricusd.reference.stages.hits import prepare
 from fabricusd.reference.stages.shadow_rays import settle, thin_out
 from fabricusd.reference.surfaces.fabric import NOWHERE_ELSE, Scattering, finish_point
-from fabricusd.reference.surfaces.fabric_far import shade_far
-from fabricusd.reference.surfaces.fabric_gap import TABLE, pass_published
+from fabricusd.reference.surfaces.fabric_far import gather, shade_far
+from fabricusd.reference.surfaces.fabric_gap import TABLE, pass_gaps, pass_published
 from fabricusd.reference.surfaces.fabric_near import (
     Lit,
     Points,
@@ -208,9 +208,18 @@ def _sample_points() -> None:
     )  # fmt: skip
 
 
-def _point_values() -> None:
+def _near(tables: SurfaceTables) -> None:
     vectors = np.zeros((3, 0), np.float32)
-    point_values(R, _cloth()[1], False, _places(), vectors, vectors, vectors, 0, 0)
+    point_values(R, tables, False, _places(), vectors, vectors, vectors, 0, 0)
+    pass_gaps(R, tables, R(0), vectors, np.zeros(0, np.float32))
+
+
+def _near_masked() -> None:
+    _near(_cloth()[1])
+
+
+def _near_projected() -> None:
+    _near(_cloth("projected")[1])
 
 
 def _lit() -> Lit:
@@ -219,6 +228,7 @@ def _lit() -> Lit:
 
 def _finish_point() -> None:
     scattering = Scattering(*[np.zeros((3, 0), np.float32)] * 5)
+    gather(_sample().wave.hits.rows, 0, 0, scattering.wo, scattering.wi)
     finish_point(
         R, True, 1, _sample().wave.hits.rows, 0, scattering, _points(), np.zeros(0, np.float32),
         _lit(),
@@ -232,8 +242,9 @@ def _shadows() -> None:
     )
 
 
-EVERY_PICTURE, CLOSE_UPS, MASKED, PROJECTED = (
+EVERY_PICTURE, CLOSE_UPS, MASKED, PROJECTED, NEAR_MASKED, NEAR_PROJECTED = (
     "every picture", "close-ups", "cloth that masks", "projected cloth",
+    "close-ups of cloth that masks", "close-ups of projected cloth",
 )  # fmt: skip
 TASKS: dict[str, tuple[Callable[[], None], ...]] = {
     EVERY_PICTURE: (
@@ -243,12 +254,14 @@ TASKS: dict[str, tuple[Callable[[], None], ...]] = {
     PROJECTED: (_shadow_table, _share_lobes_projected, _shade_far_projected),
     CLOSE_UPS: (
         _sample_points, _look_up_uneven, _shadows, _finish_point, _look_up, _shadow_table,
-        _point_values,
     ),
+    NEAR_MASKED: (_near_masked,),
+    NEAR_PROJECTED: (_near_projected,),
 }  # fmt: skip
 """The tasks of each list. Tasks that take longest stand at both ends, next to those with which they
-share parts. Every picture needs the first list, levels `weave` and `thread` also the second, and
-cloth at any level that of its law: those of `of_law`. Cloth of other laws compiles its own kernels.
+share parts. Every picture needs the first list, levels `weave` and `thread` also CLOSE_UPS, and
+cloth that of its law, `of_law`, and at those levels `near_of_law`. Cloth of other laws compiles its
+own kernels. A name stands for one task, whatever lists it is in.
 """
 
 
@@ -259,8 +272,15 @@ def of_law(fabric: Fabric) -> str | None:
     return {"masked": MASKED, "projected": PROJECTED}.get(fabric.surface_law)
 
 
+def near_of_law(fabric: Fabric) -> str | None:
+    """As `of_law`, for levels `weave` and `thread`."""
+    return {MASKED: NEAR_MASKED, PROJECTED: NEAR_PROJECTED}.get(of_law(fabric) or "")
+
+
 LONGEST = {
-    EVERY_PICTURE: prepare, CLOSE_UPS: sample_points, MASKED: shade_far, PROJECTED: pass_published
+    EVERY_PICTURE: prepare, CLOSE_UPS: sample_points, MASKED: shade_far, PROJECTED: pass_published,
+    NEAR_MASKED: point_values, NEAR_PROJECTED: point_values,
 }  # fmt: skip
 """A kernel of each list that takes long to compile, or comes last: if it is cached, so are the
-others."""
+others. (Of the laws' own, if that of another law is: the first picture of a second law then waits
+for its kernels.)"""

@@ -10,11 +10,13 @@ from pathlib import Path
 from numba.core.dispatcher import Dispatcher
 
 from fabricusd.fabric import Binding
-from fabricusd.reference.start.compile_ahead import compile_kernels
+from fabricusd.reference.start.compile_ahead import _Process, compile_kernels
 from fabricusd.reference.start.kernel_tasks import (
     CLOSE_UPS,
     EVERY_PICTURE,
     MASKED,
+    NEAR_MASKED,
+    NEAR_PROJECTED,
     PROJECTED,
     TASKS,
 )
@@ -62,10 +64,13 @@ def test_a_picture_compiles_nothing_that_was_not_compiled_ahead():
     assert signatures() == before
     for task in TASKS[CLOSE_UPS]:
         task()
-    before = signatures()
-    for level in ("weave", "thread"):
-        picture(level)
-    assert signatures() == before
+    for law, near in (("masked", NEAR_MASKED), ("projected", NEAR_PROJECTED)):
+        for task in TASKS[near]:
+            task()
+        before = signatures()
+        for level in ("weave", "thread"):
+            picture(level, law)
+        assert signatures() == before
 
 
 SECOND_START = """
@@ -103,8 +108,32 @@ def test_processes_share_the_kernels_out_by_claims(tmp_path, monkeypatch):
     monkeypatch.setattr(
         "fabricusd.reference.start.compile_ahead.TASKS", {EVERY_PICTURE: (first, second)}
     )
-    monkeypatch.setattr("gc.disable", lambda: None)
     (tmp_path / "first").touch()
     compile_kernels(EVERY_PICTURE, str(tmp_path), backwards=False)
     compile_kernels(EVERY_PICTURE, str(tmp_path), backwards=True)
     assert done == ["second"]
+
+
+LISTS = """
+from fabricusd.reference.start import compile_ahead as ahead
+
+ahead.TASKS = {name: () for name in ("one", "two")}
+ahead._PATIENCE = 60.0
+ahead.compile_lists("claims", False)
+"""
+
+
+def test_a_process_goes_through_lists_until_there_are_none():
+    run = [sys.executable, "-c", LISTS]
+    done = subprocess.run(
+        run, cwd=ROOT, input="two\none\n", capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "two\none\n"
+
+
+def test_nobody_waits_for_a_process_that_has_ended(tmp_path):
+    process = _Process(str(tmp_path), False)
+    process.ask("no such list")
+    process.wait("no such list")
+    process.wait(EVERY_PICTURE)
+    assert not process.lives
