@@ -266,6 +266,7 @@ def test_few_texels_per_thread_are_said_and_prefiltered(square, tmp_path):
     assert np.ptp(read_mip_level(result.folder / name)) == 0.0
 
 
+@pytest.mark.exhaustive
 def test_an_error_asked_for_chooses_the_resolution_and_the_maps(square, linen, tmp_path):
     """Texels, and maps to re-light, are the fewest that are within it: all cheaper ones are not."""
     result = bake(square, tmp_path, Settings(resolution=512, max_error=11.0), fabric=linen)

@@ -53,6 +53,7 @@ def test_the_mean_texel_has_the_reflectance_and_transmittance_of_the_cloth(prese
     assert np.allclose(mean[m.THROUGH : m.THROUGH + 3], share(fabric, below=True), rtol=0.02)
 
 
+@pytest.mark.exhaustive
 def test_the_back_of_the_mean_texel_is_the_front_of_the_fabric_on_the_back():
     fabric = conserving("polyester_satin_charmeuse")
     behind = replace(fabric.back, model="conserving")
@@ -102,6 +103,7 @@ def test_the_coarsest_texel_is_level_far_lit_from_behind(tmp_path):
             assert np.allclose(got, true, rtol=0.08, atol=2e-3), (side, i, o)
 
 
+@pytest.mark.exhaustive
 def test_a_bake_of_conserving_cloth_is_whole_and_can_be_resumed(tmp_path):
     fabric = conserving("silk_shot")
     source = write_quad(tmp_path / "quad.obj")

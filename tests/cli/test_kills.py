@@ -167,7 +167,7 @@ def trials(tmp_path_factory):
 
 
 KILLS = 30
-IN_SUITE = ("new, text", "render", "demo", "compare")
+IN_SUITE = ("new, text", "render", "compare")
 
 
 def cases():

@@ -120,7 +120,8 @@ def test_two_primitives_keep_their_names(tmp_path, capsys):
     "name",
     [
         "obj_interleaved_negative/two_panels.obj", "obj_concave_polygon/ell.obj",
-        "glb_without_material/panel.glb", "obj_objects_sharing_material/three.obj",
+        "glb_without_material/panel.glb",
+        pytest.param("obj_objects_sharing_material/three.obj", marks=pytest.mark.exhaustive),
     ],
 )  # fmt: skip
 def test_what_lies_apart_in_the_file_lies_apart_in_the_bake(tmp_path, name):

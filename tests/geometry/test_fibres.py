@@ -54,6 +54,7 @@ def test_albedo_at_grazing_views_changes_as_that_of_tubes_with_fibres() -> None:
     assert true[2] > 0.08
 
 
+@pytest.mark.exhaustive
 def test_dark_cloth_is_nearer_to_tubes_with_fibres_with_its_fuzz() -> None:
     fabric = hairy(load("denim"), 3.0)
     wi, wo = directions(60, 2, 80), directions(60, 3, 80)

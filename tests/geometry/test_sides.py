@@ -54,6 +54,7 @@ def test_the_medians_of_the_presets_would_not_do() -> None:
     assert np.abs(_shares(fabric, 1, views()) - found.up).max() > 0.06
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", often(JUDGED, LINEN))
 def test_white_cloth_keeps_nothing_and_gains_nothing(name: str) -> None:
     fabric = conserving(load(name), (1.0, 1.0, 1.0))

@@ -19,6 +19,7 @@ from fabricusd.reference.render import render_scene
 from fabricusd.scene.read import read_scene
 from fabricusd.scene.scene import Scene
 from fabricusd.schema import load, write_binding, write_fabric
+from tests.appearance.presets import often
 from tests.materials.scenes import MAPS
 
 THREADS = 12.0
@@ -81,7 +82,7 @@ def write_cloth(path: Path, preset: str) -> Path:
     return path
 
 
-@pytest.fixture(scope="module", params=PRESETS)
+@pytest.fixture(scope="module", params=often(PRESETS, ("linen_plain",)))
 def close_up(request, tmp_path_factory):
     """(name of the preset, picture of the threads, the scene of the look's variant `baked`)."""
     folder = tmp_path_factory.mktemp(request.param)

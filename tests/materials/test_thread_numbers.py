@@ -106,7 +106,7 @@ def inside(ids: NDArray[np.int64]) -> NDArray[np.bool_]:
     return same
 
 
-@pytest.mark.parametrize("name", often(CLOTHS, ("linen_plain", "silk_shot", "one yarn")))
+@pytest.mark.parametrize("name", often(CLOTHS, ("linen_plain", "one yarn")))
 def test_the_thread_of_a_texel_is_the_thread_of_a_pixel(name, square, tmp_path):
     ids = baked(square, CLOTHS[name], tmp_path)
     threads, uv = seen(square, CLOTHS[name], "/Front")

@@ -93,6 +93,7 @@ def test_threads_of_many_shapes_have_kinds_of_their_own():
     assert len(found.first) == 144
 
 
+@pytest.mark.exhaustive
 def test_shadows_by_neighbourhood_are_near_those_by_cell(cloth, by_kind, monkeypatch):
     fabric, compiled = cloth
     few = compile_shadow(fabric, precision=np.float64)

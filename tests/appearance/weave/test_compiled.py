@@ -76,6 +76,7 @@ def vast() -> Fabric:
     return replace(PRESETS["silk_shot"], weave=Weave(cells, "vast"))
 
 
+@pytest.mark.exhaustive
 def test_a_grid_of_sixteen_million_cells_compiles_compactly(vast: Fabric) -> None:
     compile_fabric(PRESETS["silk_shot"])
     tracemalloc.start()

@@ -36,7 +36,13 @@ def this_cluster(cluster, monkeypatch):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("threads", [(24.0, 24.0), (30.7, 22.1)], ids=["table", "no table"])
+@pytest.mark.parametrize(
+    "threads",
+    [
+        pytest.param((24.0, 24.0), id="table"),
+        pytest.param((30.7, 22.1), id="no table", marks=pytest.mark.exhaustive),
+    ],
+)
 def test_textures_are_the_same_to_the_bit(tmp_path, threads):
     scene = write_quad(tmp_path / "square.obj")
     linen = Binding(fabric=load("linen_plain"), threads_per_uv=threads)

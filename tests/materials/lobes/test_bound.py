@@ -43,6 +43,7 @@ def test_what_is_too_bright_becomes_as_bright_as_the_cloth(linen, form):
     assert all(abs(off) < 0.1 for off in held.sky_radiance.values())
 
 
+@pytest.mark.exhaustive
 def test_what_is_too_dark_is_as_bright_as_before(linen):
     bound, _ = linen
     one = known.mixture_of(load("linen_plain"), 4, CYCLES)

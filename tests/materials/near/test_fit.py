@@ -98,6 +98,7 @@ def test_another_share_of_the_parts_keeps_the_means(cloth):
     assert np.einsum("kbc,b->kc", moved.factors, share) == pytest.approx(1.0)
 
 
+@pytest.mark.exhaustive
 def test_each_set_of_shot_silk_has_its_own_color_near_by():
     """Its weft is green and its warp red."""
     fabric = load("silk_shot")

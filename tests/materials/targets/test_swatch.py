@@ -60,6 +60,7 @@ def test_it_has_the_names_that_artists_expect_and_says_what_they_hold(swatch):
     assert told["height_scale_m"] == pytest.approx(1e-3 * np.ptp(height))
 
 
+@pytest.mark.exhaustive
 def test_the_numbers_turn_back_into_the_alphas_and_the_axis_of_the_bake(satin):
     look = Look(base_color_scale=(0.9, 0.8, 0.7), smooth_scale=0.8, rough_scale=0.9)
     found = pictures(satin, look)
@@ -82,6 +83,7 @@ def test_the_numbers_turn_back_into_the_alphas_and_the_axis_of_the_bake(satin):
     assert np.allclose(found["BaseColor"].pixels, srgb_encode(np.clip(color, 0.0, 1.0)))
 
 
+@pytest.mark.exhaustive
 def test_neither_weft_nor_warp_lies_where_the_angle_starts_again(satin):
     angle = pictures(satin, Look())["AnisotropyAngle"].pixels
     assert ((angle < 0.395) | (angle > 0.855)).mean() < 0.01
@@ -99,6 +101,7 @@ def test_the_two_normal_maps_differ_in_green_alone(swatch):
     assert np.array_equal(gl[..., ::2], dx[..., ::2])
 
 
+@pytest.mark.exhaustive
 def test_green_and_red_point_down_the_slope(satin):
     """A normal leans away from where the height rises; v rises up the picture."""
     found = pictures(satin, Look())

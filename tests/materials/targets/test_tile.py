@@ -32,6 +32,7 @@ def test_texels_across_the_border_differ_as_neighbours_inside_do(name):
         assert across_border(tile.maps[key]) <= 1.05, key
 
 
+@pytest.mark.exhaustive
 def test_the_measure_tells_a_tile_of_uneven_yarn_from_one_that_repeats(monkeypatch):
     monkeypatch.setattr("fabricusd.materials.targets.tile.even", lambda cloth: cloth)
     tile = baked_tile(load("denim"), resolution=256, level="thread")
