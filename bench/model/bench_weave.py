@@ -22,10 +22,10 @@ import numpy as np
 from bench_thread import microcylinder_in_numpy
 
 from fabricusd.appearance.frame import WARP
-from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.law import surface_law
 from fabricusd.appearance.shadow.kinds import Shadow
 from fabricusd.appearance.shadow.methods import compile_shadow
-from fabricusd.appearance.surface import evaluate, weave_all
+from fabricusd.appearance.surface import evaluate, points_all, weave_all
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.lookup import find_all, lookup
@@ -92,7 +92,6 @@ def lookup_in_numpy(cloth: CompiledFabric, uv: Array) -> dict[str, Array]:
         "set": np.where(on_top | beside, hit, GAP), "thread": thread, "angle": angle,
         "w": np.where(hit == WARP, -w, w), "cell": np.stack((i, j)), "top": top,
         "along": np.where(on_top, along, strip),
-        "across": np.where(on_top, (over - 0.5) / width, (along - 0.5) / other) + 0.5,
         "slot": np.where(on_top, 0, cloth.runs.shape[2] - 1),
     }  # fmt: skip
 
@@ -126,17 +125,21 @@ def horizon_in_numpy(shadow: Shadow, hit: dict[str, Array], wi: Array) -> Array:
     """The lookup in the horizon table, written in NumPy."""
     table = shadow.table
     part = wi[0] / (np.abs(wi[0]) + np.abs(wi[1]))
-    turn = np.where(wi[1] >= 0, 1 - part, 3 + part) * (table.shape[5] / 4)
-    a = np.minimum(turn.astype(np.int32), table.shape[5] - 1)
-    rows, columns = table.shape[3:5]
-    p, q = (np.clip(hit[k] * n - 0.5, 0, n - 1) for k, n in (("along", rows), ("across", columns)))
-    r, c = np.minimum(p.astype(np.int32), rows - 2), np.minimum(q.astype(np.int32), columns - 2)
+    turn = np.where(wi[1] >= 0, 1 - part, 3 + part) * (table.shape[4] / 4)
+    a = np.minimum(turn.astype(np.int32), table.shape[4] - 1)
+    on_top, half = hit["slot"] == 0, table.shape[3] // 2
+    behind = ~on_top & (hit["along"] >= 0.5)
+    place = np.where(on_top, hit["along"], 2 * hit["along"] - behind)
+    count = np.where(on_top, table.shape[3], half)
+    x = np.clip(place * count - 0.5, 0, count - 1)
+    row = np.minimum(x.astype(np.int32), np.maximum(count - 2, 0))
+    p, r = x - row, row + np.where(behind, half, 0)
     i, j = hit["cell"]
     sine = 0
-    for dr, dc, da in itertools.product((0, 1), repeat=3):
-        weight = np.abs(1 - dr - (p - r)) * np.abs(1 - dc - (q - c)) * np.abs(1 - da - (turn - a))
-        azimuth = (a + da) % table.shape[5]
-        sine = sine + weight * table[i, j, hit["slot"], r + dr, c + dc, azimuth]
+    for dr, da in itertools.product((0, 1), repeat=2):
+        weight = np.abs(1 - dr - p) * np.abs(1 - da - (turn - a))
+        azimuth = (a + da) % table.shape[4]
+        sine = sine + weight * table[i, j, hit["slot"], r + dr, azimuth]
     sine = sine / 255
     flat = np.sqrt(wi[0] ** 2 + wi[1] ** 2)
     t = (wi[2] * np.sqrt(np.maximum(0, 1 - sine * sine)) - flat * sine) / shadow.softness + 0.5
@@ -198,43 +201,53 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
     n, workers = options.places, min(options.workers, numba.config.NUMBA_NUM_THREADS)
-    fabric = satin()
     generator = np.random.default_rng(0)
     uv = generator.uniform(-1e4, 1e4, (n, 2))
     wi, wo = upper(generator, n), upper(generator, n)
-    cloth, shadow = compile_fabric(fabric), compile_shadow(fabric)
-    law = surface_tables(fabric, precision=np.float32)
+    few, m = max(2, options.repeats // 5), n // 4
     real: Any = np.float32
-    places = np.empty(n, np.uint8), np.empty(n, np.int32), *np.empty((4, n), real)
-    out = np.empty_like(wi)
-
-    def find() -> None:
-        find_all(real, cloth, uv, *places)
-
-    def weave_level() -> None:
-        weave_all(real, cloth, shadow, law, uv, wi, wo, out)
-
-    few = max(2, options.repeats // 5)
-    m = n // 4
-    slow_find = m / best(lambda: lookup_in_numpy(cloth, uv[:m]), few)
-    slow_all = m / best(
-        lambda: all_in_numpy(fabric, cloth, shadow, uv[:m], wi[:, :m], wo[:, :m]), few
-    )
-    weave_level()
-    expected = evaluate(fabric, wi[:, :m].T, wo[:, :m].T, uv[:m], "weave", "horizon").T
-    gap = np.abs(out[:, :m] - expected) / (np.abs(expected) + 1e-3)
-    print(f"float32 against float64: 99.9 % within {np.quantile(gap, 0.999):.1e}")
     print(f"{n} places, float32, best of {options.repeats}; M places/s, and times plain NumPy")
-    print(f"{'NumPy, lookup':52}{slow_find / 1e6:8.1f}{1.0:8.1f}")
-    print(f"{'NumPy, lookup + horizon + thread BSDF':52}{slow_all / 1e6:8.1f}{1.0:8.1f}")
-    for count in sorted({1, workers}):
-        numba.set_num_threads(count)
-        for label, function, slow in (
-            ("lookup", find, slow_find),
-            ("lookup + horizon + level weave", weave_level, slow_all),
-        ):
-            rate = n / best(function, options.repeats)
-            print(f"{f'{label}, {count} worker(s)':52}{rate / 1e6:8.1f}{rate / slow:8.1f}")
+    for law in ("masked", "projected"):
+        fabric = replace(satin(), surface_law=law)
+        cloth, shadow = compile_fabric(fabric), compile_shadow(fabric)
+        tables = surface_law(fabric, precision=np.float32, shadow=shadow).published
+        found = lookup(cloth, uv)
+        places, out = found.places, np.empty_like(wi)
+        room = np.empty(n, np.uint8), np.empty(n, np.int32), *np.empty((4, n), real)
+
+        # What follows is called before the loop goes on.
+        def find(cloth=cloth, room=room) -> None:  # type: ignore[no-untyped-def]
+            find_all(real, cloth, uv, *room)
+
+        def weave_level(tables=tables, places=places, out=out) -> None:  # type: ignore[no-untyped-def]
+            points_all(real, tables, False, places, wi, wo, out)
+
+        def shadowed(cloth=cloth, shadow=shadow, tables=tables, out=out) -> None:  # type: ignore[no-untyped-def]
+            weave_all(real, cloth, shadow, tables, uv, wi, wo, out)
+
+        slow_find = m / best(lambda cloth=cloth: lookup_in_numpy(cloth, uv[:m]), few)
+        slow_all = m / best(
+            lambda fabric=fabric, cloth=cloth, shadow=shadow: all_in_numpy(
+                fabric, cloth, shadow, uv[:m], wi[:, :m], wo[:, :m]
+            ),
+            few,
+        )
+        shadowed()
+        expected = evaluate(fabric, wi[:, :m].T, wo[:, :m].T, uv[:m], "weave", "horizon").T
+        gap = np.abs(out[:, :m] - expected) / (np.abs(expected) + 1e-3)
+        print(f"law {law}; float32 against float64: 99.9 % within {np.quantile(gap, 0.999):.1e}")
+        print(f"{'NumPy, lookup':52}{slow_find / 1e6:8.1f}{1.0:8.1f}")
+        print(f"{'NumPy, lookup + horizon + thread BSDF':52}{slow_all / 1e6:8.1f}{1.0:8.1f}")
+        for count in sorted({1, workers}):
+            numba.set_num_threads(count)
+            for label, function, slow in (
+                ("lookup, one place at a time", find, slow_find),
+                ("level weave at places that are known", weave_level, None),
+                ("lookup + horizon + level weave", shadowed, slow_all),
+            ):
+                rate = n / best(function, options.repeats)
+                times = f"{rate / slow:8.1f}" if slow else ""
+                print(f"{f'{label}, {count} worker(s)':52}{rate / 1e6:8.1f}{times}")
     errors(fabric, uv)
     cells = np.random.default_rng(1).random((4096, 4096)) < 0.5
     vast = replace(fabric, weave=Weave(cells, "vast"))

@@ -114,9 +114,16 @@ def _angle_at(corners: NDArray[Any], k: int) -> NDArray[Any]:
 
 
 def _add_at(total: NDArray[Any], index: NDArray[np.int64], vectors: NDArray[Any]) -> None:
-    """`total[index] += vectors` for (n, 3) vectors; also correct for repeated indices."""
+    """`total[index] += vectors` for (n, 3) vectors; also correct for repeated indices.
+
+    Only the rows between the lowest and the highest index are gone over: a mesh is added part by
+    part, and its parts mostly lie together.
+    """
+    if not len(index):
+        return
+    low, high = int(index.min()), int(index.max()) + 1
     for axis in range(3):
-        total[:, axis] += np.bincount(index, vectors[:, axis], len(total))
+        total[low:high, axis] += np.bincount(index - low, vectors[:, axis], high - low)
 
 
 def _face_normals(corners: NDArray[Any]) -> NDArray[Any]:
