@@ -57,7 +57,7 @@ def shoot(target: Path, frames: int) -> None:
 def main() -> int:
     """Take the picture where there is a browser."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--frames", type=int, default=4)
+    parser.add_argument("--frames", type=int, default=32)
     parser.add_argument("-o", "--output", type=Path, default=HERE / "images" / "preview_page.png")
     options = parser.parse_args()
     if not CHROMIUM.exists():

@@ -81,13 +81,15 @@ void main() {
     color = vec4(heat(difference(lab(shown(drawn(p))), lab(shown(reference(p))))), 1.0);
     return;
   }
-  if (inside && gl_FragCoord.x > split) {
+  // Both sides of the line have the same pixels: where the picture's are larger, the page takes them.
+  bool other = gl_FragCoord.x > split;
+  if (inside && (other || square.z > 1.02 * square.w)) {
     vec2 t = q - 0.5, f = fract(t);
     ivec2 low = ivec2(floor(t)), most = ivec2(square.w) - 1;
     vec4 sum = vec4(0.0);
     for (int k = 0; k < 4; ++k) {
-      ivec2 s = ivec2(k & 1, k >> 1);
-      sum += (s.x == 1 ? f.x : 1.0 - f.x) * (s.y == 1 ? f.y : 1.0 - f.y) * reference(clamp(low + s, ivec2(0), most));
+      ivec2 s = ivec2(k & 1, k >> 1), at = clamp(low + s, ivec2(0), most);
+      sum += (s.x == 1 ? f.x : 1.0 - f.x) * (s.y == 1 ? f.y : 1.0 - f.y) * (other ? reference(at) : drawn(at));
     }
     here = shown(sum);
   }

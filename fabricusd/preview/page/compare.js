@@ -1,5 +1,5 @@
 // The path tracer's picture of the same view: a wipe, where the two differ, and what each took.
-const MOST_TRACED = 512;
+const MOST_TRACED = 1024;
 let traced = null;  // { of, level, samples, seconds, found } of the picture that was traced last
 let mode = 'page', tracing = false, begun = 0, took = 0;
 
