@@ -72,6 +72,9 @@ def test_the_picture_is_the_same_to_the_bit(cluster, how):
     one = render_scene(cloth(), workers=1, **size, **how)
     many = render_scene(cloth(), cluster=cluster, **size, **how)
     same(one, many)
+    assert many.complete
+    assert (one.rays, one.not_finite, one.met) == (many.rays, many.not_finite, many.met)
+    assert many.cut == pytest.approx(one.cut)
 
 
 def test_a_picture_of_instances_is_the_same_to_the_bit(cluster):
@@ -81,8 +84,6 @@ def test_a_picture_of_instances_is_the_same_to_the_bit(cluster):
     assert one.metadata["fabricusd:instances"] == 3
     same(one, many)
     assert many.complete
-    assert (one.rays, one.not_finite, one.met) == (many.rays, many.not_finite, many.met)
-    assert many.cut == pytest.approx(one.cut)
 
 
 def test_what_ctrl_c_leaves_is_a_picture(cluster):
