@@ -141,16 +141,18 @@ _started: list[_Process] = []
 _starting = threading.Lock()
 
 
+@cache
+def _claims() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="fabricusd-")
+
+
 def _processes() -> list[_Process]:
     """The processes that compile; those that have ended are replaced."""
     with _starting:
-        if not all(process.lives for process in _started) or not _started:
-            while _started:
-                _started.pop().stop()
-            claims = tempfile.TemporaryDirectory(prefix="fabricusd-")
-            atexit.register(claims.cleanup)
-            count = min(worker_count(None), _MOST_PROCESSES)
-            _started.extend(_Process(claims.name, k % 2 == 1) for k in range(count))
+        for k in range(min(worker_count(None), _MOST_PROCESSES)):
+            if k < len(_started) and _started[k].lives:
+                continue
+            _started[k : k + 1] = [_Process(_claims().name, k % 2 == 1)]
         return list(_started)
 
 
