@@ -7,7 +7,7 @@ BIN := $(VENV)/Scripts
 endif
 STAMP := $(VENV)/.installed
 
-.PHONY: help demo test test-all quick lint schema bench docs site blender clean
+.PHONY: help demo test test-all quick lint schema bench docs wheel site blender clean
 
 help:  ## Say what each target does.
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
@@ -54,6 +54,13 @@ docs: $(STAMP)  ## Remake every figure and table in docs/.
 	for script in docs/make_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 	$(BIN)/fabricusd chart -o docs/images/charts --page docs/charts.md
 	$(BIN)/fabricusd chart -o docs/images/charts --stability docs/stability.md
+
+wheel: $(STAMP)  ## Build the source distribution and a wheel that brings compiled kernels, into dist/.
+	rm -rf fabricusd/kernels/ready build/lib
+	mkdir -p fabricusd/kernels/ready
+	$(BIN)/python -m build --sdist
+	$(BIN)/fabricusd cache --pack fabricusd/kernels/ready
+	$(BIN)/python -m build --wheel
 
 site: $(STAMP)  ## Build the documentation's site into build/site; open build/site/index.html.
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict

@@ -18,6 +18,8 @@ from pathlib import Path
 
 import llvmlite.binding as llvm
 
+from fabricusd.kernels.processor import LEVELS, level_of
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 
@@ -26,14 +28,12 @@ def settings() -> dict[str, tuple[str, str]]:
     """(NUMBA_CPU_NAME, NUMBA_CPU_FEATURES) by what they stand for; without a name, both are left
     alone."""
     name, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
-    found = {
-        "as it is": ("", ""),
-        "kept to 256 bits": (name, f"{features},+prefer-256-bit"),
-        "haswell": ("haswell", ""),
-    }
-    if "+avx512vl" in features.split(","):
-        found["cascadelake"] = ("cascadelake", "")
-        found["cascadelake, wide"] = ("cascadelake", "-prefer-256-bit")
+    found = {"as fabricusd chooses": ("", ""), "this processor": (name, features)}
+    for level in LEVELS:
+        if level_of(features) in LEVELS[: LEVELS.index(level) + 1]:
+            found[level.name] = (level.name, level.features)
+    found["x86-64-v4, kept to 256 bits"] = ("x86-64-v4", "+prefer-256-bit")
+    found["haswell"] = ("haswell", "")
     return found
 
 

@@ -2,11 +2,12 @@
 
     python bench/tracer/bench_first.py [--runs 5] [--size 256] [--spp 4]
 
-Runs `fabricusd render` on the draped cloth of `samples`: first with an empty cache of compiled
-kernels, as after an installation, then with the cache that this run filled, and once more with an
-empty cache at level `weave`, as for a close-up, which needs more kernels. Processor time is that of
-the command and all processes that it started. The first figure is valid only with two idle
-processors; the load is printed beside it.
+Runs `fabricusd render` on the draped cloth of `samples`: first with an empty cache, as after an
+installation from source, then with the cache that this run filled, and once more with an empty
+cache at level `weave`, as for a close-up, which needs more kernels. Where the package brings
+compiled kernels (`make wheel`), it then takes both first pictures with them, as after the
+installation of a wheel. Processor time is that of the command and all processes that it started.
+The first figures are valid only with two idle processors; the load is printed beside them.
 """
 
 from __future__ import annotations
@@ -21,19 +22,28 @@ import tempfile
 import time
 from pathlib import Path
 
+from fabricusd.kernels.ready import FOLDER, VARIABLE, file_name
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def run(
-    scene: Path, size: int, spp: int, kernels: Path, level: str = "auto"
+    scene: Path, size: int, spp: int, cache: Path, level: str = "auto", ready: bool = False
 ) -> tuple[float, float]:
-    """(wall time, processor time) [s] of one picture, with compiled kernels cached in `kernels`."""
+    """(wall time, processor time) [s] of one picture, with the cache in a folder.
+
+    ready : whether kernels that the package brings are used
+    """
     command = [
         sys.executable, "-m", "fabricusd", "render", str(scene), "-o", f"{scene}.exr",
         "--width", str(size), "--height", str(size), "--spp", str(spp), "-q",
         "--level", level,
     ]  # fmt: skip
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(kernels), "PYTHONPATH": str(ROOT)}
+    environment = {
+        **os.environ, "FABRICUSD_CACHE_DIR": str(cache), VARIABLE: "1" if ready else "0",
+        "PYTHONPATH": str(ROOT),
+    }  # fmt: skip
+    environment.pop("NUMBA_CACHE_DIR", None)
     # Let Python cache its modules, as an installer would.
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -63,15 +73,21 @@ def main() -> None:
         )
         scene = folder / "drape.usda"
         print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}")
-        wall, busy = run(scene, options.size, options.spp, folder / "kernels")
+        wall, busy = run(scene, options.size, options.spp, folder / "cache")
         print(f"first picture: {wall:.1f} s, processors {busy:.1f} s")
         times = [
-            run(scene, options.size, options.spp, folder / "kernels") for _ in range(options.runs)
+            run(scene, options.size, options.spp, folder / "cache") for _ in range(options.runs)
         ]
         wall, busy = (statistics.median(column) for column in zip(*times, strict=True))
         print(f"next pictures, median of {options.runs}: {wall:.2f} s, processors {busy:.2f} s")
         wall, busy = run(scene, options.size, options.spp, folder / "others", level="weave")
         print(f"first picture, level weave: {wall:.1f} s, processors {busy:.1f} s")
+        if (FOLDER / file_name()).exists():
+            for level in ("auto", "weave"):
+                name = folder / f"ready {level}"
+                wall, busy = run(scene, options.size, options.spp, name, level, ready=True)
+                said = f"first picture with the package's kernels, level {level}"
+                print(f"{said}: {wall:.1f} s, processors {busy:.1f} s")
         print(f"load {os.getloadavg()[0]:.1f}")
 
 

@@ -1,16 +1,18 @@
-"""Choose the folder in which numba caches compiled kernels: one for each state of the sources.
+"""Choose where numba caches compiled kernels: in a folder for each state of the sources.
 
 numba decides whether cached machine code is still valid by looking at the kernel's own file. But a
 kernel also contains the functions it inlines and constants of other modules, so a change to another
 file would leave it stale. This module therefore names the folder by a digest of every source that
 kernels may read. Stale kernels cannot be loaded, nothing has to be deleted, and two versions of the
-package can run side by side.
+package can run side by side. Inside the folder, names do not depend on where the package lies, so
+that installations of one version share their kernels.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -18,6 +20,7 @@ import numba
 
 from fabricusd.cache import KERNELS, cache_folder
 from fabricusd.kernels.internals import use_internals
+from fabricusd.kernels.ready import unpack_into
 
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = (
@@ -53,5 +56,13 @@ def digest_of(package: Path) -> str:
 
 def use_cache() -> None:
     """Make numba cache kernels in the user's cache, unless NUMBA_CACHE_DIR names a folder."""
-    if "NUMBA_CACHE_DIR" not in os.environ:
-        numba.config.CACHE_DIR = str(cache_folder(KERNELS, fingerprint()))
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return
+    folder = cache_folder(KERNELS, fingerprint())
+    numba.config.CACHE_DIR = str(folder)
+    if use_internals():
+        with suppress(ImportError, AttributeError):
+            from fabricusd.kernels.locator import locate_in
+
+            locate_in(folder, PACKAGE, fingerprint())
+            unpack_into(folder)

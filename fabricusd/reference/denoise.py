@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
 
 from fabricusd.errors import FabricError
 
@@ -78,6 +77,9 @@ def mixed(
     variance : (h, w, 3) of the noisy picture's pixels; where it is not finite, as after a single
         sample, the smooth picture stands
     """
+    # Imported here, because every picture would wait for it.
+    from scipy.ndimage import uniform_filter
+
     square = (WINDOW, WINDOW, 0)
     difference = noisy.astype(np.float64) - smooth
     known = np.isfinite(variance).all(axis=-1, keepdims=True)
