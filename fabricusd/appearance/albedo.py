@@ -199,7 +199,7 @@ def _node(
     o = Angles(theta=theta_o[:, None, None], phi=phi_o[:, None, None], psi=psi_o[:, None, None])
     surface, volume = thread_terms(part.thread, part.model, i, o)
     law = law_of(fabric)
-    seen = law.plain_weight(fabric, psi0, i, o) * law.plain_mask(fabric, i, o)
+    seen = law.plain_weight(fabric, part.is_warp, psi0, i, o) * law.plain_mask(fabric, i, o)
     if law.absolute:
         q = _total(fabric, parts, views, effort)[:, None, None] + np.zeros(up.shape)
     else:
@@ -221,7 +221,7 @@ def _total(fabric: Fabric, parts: list[Share], views: Floats, effort: Effort) ->
     for part in parts:
         for psi0, weight in zip(*_nodes(part, effort), strict=True):
             o = angles(to_thread(views, part.is_warp, psi0))
-            seen += part.area * weight * law.plain_weight(fabric, psi0, o, o)
+            seen += part.area * weight * law.plain_weight(fabric, part.is_warp, psi0, o, o)
     return np.asarray(law.plain_total(fabric, seen, gap(fabric), views))
 
 

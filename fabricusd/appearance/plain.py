@@ -105,7 +105,7 @@ def normalization(fabric: Fabric, wi: Array, wo: Array, per_segment: int = 64) -
     for share, psi0, area in _nodes(fabric, per_segment):
         i = angles(to_thread(wi, share.is_warp, psi0))
         o = angles(to_thread(wo, share.is_warp, psi0))
-        seen = seen + area * law.plain_weight(fabric, psi0, i, o)
+        seen = seen + area * law.plain_weight(fabric, share.is_warp, psi0, i, o)
     return np.asarray(law.plain_total(fabric, seen, gap(fabric), np.asarray(wo)))
 
 
@@ -130,7 +130,7 @@ def segment(
         surface, volume = surface * across_surface, volume * across_volume
     value = surface[..., None] + volume[..., None] * albedo_of(share.thread, share.model)
     law = law_of(fabric)
-    visible = law.plain_weight(fabric, psi0, i, o) * law.plain_mask(fabric, i, o)
+    visible = law.plain_weight(fabric, share.is_warp, psi0, i, o) * law.plain_mask(fabric, i, o)
     return np.asarray(value * (visible * np.cos(i.theta))[..., None])
 
 

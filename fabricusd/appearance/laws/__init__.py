@@ -43,7 +43,7 @@ def _part(name: str) -> Any:
     return by_type(lambda tables: getattr(_BY_TYPE[tables], name))
 
 
-overlap, weight, mask, total = (_part(n) for n in ("overlap", "weight", "mask", "total"))
+shared, weight, mask, total = (_part(n) for n in ("shared", "weight", "mask", "total"))
 openness, node_room = _part("openness"), _part("node_room")
 light_nodes, lit_node, lit_alone = (_part(n) for n in ("light_nodes", "lit_node", "lit_alone"))
 """Each of these takes (R, tables, ...) as in `Law`."""

@@ -49,8 +49,9 @@ class Law:
     make : (fabric, shadow as `lit.light_fields` takes it, precision) -> the fields that are its own
     absolute : whether light that neighbouring threads hold back is lost. Otherwise the mask already
         contains the mean shadow, and `g` only says where in the repeat it falls
-    overlap : (R, tables, cos_half) -> a number that `weight` and `mask` may need of two angles,
-        from cos(d/2), d their difference
+    shared : (R, tables, thread_set, across_o, cos_half) -> a number that `weight` may need, which
+        is the same for all threads of a set; across_o : wo's component across the set; cos_half :
+        cos(d/2), d the difference of the longitudes of wi and wo
     weight : (R, tables, c, s, pair) -> the weight of thread at the tangent angle with cosine c and
         sine s; pair : a `segment.SetPair`
     mask : (R, tables, cos_phi_i, cos_phi_o, cos_half) -> the factor of `f_s`, from azimuths
@@ -59,15 +60,15 @@ class Law:
     light_cell : (R, tables, x, y, z) -> (base, a, b), what `lit` needs of a direction to the light
     lit : (R, tables, node, base, a, b) -> mean of g at a node
     plain_weight, plain_mask, plain_total : the same in plain NumPy, sharing no code with the
-        kernels: (fabric, psi0, angles of wi, angles of wo), (fabric, angles, angles) and
-        (fabric, seen, gap, wo)
+        kernels: (fabric, is_warp, psi0, angles of wi, angles of wo), (fabric, angles, angles)
+        and (fabric, seen, gap, wo)
     """
 
     summary: str
     tables: type
     make: Callable[[Fabric, Any, Any], dict[str, Any]]
     absolute: bool
-    overlap: Kernel
+    shared: Kernel
     weight: Kernel
     mask: Kernel
     total: Kernel
@@ -82,8 +83,8 @@ class Law:
 
 
 @njit(**INLINE)
-def no_overlap(R, tables, cos_half):
-    """`Law.overlap` of a law that needs none."""
+def nothing_shared(R, tables, thread_set, across_o, cos_half):
+    """`Law.shared` of a law that needs none."""
     return R(0)
 
 

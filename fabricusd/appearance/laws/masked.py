@@ -51,11 +51,17 @@ def _overlap(R, tables, cos_half):
 
 
 @njit(**INLINE)
+def _shared(R, tables, thread_set, across_o, cos_half):
+    """`u` of the longitudes, which a tangent angle shifts equally."""
+    return _overlap(R, tables, cos_half)
+
+
+@njit(**INLINE)
 def _weight(R, tables, c, s, pair):
     """`P` at the tangent angle with cosine c and sine s."""
     x = max(s * pair.along_i + c * pair.up_i, R(0)) * pair.scale_i
     y = max(s * pair.along_o + c * pair.up_o, R(0)) * pair.scale_o
-    return masked(R, x, y, pair.overlap)
+    return masked(R, x, y, pair.shared)
 
 
 @njit(**INLINE)
@@ -77,7 +83,7 @@ def plain_masked(x: Array, y: Array, width: float) -> Array:
     return (1 - u) * mx * my + u * np.minimum(mx, my)
 
 
-def _plain_weight(fabric: Fabric, psi0: Any, i: Angles, o: Angles) -> Array:
+def _plain_weight(fabric: Fabric, is_warp: bool, psi0: Any, i: Angles, o: Angles) -> Array:
     return plain_masked(i.psi, o.psi, fabric.masking_width)
 
 
@@ -94,7 +100,7 @@ LAW = Law(
     tables=Masked,
     make=_make,
     absolute=False,
-    overlap=_overlap,
+    shared=_shared,
     weight=_weight,
     mask=_mask,
     total=_total,

@@ -1,9 +1,13 @@
 """Surface law `projected`: each thread by the area of it that the viewer sees.
 
-With `q = 1/max(n_t.N, cos 85 degrees)` the area of thread on a unit of cloth and
-`mu = max(0, n_t.wo)`, the weight is `q mu` and
+With `q = 1/max(n_t.N, cos 85 degrees)` the area of thread on a unit of cloth, the weight is `q mu`
+and
 
-    L_o = (1 - gap(wo)) sum a q mu f_s cos(theta_i) g / sum a q mu.
+    L_o = (1 - gap(wo)) sum a q mu f_s cos(theta_i) g / sum a q mu,
+    mu = (n + sqrt(n^2 + (h/w)^2 b^2))/2,   n = n_t.wo,   b = the component of wo across the set.
+
+`mu` is what is seen of the upper half of a section of height h and width w, over w; of a flat
+thread it is `max(0, n)`.
 
 The gaps close as the view turns from the normal, since threads are as high as their sections:
 `gap(w)` is the product over the sets of `1 - 2 sqrt(half_width^2 + half_height^2 t^2)/pitch`, with
@@ -24,7 +28,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.laws.excess import EXCESS_FIELDS, excess_at, no_excess
-from fabricusd.appearance.laws.law import Law, no_mask, no_overlap, tables_class
+from fabricusd.appearance.laws.law import Law, no_mask, tables_class
 from fabricusd.appearance.laws.lit import (
     LIGHT_FIELDS,
     light_fields,
@@ -42,6 +46,8 @@ from fabricusd.kernels.real import INLINE
 LEAST_COSINE = math.cos(PILE_ANGLE)
 """Least n_t.N that thread counts with: steeper thread would take all of the view."""
 
+LEAST_WIDTH_2 = 1e-12
+"""Least squared width [pitches] that a set counts with: one that is nowhere seen has none."""
 
 Projected = tables_class(__name__, "Projected", "wide_2", "tall_2", *LIGHT_FIELDS, *EXCESS_FIELDS)
 """wide_2, tall_2 : (2,) real - squared widths and heights of the threads of each set, in pitches"""
@@ -70,8 +76,18 @@ def _make(fabric: Fabric, shadow: Any, precision: Any) -> dict[str, Any]:
 
 
 @njit(**INLINE)
+def _shared(R, tables, thread_set, across_o, cos_half):
+    """`(h/w)^2 b^2`."""
+    wide_2 = max(tables.wide_2[thread_set], R(LEAST_WIDTH_2))
+    return tables.tall_2[thread_set] / wide_2 * across_o * across_o
+
+
+@njit(**INLINE)
 def _weight(R, tables, c, s, pair):
-    return max(s * pair.along_o + c * pair.up_o, R(0)) / max(c, R(LEAST_COSINE))
+    n = s * pair.along_o + c * pair.up_o
+    # Not below 0 by rounding.
+    seen = max(n + math.sqrt(n * n + pair.shared), R(0))
+    return R(0.5) * seen / max(c, R(LEAST_COSINE))
 
 
 @njit(**INLINE)
@@ -89,10 +105,12 @@ def _total(R, tables, seen, ox, oy, oz):
     return seen * most / (R(1) - _openness(R, tables, ox, oy, oz))
 
 
-def _plain_weight(fabric: Fabric, psi0: Any, i: Angles, o: Angles) -> Array:
-    # cos theta cos phi is the component along the thread's normal.
-    facing = np.maximum(np.cos(o.theta) * np.cos(o.phi), 0)
-    return np.asarray(facing / np.maximum(np.cos(psi0), LEAST_COSINE))
+def _plain_weight(fabric: Fabric, is_warp: bool, psi0: Any, i: Angles, o: Angles) -> Array:
+    wide, tall = (shape[WARP if is_warp else WEFT] for shape in _shape(fabric))
+    # Components along the thread's normal and across it.
+    n, b = np.cos(o.theta) * np.cos(o.phi), np.cos(o.theta) * np.sin(o.phi)
+    seen = (n + np.hypot(n, tall / wide * b)) / 2
+    return np.asarray(seen / np.maximum(np.cos(psi0), LEAST_COSINE))
 
 
 def _plain_mask(fabric: Fabric, i: Angles, o: Angles) -> Array:
@@ -114,7 +132,7 @@ LAW = Law(
     tables=Projected,
     make=_make,
     absolute=True,
-    overlap=no_overlap,
+    shared=_shared,
     weight=_weight,
     mask=no_mask,
     total=_total,

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.laws.excess import EXCESS_FIELDS, excess_at, no_excess
-from fabricusd.appearance.laws.law import Law, no_mask, no_overlap, same_gap, tables_class
+from fabricusd.appearance.laws.law import Law, no_mask, nothing_shared, same_gap, tables_class
 from fabricusd.appearance.laws.lit import (
     LIGHT_FIELDS,
     light_fields,
@@ -44,7 +44,7 @@ def _total(R, tables, seen, ox, oy, oz):
     return excess_at(R, tables, ox, oy, oz)
 
 
-def _plain_weight(fabric: Fabric, psi0: Any, i: Angles, o: Angles) -> Array:
+def _plain_weight(fabric: Fabric, is_warp: bool, psi0: Any, i: Angles, o: Angles) -> Array:
     return np.ones(np.broadcast_shapes(np.shape(i.psi), np.shape(o.psi)))
 
 
@@ -61,7 +61,7 @@ LAW = Law(
     tables=Unmasked,
     make=_make,
     absolute=True,
-    overlap=no_overlap,
+    shared=nothing_shared,
     weight=_weight,
     mask=no_mask,
     total=_total,

@@ -16,7 +16,7 @@ from fabricusd.kernels.real import BLOCK, INLINE, index
 
 ALONG_I, ACROSS_I, UP_I, SCALE_I = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
 ALONG_O, ACROSS_O, UP_O, SCALE_O = 4 * BLOCK, 5 * BLOCK, 6 * BLOCK, 7 * BLOCK
-OVERLAP = 8 * BLOCK
+SHARED = 8 * BLOCK
 NORMALIZATION, RED, GREEN, BLUE = 9 * BLOCK, 10 * BLOCK, 11 * BLOCK, 12 * BLOCK
 """Offsets of the rows: the fields of `segment.SetPair`, then the sums."""
 
@@ -48,7 +48,7 @@ def prepare(R, tables, thread_set, wi, wo, start, size, block, at=0):
         block[UP_I + x], block[SCALE_I + x] = pair.up_i, pair.scale_i
         block[ALONG_O + x], block[ACROSS_O + x] = pair.along_o, pair.across_o
         block[UP_O + x], block[SCALE_O + x] = pair.up_o, pair.scale_o
-        block[OVERLAP + x] = pair.overlap
+        block[SHARED + x] = pair.shared
 
 
 @njit(**INLINE)
@@ -57,7 +57,7 @@ def pair_at(block, x):
     return SetPair(
         block[ALONG_I + x], block[ACROSS_I + x], block[UP_I + x], block[SCALE_I + x],
         block[ALONG_O + x], block[ACROSS_O + x], block[UP_O + x], block[SCALE_O + x],
-        block[OVERLAP + x],
+        block[SHARED + x],
     )  # fmt: skip
 
 

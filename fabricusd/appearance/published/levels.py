@@ -23,10 +23,10 @@ from fabricusd.appearance.published.blocks import (
     GREEN,
     NORMALIZATION,
     NOTHING,
-    OVERLAP,
     RED,
     SCALE_I,
     SCALE_O,
+    SHARED,
     UP_I,
     UP_O,
     add_weight,
@@ -183,7 +183,7 @@ def _of_model(R, model, tables, across_too, size, block):
             _own(block, ALONG_I + x, warp), _own(block, ACROSS_I + x, warp), block[UP_I + x],
             _own(block, SCALE_I + x, warp), _own(block, ALONG_O + x, warp),
             _own(block, ACROSS_O + x, warp), block[UP_O + x], _own(block, SCALE_O + x, warp),
-            _own(block, OVERLAP + x, warp),
+            _own(block, SHARED + x, warp),
         )  # fmt: skip
         p = laws.weight(R, tables, c, s, pair)
         surface, volume = _segment_at(

@@ -32,7 +32,7 @@ class SetPair(NamedTuple):
     along, across : real - components along the axis of the set and across it
     up : real - N.w
     scale : real - 1/|w without across|, so that cos psi = n_t.w scale at any tangent angle
-    overlap : real - the law's `overlap` of the longitudes psi, which a tangent angle shifts equally
+    shared : real - the law's `shared`
     """
 
     along_i: Any
@@ -43,7 +43,7 @@ class SetPair(NamedTuple):
     across_o: Any
     up_o: Any
     scale_o: Any
-    overlap: Any
+    shared: Any
 
 
 @njit(**INLINE)
@@ -55,7 +55,7 @@ def along_set(R, tables, thread_set, ix, iy, iz, ox, oy, oz):
     scale_i = R(1) / math.sqrt(a_i * a_i + iz * iz)
     scale_o = R(1) / math.sqrt(a_o * a_o + oz * oz)
     cos_half = cos_half_difference(R, a_i * scale_i, iz * scale_i, a_o * scale_o, oz * scale_o)
-    u = laws.overlap(R, tables, cos_half)
+    u = laws.shared(R, tables, thread_set, b_o, cos_half)
     return SetPair(a_i, b_i, iz, scale_i, a_o, b_o, oz, scale_o, u)
 
 

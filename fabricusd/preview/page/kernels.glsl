@@ -225,21 +225,31 @@ float k_overlap(float cos_half) {
   return k_exp32((((-published_precision) * half_) * half_));
 }
 
-float k_no_overlap(float cos_half) {
+float k_shared(int thread_set, float across_o, float cos_half) {
+  return k_overlap(cos_half);
+}
+
+float k_nothing_shared(int thread_set, float across_o, float cos_half) {
   return 0.0;
 }
 
-float k_law_overlap(float a2) {
+float k_shared_1(int thread_set, float across_o, float cos_half) {
+  float wide_2;
+  wide_2 = max(F(published_wide_2_at + thread_set), 1e-12);
+  return (((F(published_tall_2_at + thread_set) / wide_2) * across_o) * across_o);
+}
+
+float k_law_shared(int a2, float a3, float a4) {
 #if LAW == MASKED
-  return k_overlap(a2);
+  return k_shared(a2, a3, a4);
 #elif LAW == UNMASKED
-  return k_no_overlap(a2);
+  return k_nothing_shared(a2, a3, a4);
 #elif LAW == PROJECTED
-  return k_no_overlap(a2);
+  return k_shared_1(a2, a3, a4);
 #endif
 }
 
-struct SetPair { float along_i_; float across_i_; float up_i_; float scale_i_; float along_o_; float across_o_; float up_o_; float scale_o_; float overlap_; };
+struct SetPair { float along_i_; float across_i_; float up_i_; float scale_i_; float along_o_; float across_o_; float up_o_; float scale_o_; float shared_; };
 
 SetPair k_along_set(int thread_set, float ix, float iy, float iz, float ox, float oy, float oz) {
   bool warp;
@@ -259,7 +269,7 @@ SetPair k_along_set(int thread_set, float ix, float iy, float iz, float ox, floa
   scale_i = (1.0 / sqrt(((a_i * a_i) + (iz * iz))));
   scale_o = (1.0 / sqrt(((a_o * a_o) + (oz * oz))));
   cos_half = k_cos_half_difference((a_i * scale_i), (iz * scale_i), (a_o * scale_o), (oz * scale_o));
-  u = k_law_overlap(cos_half);
+  u = k_law_shared(thread_set, b_o, cos_half);
   return SetPair(a_i, b_i, iz, scale_i, a_o, b_o, oz, scale_o, u);
 }
 
@@ -272,7 +282,7 @@ float k_weight(float c, float s, SetPair pair) {
   float y;
   x = (max(((s * pair.along_i_) + (c * pair.up_i_)), 0.0) * pair.scale_i_);
   y = (max(((s * pair.along_o_) + (c * pair.up_o_)), 0.0) * pair.scale_o_);
-  return k_masked(x, y, pair.overlap_);
+  return k_masked(x, y, pair.shared_);
 }
 
 float k_weight_1(float c, float s, SetPair pair) {
@@ -280,7 +290,11 @@ float k_weight_1(float c, float s, SetPair pair) {
 }
 
 float k_weight_2(float c, float s, SetPair pair) {
-  return (max(((s * pair.along_o_) + (c * pair.up_o_)), 0.0) / max(c, 0.08715574274765814));
+  float n;
+  float seen;
+  n = ((s * pair.along_o_) + (c * pair.up_o_));
+  seen = max((n + sqrt(((n * n) + pair.shared_))), 0.0);
+  return ((0.5 * seen) / max(c, 0.08715574274765814));
 }
 
 float k_law_weight(float a2, float a3, SetPair a4) {

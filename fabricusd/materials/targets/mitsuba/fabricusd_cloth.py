@@ -31,6 +31,7 @@ ROWS, COLUMNS = 16, 8
 """Of the table `excess`, see `excess_at`."""
 
 COS2_D_MINIMUM, COS_SUM_MINIMUM, NOTHING = 1e-6, 1e-3, 1e-12
+LEAST_WIDTH_2 = 1e-12
 
 
 class Cloth:
@@ -51,12 +52,12 @@ class Cloth:
         seen, total = mi.Float(0), mi.Color3f(0)
         for warp in (False, True):
             i, o = (self._along(warp, w) for w in (wi, wo))
-            overlap = self._overlap(i[0] * i[3] + o[0] * o[3], i[2] * i[3] + o[2] * o[3])
+            shared = self._shared(warp, i, o)
             for k, node in enumerate(self.nodes):
                 if node["warp"] != warp:
                     continue
                 c, s, thread = node["cosine"], node["sine"], self.threads[node["thread"]]
-                p = node["weight"] * self._weight(c, s, i, o, overlap)
+                p = node["weight"] * self._weight(c, s, i, o, shared)
                 seen += p
                 surface, volume = self._segment(thread, c, s, i, o)
                 p *= self._lit(k, wi)
@@ -92,14 +93,23 @@ class Cloth:
         half = dr.acos(dr.minimum(0.5 * dr.sqrt(sine**2 + cosine**2), 1))
         return dr.exp(-self.said["precision"] * half**2)
 
-    def _weight(self, c: float, s: float, i: Any, o: Any, overlap: Any) -> Any:
+    def _shared(self, warp: bool, i: Any, o: Any) -> Any:
+        """Return what the law's weights need and all threads of a set have in common."""
+        if self.law == "projected":
+            wide, tall = self.said["wide_2"][int(warp)], self.said["tall_2"][int(warp)]
+            return tall / max(wide, LEAST_WIDTH_2) * o[1] ** 2
+        return self._overlap(i[0] * i[3] + o[0] * o[3], i[2] * i[3] + o[2] * o[3])
+
+    def _weight(self, c: float, s: float, i: Any, o: Any, shared: Any) -> Any:
         """Return how much of the view thread at this tangent angle takes."""
         if self.law == "unmasked":
             return mi.Float(1)
-        facing = dr.maximum(s * o[0] + c * o[2], 0)
+        facing = s * o[0] + c * o[2]
         if self.law == "projected":
-            return facing / max(c, LEAST_COSINE)
-        return _masked(dr.maximum(s * i[0] + c * i[2], 0) * i[3], facing * o[3], overlap)
+            seen = dr.maximum(facing + dr.sqrt(facing**2 + shared), 0)
+            return 0.5 * seen / max(c, LEAST_COSINE)
+        lit, seen = dr.maximum(s * i[0] + c * i[2], 0), dr.maximum(facing, 0)
+        return _masked(lit * i[3], seen * o[3], shared)
 
     def _segment(self, thread: dict[str, Any], c: float, s: float, i: Any, o: Any) -> Any:
         """(surface, volume without albedo) of one tangent angle, mask and cosine included."""
