@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 import sys
 import sysconfig
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -55,7 +54,8 @@ def unpack_into(folder: Path) -> None:
     # Imported here, because every command would wait for it.
     import zipfile
 
-    with suppress(OSError, zipfile.BadZipFile), zipfile.ZipFile(file) as source:
+    # A damaged file raises what its damage makes of it.
+    with suppress(Exception), zipfile.ZipFile(file) as source:
         names = [name for name in source.namelist() if name.startswith(f"{folder.name}/")]
         # An index (.nbi) after the code (.nbc) it names: another process may be reading.
         for name in sorted(names, key=lambda name: (name.endswith(".nbi"), name)):
@@ -68,6 +68,9 @@ def unpack_into(folder: Path) -> None:
 def _write(target: Path, content: bytes) -> None:
     """Write a file that is whole from the moment it is there."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=target.parent, delete=False) as file:
-        file.write(content)
-    os.replace(file.name, target)
+    temporary = target.with_name(f"{target.name}.tmp.{os.urandom(8).hex()}")
+    try:
+        temporary.write_bytes(content)
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -73,11 +73,21 @@ def test_they_are_unpacked_once(kernels, tmp_path):
     assert set(there(folder)) == {"b/g-2.py311.nbi"}
 
 
-def test_a_damaged_file_costs_time_only(kernels, tmp_path):
-    kernels.write_bytes(kernels.read_bytes()[:100])
-    (tmp_path / "digest").mkdir()
-    ready.unpack_into(tmp_path / "digest")
-    assert there(tmp_path / "digest") == {}
+@pytest.mark.parametrize("damage", ["cut off", "a wrong byte"])
+def test_a_damaged_file_costs_time_only(kernels, tmp_path, damage):
+    content = bytearray(kernels.read_bytes())
+    if damage == "cut off":
+        del content[100:]
+    else:
+        # In the first file's own bytes, behind the 30 of its header and its name.
+        content[30 + len("digest/a/f-1.py311.1.nbc") + 2] ^= 0xFF
+    kernels.write_bytes(content)
+    folder = tmp_path / "digest"
+    folder.mkdir()
+    ready.unpack_into(folder)
+    assert set(there(folder).items()) <= set(CONTENT.items())
+    assert there(folder) != CONTENT
+    assert not list(folder.rglob("*.tmp.*"))
 
 
 def test_they_can_be_declined(kernels, tmp_path, monkeypatch):
