@@ -26,7 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--clear", action="store_true", help="remove everything in the cache")
     what.add_argument(
-        "--pack", metavar="FOLDER", help="write compiled kernels to a file in this folder"
+        "--pack",
+        metavar="FOLDER",
+        help="write compiled kernels to a file in this folder (no default)",
     )
 
 
