@@ -27,7 +27,7 @@ VERSION = 1
 LEAST_COSINE = 0.08715574274765817
 """cos 85 degrees: least cosine that steep thread counts with under `projected`."""
 
-ROWS, COLUMNS = 16, 8
+ROWS, COLUMNS = 24, 32
 """Of the table `excess`, see `excess_at`."""
 
 COS2_D_MINIMUM, COS_SUM_MINIMUM, NOTHING = 1e-6, 1e-3, 1e-12
