@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
+from scipy.signal import detrend
 
 from fabricusd.errors import FabricError
 from fabricusd.images.files import read_image
@@ -19,8 +20,10 @@ EDGE = 0.93
 """Largest distance from the axis, in radii, that is used: beyond, a pixel covers too much cloth."""
 LOWEST_LIGHT, LOWEST_VIEW = 0.12, 0.25
 """Least cosines to the normal of light and camera."""
-PLACES, LINES = 110, 24
-"""Places across a wrap, and lines along it that are averaged."""
+PLACES = 110
+"""Places across a wrap."""
+FEWEST_LINES, MOST_LINES = 24, 512
+"""Lines along a wrap that are averaged, between these one for each pixel of its height."""
 RELATIVE, FLOOR = 0.01, 0.003
 """What a model of cloth may be off by: a share of the light, and of the brightest light."""
 
@@ -73,7 +76,12 @@ def profile(
     u, v, normal = frame_at(cylinder, phi)
     middle = 0.5 * (cylinder.bottom + cylinder.top)
     base = np.array([cylinder.x, middle, cylinder.z]) + cylinder.radius * normal
-    heights = np.linspace(cylinder.bottom, cylinder.top, LINES) - middle
+    ends = base[[PLACES // 2] * 2] + np.outer(
+        [cylinder.bottom - middle, cylinder.top - middle], [0.0, 1.0, 0.0]
+    )
+    tall = float(np.linalg.norm(np.diff(stand.project(ends, picture.shape[:2]), axis=0)))
+    lines = int(np.clip(round(tall), FEWEST_LINES, MOST_LINES))
+    heights = np.linspace(cylinder.bottom, cylinder.top, lines) - middle
     at = base[None] + heights[:, None, None] * np.array([0.0, 1.0, 0.0])
     to_eye = eye - base
     to_eye /= np.linalg.norm(to_eye, axis=1)[:, None]
@@ -88,10 +96,11 @@ def profile(
     rows = np.stack([
         map_coordinates(picture[..., c], [pixels[:, 1] - 0.5, pixels[:, 0] - 0.5], order=1)
         for c in range(3)
-    ], axis=1).reshape(LINES, PLACES, 3)  # fmt: skip
+    ], axis=1).reshape(lines, PLACES, 3)  # fmt: skip
     mean = rows.mean(axis=0)
-    noise = rows.std(axis=0) / math.sqrt(LINES)
-    # The spread of few lines is itself noisy: smoothed along the wrap it is not.
+    # Light that changes along the cylinder is no noise, and the spread of few lines is itself
+    # noisy: smoothed along the wrap it is not.
+    noise = detrend(rows, axis=0).std(axis=0) / math.sqrt(lines)
     kernel = np.ones(9) / 9
     noise = np.stack(
         [np.convolve(np.pad(noise[:, c], 4, "edge"), kernel, "valid") for c in range(3)], axis=1
