@@ -17,7 +17,7 @@ from fabricusd.measure.cylinder.intervals import (
     products_of,
 )
 from fabricusd.measure.cylinder.model import fabric_of, numbers, worn
-from fabricusd.measure.cylinder.problem import Linear, Problem, search
+from fabricusd.measure.cylinder.problem import Linear, Problem, search, shown
 from fabricusd.measure.cylinder.profile import Profile
 from fabricusd.measure.cylinder.setup import FIT
 from fabricusd.measure.fit.intervals import at_end
@@ -127,7 +127,7 @@ def _wraps(
     white = max(float(p.light.max()) for p in profiles)
     wraps, notes = [], []
     for p in profiles:
-        surface, volume = problem.model.columns(problem.names, x, p.wi, p.wo)
+        surface, volume = shown(problem.model, problem.names, x, [p])
         light = linear.gain * (surface[:, None] + volume @ linear.albedo)
         off = (p.light - light) / p.sigma
         told = delta_e_2000(light / white, p.light / white)

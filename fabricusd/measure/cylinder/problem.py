@@ -26,6 +26,23 @@ class Linear(NamedTuple):
     gain: float
 
 
+def shown(
+    model: Model, names: tuple[Number, ...], x: Floats, profiles: list[Profile]
+) -> tuple[Floats, Floats]:
+    """((n,) surface, (n, k) volume) that the pixels of wraps show for numbers x."""
+    surface, volume = model.columns(
+        names, x, *(np.concatenate([w.reshape(-1, 3) for w in (getattr(p, name) for p in profiles)])
+                    for name in ("wi", "wo")),
+    )  # fmt: skip
+    whole = np.concatenate((surface[:, None], volume), axis=1)
+    ends = np.cumsum([p.wi.size // 3 for p in profiles])[:-1]
+    found = np.concatenate([
+        p.seen(part.reshape(2, len(p.side), -1))
+        for p, part in zip(profiles, np.split(whole, ends), strict=True)
+    ])  # fmt: skip
+    return found[:, 0], found[:, 1:]
+
+
 class Problem:
     """Residuals of wraps; albedos, and the gain of a light that is not known, follow linearly.
 
@@ -36,18 +53,18 @@ class Problem:
         self, template: Fabric, names: tuple[Number, ...], profiles: list[Profile], scale: float
     ) -> None:
         self.template, self.names, self.scale = template, names, scale
-        self.light, self.sigma, self.wi, self.wo = (
-            np.concatenate([getattr(p, name) for p in profiles])
-            for name in ("light", "sigma", "wi", "wo")
+        self.light, self.sigma = (
+            np.concatenate([getattr(p, name) for p in profiles]) for name in ("light", "sigma")
         )
+        self.profiles = profiles
         self.model = Model(template)
         self.low, self.high, self.steps = (
             np.array([getattr(n, name) for n in names]) for name in ("low", "high", "step")
         )
 
     def columns(self, x: Floats) -> tuple[Floats, Floats]:
-        """((n,) surface, (n, k) volume) for numbers x."""
-        return self.model.columns(self.names, x, self.wi, self.wo)
+        """((n,) surface, (n, k) volume) that pixels of the fitted wraps show for numbers x."""
+        return shown(self.model, self.names, x, self.profiles)
 
     def solve(self, x: Floats) -> tuple[Floats, Linear]:
         """((n, 3) light, what is linear) for numbers x."""

@@ -12,6 +12,7 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import SURFACE_LAWS, even
 from fabricusd.measure.cylinder.fit import fit_cylinders
 from fabricusd.measure.cylinder.model import Model, numbers, require_template, worn
+from fabricusd.measure.cylinder.problem import shown
 from fabricusd.measure.cylinder.profile import FLOOR, RELATIVE, profile
 from fabricusd.measure.cylinder.simulate import photographed, three_wraps
 from fabricusd.measure.fit.parameters import volume_level
@@ -42,7 +43,7 @@ def wraps(template, noise=1.0, stray=0.0):
     made = []
     for cylinder in stand.cylinders:
         p = profile(np.ones((180, 720, 3)), stand, cylinder, 0, "ones")
-        surface, volume = Model(template).columns(names, truth(template, names), p.wi, p.wo)
+        surface, volume = shown(Model(template), names, truth(template, names), [p])
         light = np.pi * (surface[:, None] + volume @ albedo)
         sigma = np.sqrt((RELATIVE * light) ** 2 + (FLOOR * light.max()) ** 2)
         if cylinder is stand.cylinders[0]:
@@ -59,9 +60,10 @@ def test_columns_add_up_to_the_law(law):
     template = template_of("silk_shot", law)
     names = numbers(template, coverage=False)
     p = profile(np.ones((180, 720, 3)), three_wraps(), three_wraps().cylinders[2], 0, "ones")
-    surface, volume = Model(template).columns(names, truth(template, names), p.wi, p.wo)
+    wi, wo = p.wi[0], p.wo[0]
+    surface, volume = Model(template).columns(names, truth(template, names), wi, wo)
     albedo = np.array([template.thread_list[k].albedo for k in worn(template)])
-    wanted = evaluate(even(template), p.wi, p.wo, shadow=mean_shadow(template), max_error=1e-3)
+    wanted = evaluate(even(template), wi, wo, shadow=mean_shadow(template), max_error=1e-3)
     found = surface[:, None] + volume @ albedo
     assert np.abs(found - wanted).max() < 0.01 * wanted.max()
 
@@ -124,7 +126,7 @@ def test_light_has_no_jumps_where_curves_are_scaled(name):
     light = []
     for scale in (0.999, 1.0, 1.001):
         x[at] = scale
-        light.append(sum(part.sum() for part in model.columns(names, x, p.wi, p.wo)))
+        light.append(sum(part.sum() for part in shown(model, names, x, [p])))
     low, middle, high = light
     assert abs(high - low) > 1e-5 * middle
     assert abs(low + high - 2 * middle) < 0.02 * abs(high - low)
@@ -152,6 +154,6 @@ def test_the_path_tracer_agrees_with_the_columns_across_every_wrap():
     albedo = np.array([template.thread_list[k].albedo for k in worn(template)])
     for cylinder in stand.cylinders:
         p = profile(picture, stand, cylinder, 0, "render")
-        surface, volume = Model(template).columns(names, truth(template, names), p.wi, p.wo)
+        surface, volume = shown(Model(template), names, truth(template, names), [p])
         light = np.pi * (surface[:, None] + volume @ albedo)
         assert np.sqrt(((p.light - light) ** 2).mean()) < 0.01 * light.mean()
