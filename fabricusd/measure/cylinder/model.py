@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.laws import law_of
-from fabricusd.appearance.published.excess import excess_of
 from fabricusd.appearance.published.tables import has_cell_lobes
 from fabricusd.appearance.scattering.columns import LAW
 from fabricusd.appearance.scattering.model import PUBLISHED
@@ -199,7 +198,6 @@ class Model:
         self.rule = Rule(CELLS, SPACING) if cells else Rule(POINTS, SPACING / WIDTH)
         self.law = law_of(template)
         self.held = False
-        self.excess: Floats | None = None
         self._groups: Kept[tuple[Floats, float]] = Kept(KEPT_SHADOWS)
         self._shapes: Kept[dict[str, Any]] = Kept(KEPT)
 
@@ -207,20 +205,6 @@ class Model:
         """Whether the template's shadow serves all cloths, whose curves differ little: one of its
         own takes a third of a second."""
         self.held = held
-
-    def limit(self, names: Sequence[Number], x: Floats, albedo: Floats) -> bool:
-        """Divide all light by what keeps the cloth of x and (k, 3) albedos from being brighter than
-        white, in which neighbours differ little; whether that is above 1 anywhere. Takes a second.
-        """
-        if not self.law.absolute:
-            return False
-        colors = {k: tuple(albedo[n]) for n, k in enumerate(worn(self.template))}
-        self.excess = None
-        found = excess_of(self._tables(names, x, colors), np.float64)
-        if not (found > 1.0).any():
-            return False
-        self.excess = np.ascontiguousarray(found).reshape(-1)
-        return True
 
     def columns(
         self, names: Sequence[Number], x: Floats, wi: Floats, wo: Floats
@@ -248,7 +232,8 @@ class Model:
     def _tables(
         self, names: Sequence[Number], x: Floats, albedo: dict[int, tuple[float, ...]]
     ) -> Any:
-        """The tables of the law at level `far`."""
+        """The tables of the law at level `far`, but for what keeps cloth from being brighter than
+        white: that takes seconds, and begins at views that are left out."""
         precision = np.float64
         fabric = fabric_of(self.template, names, x, albedo)
         q = self._nodes(names, x)
@@ -259,8 +244,6 @@ class Model:
 
         # What a law makes of the shape does not depend on the threads' lobes.
         made = self._shapes.get((_shape(fabric), self.held), shape)
-        if self.excess is not None:
-            made = made | {"excess": self.excess}
         nodes = np.stack((np.cos(q.psi0), np.sin(q.psi0), q.weight, q.half), axis=1)
         return self.law.tables(
             threads=threads, nodes=np.ascontiguousarray(nodes), node_thread=q.thread,

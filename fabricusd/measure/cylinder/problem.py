@@ -105,10 +105,6 @@ def search(problem: Problem, seed: int) -> Found:
     order = np.argsort(judged, kind="stable")[:REFINED]
     rough = [refine(problem, drawn[k]).x for k in parts("fits", list(order))]
     problem.model.hold(False)
-    found = sorted(
+    return min(
         (refine(problem, x) for x in parts("fits with shadows", rough)), key=lambda f: f.chi2
     )
-    best = found[0]
-    if problem.model.limit(names, best.x, problem.solve(best.x)[1].albedo):
-        found = [refine(problem, best.x)]
-    return found[0]

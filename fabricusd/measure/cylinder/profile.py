@@ -18,8 +18,9 @@ Floats = NDArray[np.float64]
 
 EDGE = 0.93
 """Largest distance from the axis, in radii, that is used: beyond, a pixel covers too much cloth."""
-LOWEST_LIGHT, LOWEST_VIEW = 0.12, 0.25
-"""Least cosines to the normal of light and camera."""
+LOWEST_LIGHT, LOWEST_VIEW = 0.12, 0.43
+"""Least cosines to the normal of light and camera. At lower views, shot silk would be brighter than
+white, which the law keeps it from and the fit does not."""
 PLACES = 110
 """Places across a wrap."""
 FEWEST_LINES, MOST_LINES = 24, 512

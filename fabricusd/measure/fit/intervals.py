@@ -207,9 +207,10 @@ def _side(
             within.append(found.x)
             if value == end:
                 return end, True, within, better
-            step *= float(np.clip(np.sqrt(rise / max(risen, 1e-9)), 1.3, 3.0)) - (
-                0.0 if risen < 0.3 * rise else 0.9
-            )
+            # As far again as a parabola would rise from here, but never in smaller steps: chi^2
+            # may level out.
+            reach = abs(value - at) * (1.1 * np.sqrt(rise / max(risen, 1e-9)) - 1.0)
+            step = float(np.clip(reach, step, 3.0 * step))
         if outside is not None and abs(outside[1] - rise) < 0.1 * rise:
             return outside[0], False, within, better
         if outside is not None and abs(inside_rise - rise) < 0.1 * rise:

@@ -31,11 +31,17 @@ DARK = 0.004
 
 @dataclass(frozen=True, kw_only=True)
 class Texture:
-    """contrast : standard deviation of what repeats, over the mean; channels : (3,) contrast of
-    each channel over that of the luminance, with sign, NaN where it is too dark to tell
+    """contrast : standard deviation of what repeats, over the mean
+    waves : (k, 2) cycles per pixel of `color_waves`; slow : contrast of them alone
+    slow_error : what a lens may have changed of the logarithm of the latter, and a model of cloth
+    channels : (3,) slow contrast of each channel over that of the luminance, with sign, NaN where
+        it is too dark to tell
     """
 
     contrast: float
+    waves: Floats
+    slow: float
+    slow_error: float
     channels: Floats
 
 
@@ -49,6 +55,29 @@ class Unevenness:
     low: float
     high: float
     length: float
+
+
+LENS = 0.35
+"""By how much the variance of a lens's blur differs from that of a pixel's filter [square pixels],
+..."""
+MODEL_ERROR, MOST_ERROR = 0.1, 0.3
+"""... what the logarithm of a fitted cloth's contrast may be off by, and the most of both."""
+COARSEST = 2 / 40
+"""Cycles per pixel below which change is light and folds."""
+
+
+def color_waves(lattice: Lattice) -> Floats:
+    """(k, 2) cycles per pixel of the waves of a weave that are slower than its threads, one of each
+    pair of opposites: what differs from cell to cell. The faster ones also tell the shape of
+    threads and the blur of a lens; where threads are so fine that none is left, all are taken."""
+    waves = waves_of(lattice.weave)[0]
+    within = np.abs(waves).max(axis=1) < 1.0
+    for keep in (within, np.ones(len(waves), bool)):
+        found = waves[keep] @ lattice.frequencies.T
+        clear = (np.hypot(*found.T) >= COARSEST) & (np.abs(found).max(axis=1) < 0.5)
+        if clear.any():
+            return np.asarray(found[clear])
+    return np.asarray(waves[within] @ lattice.frequencies.T)
 
 
 def _middle(photograph: Photograph, share: int) -> Floats:
@@ -69,14 +98,18 @@ def _middle(photograph: Photograph, share: int) -> Floats:
 
 def near_lattice(lattice: Lattice, n: int, reach: float = REACH) -> NDArray[np.bool_]:
     """(n, n) which frequencies of an FFT are the weave's, up to `reach` beside the lattice."""
+    points = lattice_points(waves_of(lattice.weave)[0]) @ lattice.frequencies.T
+    return _near(points, n, reach)
+
+
+def _near(points: Floats, n: int, reach: float) -> NDArray[np.bool_]:
     f = np.fft.fftfreq(n)
     u, v = np.meshgrid(f, f)
-    points = lattice_points(waves_of(lattice.weave)[0]) @ lattice.frequencies.T
     points = points[(np.abs(points).max(axis=1) < 0.5 + reach) & (np.abs(points).max(axis=1) > 0)]
     found = np.zeros((n, n), bool)
     for x, y in points:
         found |= (u - x) ** 2 + (v - y) ** 2 < reach**2
-    found[np.hypot(u, v) < 2 / 40] = False
+    found[np.hypot(u, v) < COARSEST] = False
     return found
 
 
@@ -95,12 +128,21 @@ def texture_of(photograph: Photograph, lattice: Lattice) -> Texture:
     outside = np.where(mask, 0.0, power)
     count = np.bincount(radius.ravel(), (~mask).ravel().astype(float))
     floor = np.bincount(radius.ravel(), outside.ravel()) / np.maximum(count, 1.0)
-    variance = float((power - floor[radius])[mask].sum())
-    whole = float((np.abs(waves[3][mask]) ** 2).sum())
-    channels = (waves[:3, mask] * np.conj(waves[3, mask])).real.sum(axis=1) / max(whole, 1e-30)
+    clear = power - floor[radius]
+    slow = color_waves(lattice)
+    mine = _near(np.concatenate((slow, -slow)), n, REACH)
+    whole = float((np.abs(waves[3][mine]) ** 2).sum())
+    channels = (waves[:3, mine] * np.conj(waves[3, mine])).real.sum(axis=1) / max(whole, 1e-30)
     dark = photograph.linear.mean(axis=(0, 1)) < DARK
+    square = np.hypot(*np.meshgrid(np.fft.fftfreq(n), np.fft.fftfreq(n)))[mine] ** 2
+    steepness = float((power[mine] * square).sum() / max(power[mine].sum(), 1e-30))
+    blurred = 2.0 * np.pi**2 * LENS * steepness
     return Texture(
-        contrast=float(np.sqrt(max(variance, 1e-8))), channels=np.where(dark, np.nan, channels)
+        contrast=float(np.sqrt(max(clear[mask].sum(), 1e-8))),
+        waves=slow,
+        slow=float(np.sqrt(max(clear[mine].sum(), 1e-8))),
+        slow_error=float(min(np.hypot(MODEL_ERROR, blurred), MOST_ERROR)),
+        channels=np.where(dark, np.nan, channels),
     )
 
 
