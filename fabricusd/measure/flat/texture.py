@@ -32,7 +32,7 @@ DARK = 0.004
 @dataclass(frozen=True, kw_only=True)
 class Texture:
     """contrast : standard deviation of what repeats, over the mean
-    waves : (k, 2) cycles per pixel of `color_waves`; slow : contrast of them alone
+    waves : (k, 2) cycles per pixel of `color_waves`; slow : contrast of them alone, or of all
     slow_error : what a lens may have changed of the logarithm of the latter, and a model of cloth
     channels : (3,) slow contrast of each channel over that of the luminance, with sign, NaN where
         it is too dark to tell
@@ -66,18 +66,18 @@ COARSEST = 2 / 40
 """Cycles per pixel below which change is light and folds."""
 
 
+FINE = 3.0
+"""Pixels a thread below which no wave of the weave is slow: a lens blurs all of them alike."""
+
+
 def color_waves(lattice: Lattice) -> Floats:
     """(k, 2) cycles per pixel of the waves of a weave that are slower than its threads, one of each
     pair of opposites: what differs from cell to cell. The faster ones also tell the shape of
-    threads and the blur of a lens; where threads are so fine that none is left, all are taken."""
+    threads and the blur of a lens. None where threads are fine."""
     waves = waves_of(lattice.weave)[0]
-    within = np.abs(waves).max(axis=1) < 1.0
-    for keep in (within, np.ones(len(waves), bool)):
-        found = waves[keep] @ lattice.frequencies.T
-        clear = (np.hypot(*found.T) >= COARSEST) & (np.abs(found).max(axis=1) < 0.5)
-        if clear.any():
-            return np.asarray(found[clear])
-    return np.asarray(waves[within] @ lattice.frequencies.T)
+    found = waves[np.abs(waves).max(axis=1) < 1.0] @ lattice.frequencies.T
+    clear = (np.hypot(*found.T) >= COARSEST) & (np.abs(found).max(axis=1) < 0.5)
+    return np.asarray(found[clear & (min(lattice.pitch) >= FINE)])
 
 
 def _middle(photograph: Photograph, share: int) -> Floats:
@@ -130,7 +130,7 @@ def texture_of(photograph: Photograph, lattice: Lattice) -> Texture:
     floor = np.bincount(radius.ravel(), outside.ravel()) / np.maximum(count, 1.0)
     clear = power - floor[radius]
     slow = color_waves(lattice)
-    mine = _near(np.concatenate((slow, -slow)), n, REACH)
+    mine = _near(np.concatenate((slow, -slow)), n, REACH) if len(slow) else mask
     whole = float((np.abs(waves[3][mine]) ** 2).sum())
     channels = (waves[:3, mine] * np.conj(waves[3, mine])).real.sum(axis=1) / max(whole, 1e-30)
     dark = photograph.linear.mean(axis=(0, 1)) < DARK
@@ -141,7 +141,9 @@ def texture_of(photograph: Photograph, lattice: Lattice) -> Texture:
         contrast=float(np.sqrt(max(clear[mask].sum(), 1e-8))),
         waves=slow,
         slow=float(np.sqrt(max(clear[mine].sum(), 1e-8))),
-        slow_error=float(min(np.hypot(MODEL_ERROR, blurred), MOST_ERROR)),
+        slow_error=float(min(np.hypot(MODEL_ERROR, blurred), MOST_ERROR))
+        if len(slow)
+        else MOST_ERROR,
         channels=np.where(dark, np.nan, channels),
     )
 

@@ -25,7 +25,8 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import FACETS, Fabric, TangentCurve, Thread, ThreadSet, Weave
 from fabricusd.measure.angles import DEGREE
 from fabricusd.measure.flat import law
-from fabricusd.measure.flat.photograph import LUMINANCE, Photograph, squares
+from fabricusd.measure.flat.contrast import SlowContrast
+from fabricusd.measure.flat.photograph import Photograph, squares
 from fabricusd.measure.flat.setup import Setup, turned
 from fabricusd.measure.flat.texture import Texture
 from fabricusd.steps import parts
@@ -260,31 +261,6 @@ class Search:
     def residuals(self, x: Floats) -> Floats:
         """All residuals for parameters x, colours and gain at their best."""
         return np.concatenate((self.solve(self.parts(x)).fun, (x - USUAL) / SPREAD))
-
-
-class SlowContrast:
-    """Contrast of a patch in waves that are given.
-
-    waves : (k, 2) cycles per pixel
-    """
-
-    def __init__(self, waves: Floats) -> None:
-        at = np.arange(law.PATCH) + 0.5
-        x, y = (a.ravel() for a in np.meshgrid(at, at))
-        phase = 2.0 * math.pi * (np.stack((x, y), axis=1) @ waves.T)
-        w = np.sin(math.pi * at / law.PATCH)
-        self.window = np.outer(w, w).ravel()[:, None]
-        columns = np.concatenate((np.ones((len(x), 1)), np.cos(phase), np.sin(phase)), axis=1)
-        self.fit = np.linalg.pinv(columns * self.window)
-
-    def __call__(self, picture: Floats) -> tuple[float, Floats]:
-        """(contrast of the luminance, (3,) of each channel over it, with sign) of a patch."""
-        pixels = picture.reshape(-1, 3)
-        planes = np.concatenate((pixels, pixels @ LUMINANCE[:, None]), axis=1)
-        found = self.fit @ (planes * self.window)
-        relative = found[1:] / np.maximum(found[0], 1e-12)
-        square = max(float((relative[:, 3] ** 2).sum()), 1e-12)
-        return math.sqrt(0.5 * square), relative[:, :3].T @ relative[:, 3] / square
 
 
 def fit_faces(tasks: list[Task]) -> tuple[int, Toned]:

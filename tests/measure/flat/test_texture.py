@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from fabricusd.measure.flat.contrast import SlowContrast
 from fabricusd.measure.flat.law import PATCH
 from fabricusd.measure.flat.photograph import LUMINANCE, Photograph
 from fabricusd.measure.flat.texture import gap_of, texture_of, unevenness_of
-from fabricusd.measure.flat.tones import SlowContrast
 from fabricusd.measure.flat.weave import find_weave
 from tests.measure.flat.pictures import woven
 
@@ -50,6 +50,9 @@ def test_contrast_of_a_patch_is_that_of_the_waves_that_are_asked_for():
     own = 0.4 * LUMINANCE[0] - 0.2 * LUMINANCE[2]
     assert contrast == pytest.approx(own / np.sqrt(2), rel=0.02)
     assert [red, green, blue] == pytest.approx([0.4 / own, 0.0, -0.2 / own], abs=0.1)
+    y = picture @ LUMINANCE
+    whole, _ = SlowContrast(np.zeros((0, 2)))(picture)
+    assert whole == pytest.approx(y.std() / y.mean())
 
 
 def test_channels_tell_that_threads_differ_in_colour():
