@@ -80,17 +80,17 @@ def color_waves(lattice: Lattice) -> Floats:
     return np.asarray(found[clear & (min(lattice.pitch) >= FINE)])
 
 
-def _middle(photograph: Photograph, share: int) -> Floats:
+def _middle(photograph: Photograph, reach: float) -> Floats:
     """(3 + 1, n, n) relative texture of the channels and of the luminance, row 0 at negative y.
 
-    share : of the side of this square, over which light is taken to be even
+    reach : pixels over which light is taken to be even
     """
     n = window_of(photograph)
     rows, columns = photograph.shape
     top, left = (rows - n) // 2, (columns - n) // 2
     planes = [photograph.linear[..., c] for c in range(3)] + [photograph.linear @ LUMINANCE]
     found = [
-        (p / np.maximum(gaussian_filter(p, n / share), 1e-5) - 1.0)[top : top + n, left : left + n]
+        (p / np.maximum(gaussian_filter(p, reach), 1e-5) - 1.0)[top : top + n, left : left + n]
         for p in planes
     ]
     return np.stack(found)[:, ::-1]
@@ -115,7 +115,10 @@ def _near(points: Floats, n: int, reach: float) -> NDArray[np.bool_]:
 
 def texture_of(photograph: Photograph, lattice: Lattice) -> Texture:
     """How strong the weave is."""
-    planes = _middle(photograph, 32)
+    slow = color_waves(lattice)
+    # What light is taken to be must not follow the slowest wave: this leaves it 2 % of it.
+    slowest = min(np.hypot(*slow.T), default=1.0)
+    planes = _middle(photograph, max(window_of(photograph) / 32, 0.45 / slowest))
     n = planes.shape[-1]
     mask = near_lattice(lattice, n)
     w = np.hanning(n + 1)[:n]
@@ -129,7 +132,6 @@ def texture_of(photograph: Photograph, lattice: Lattice) -> Texture:
     count = np.bincount(radius.ravel(), (~mask).ravel().astype(float))
     floor = np.bincount(radius.ravel(), outside.ravel()) / np.maximum(count, 1.0)
     clear = power - floor[radius]
-    slow = color_waves(lattice)
     mine = _near(np.concatenate((slow, -slow)), n, REACH) if len(slow) else mask
     whole = float((np.abs(waves[3][mine]) ** 2).sum())
     channels = (waves[:3, mine] * np.conj(waves[3, mine])).real.sum(axis=1) / max(whole, 1e-30)
@@ -154,7 +156,7 @@ def unevenness_of(photograph: Photograph, lattice: Lattice) -> tuple[Unevenness,
     From one thread to the next on, grain of the camera correlates with no neighbour; blotches
     correlate alike in all directions, which the autocorrelation aslant tells.
     """
-    planes = _middle(photograph, 8)
+    planes = _middle(photograph, window_of(photograph) / 8)
     n = planes.shape[-1]
     waves = np.fft.fft2(planes[3])
     # Uneven threads have their power beside the lattice too: where its points are close, less of
