@@ -12,6 +12,9 @@ With `--light sun`, the default, the light is one distant light, without bounces
 sky`, it is a clear sky with a hazy sun in it, with four bounces, and means of 2 x 2 pixels are
 compared; OSL cannot show it.
 
+With `--picture FILE`, nothing is rendered: the parts that FOLDER has of that light are put below
+one another, a row for each subject and preset and a column for the reference and each kind.
+
 With `--behind`, the fabrics' threads conserve energy and the sun stands behind the cloth, which
 shows what comes through. There are no lobes and no OSL shader of such threads.
 """
@@ -226,13 +229,20 @@ def shrunk(pixels, block):
     return pixels.reshape(h, block, w, block, -1).mean(axis=(1, 3))
 
 
-def stack(folder, names, kinds, light):
-    """Write all rows of pictures below one another, at half size, to `side_by_side.LIGHT.png`."""
+def parts_of(folder, light):
+    """Names of the subjects and presets of which `folder` has every picture."""
+    names = [f"{s.name}.{preset}.{light}" for s in (CYLINDER, GARMENT) for preset in PRESETS]
+    kinds = ("reference", *KINDS[light])
+    return [n for n in names if all((folder / f"{n}.{kind}.exr").exists() for kind in kinds)]
+
+
+def stack(folder, names, light, out):
+    """Write all rows of pictures below one another, at half size, to the PNG `out`."""
     rows = [
         np.concatenate(
             [
                 read_exr_layers(folder / f"{name}.{kind}.exr")[0]["beauty"][..., :3]
-                for kind in ("reference", *kinds)
+                for kind in ("reference", *KINDS[light])
             ],
             axis=1,
         )
@@ -240,22 +250,33 @@ def stack(folder, names, kinds, light):
     ]
     pixels = np.clip(np.concatenate(rows, axis=0), 0.0, 1.0)
     small = shrunk(pixels, 2)
-    out = folder / f"side_by_side.{light}.png"
     write_png(out, np.rint(srgb_encode(small) * 255).astype(np.uint8))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--blender", required=True, help="a Python that can import bpy")
+    parser.add_argument("--blender", help="a Python that can import bpy")
     parser.add_argument("--out", type=Path, default=Path("build/blender"))
     parser.add_argument("--presets", nargs="+", default=list(PRESETS))
     parser.add_argument("--subjects", nargs="+", default=["cylinder", "garment"])
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--light", choices=("sun", "sky"), default="sun")
     parser.add_argument("--behind", action="store_true", help="light through the cloth")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="only put parts together")
     options = parser.parse_args()
     light = "behind" if options.behind else options.light
     folder = options.out.resolve()
+    if options.picture:
+        names = parts_of(folder, light)
+        if not names:
+            parser.error(
+                f"{folder} has no pictures under '{light}'; make some with --blender PYTHON"
+            )
+        stack(folder, names, light, options.picture)
+        print("\n".join(names))
+        return
+    if not options.blender:
+        parser.error("--blender is missing; it must be a Python that can import bpy")
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "addons").mkdir(exist_ok=True)
     write_addon(folder / "addons" / "fabricusd_looks")
@@ -281,7 +302,7 @@ def main() -> None:
                     flush=True,
                 )
             done.append(scene.stem)
-    stack(folder, done, KINDS[light], light)
+    stack(folder, done, light, folder / f"side_by_side.{light}.png")
 
 
 if __name__ == "__main__":

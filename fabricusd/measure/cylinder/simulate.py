@@ -102,9 +102,12 @@ def _tube(cylinder: Cylinder, radius: float, material: int) -> Mesh:
 
 def photographed(
     fabric: Fabric, stand: Stand, *, width: int = 720, height: int = 180, spp: int = 64,
-    bounces: int = 0, seed: int = 0,
+    bounces: int = 0, seed: int = 0, level: str = "far",
 ) -> Floats:  # fmt: skip
-    """(h, w, 3) by the path tracer; bounces : 0 for no light from cylinder to cylinder."""
+    """(h, w, 3) by the path tracer; bounces : 0 for no light from cylinder to cylinder
+
+    level : "far" for cloth whose threads are too small to be seen, and so is their unevenness
+    """
     from fabricusd.reference.render import render_scene
     from fabricusd.stop import Stop
 
@@ -112,7 +115,7 @@ def photographed(
     try:
         made: Any = render_scene(
             scene_of(fabric, stand, width / height), width=width, height=height, spp=spp,
-            max_bounces=bounces, seed=seed, stop=stop,
+            max_bounces=bounces, level=level, seed=seed, stop=stop,
         )  # fmt: skip
     finally:
         stop.release()

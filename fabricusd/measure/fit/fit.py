@@ -89,7 +89,7 @@ def fit_thread(
         scale = per_value if per_value > CALIBRATED[1] else 1.0
         known = curvature(problem, best.x, linear, scale)
         which = to_profile(problem, best.x, known)
-        traced = profiles(problem, best, which, known, scale, workers)
+        traced = profiles(problem, best, which, known, scale, workers, model)
         lower = [p.better for p in traced.values() if p.better is not None]
         if not lower:
             break

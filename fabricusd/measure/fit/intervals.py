@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from fabricusd.measure.fit.problem import Linear, Problem
-from fabricusd.measure.fit.search import Found, beside, refine
+from fabricusd.measure.fit.search import Found, Searched, beside, refine
 
 Floats = NDArray[np.float64]
 
@@ -100,17 +100,25 @@ def curvature(problem: Problem, x: Floats, linear: Linear, scale: float) -> Curv
     for c in range(3):
         k = labels.index(f"albedo {c}")
         free[k] = 0.0 < linear.albedo[c] < problem.most
+    return Curvature(
+        labels=tuple(labels), values=np.array(values),
+        covariance=covariance_of(jacobian, free, scale),
+    )  # fmt: skip
+
+
+def covariance_of(jacobian: Floats, free: NDArray[np.bool_], scale: float) -> Floats:
+    """(p, p) `scale (J^T J)^-1` of the columns of (m, p) `jacobian` that are free, 0 elsewhere."""
     norms = np.linalg.norm(jacobian, axis=0)
-    free &= norms > 0
-    covariance = np.zeros((len(labels), len(labels)))
+    free = free & (norms > 0)
+    covariance = np.zeros((len(norms), len(norms)))
     if free.any():
         scaled = jacobian[:, free] / norms[free]
         inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-13, hermitian=True)
         covariance[np.ix_(free, free)] = inverse / np.outer(norms[free], norms[free]) * scale
-    return Curvature(labels=tuple(labels), values=np.array(values), covariance=covariance)
+    return covariance
 
 
-def at_end(problem: Problem, x: Floats) -> NDArray[np.bool_]:
+def at_end(problem: Searched, x: Floats) -> NDArray[np.bool_]:
     """(k,) which parameters lie at an end of their range."""
     near = 2e-5 * (problem.high - problem.low)
     return np.asarray((x - problem.low < near) | (problem.high - x < near))
@@ -126,26 +134,26 @@ def _slope(problem: Problem, x: Floats, linear: Linear, k: int) -> Floats:
     return np.asarray(rise / (up[k] - down[k]))
 
 
-def to_profile(problem: Problem, x: Floats, known: Curvature) -> list[int]:
+def to_profile(problem: Searched, x: Floats, known: Curvature) -> list[int]:
     """Indices of the nonlinear parameters whose interval curvature does not tell."""
     related = np.abs(known.correlation).max(axis=1)
     half = SIGMAS * known.deviations
     end = at_end(problem, x)
     return [
-        k for k in range(len(problem.names))
+        k for k in range(len(x))
         if end[k] or related[k] > CORRELATED or half[k] == 0
         or half[k] > WIDE * max(abs(x[k]), 0.05 * problem.steps[k])
     ]  # fmt: skip
 
 
 def profiles(
-    problem: Problem, best: Found, which: list[int], known: Curvature, scale: float,
-    workers: int | None,
+    problem: Searched, best: Found, which: list[int], known: Curvature, scale: float,
+    workers: int | None, name: str,
 ) -> dict[int, Profile]:  # fmt: skip
-    """The profiles of parameters, their sides on every core."""
+    """The profiles of parameters, their sides on every core. name : of what is fitted"""
     sides = [(k, side) for k in which for side in (-1.0, 1.0)]
     made = beside(
-        f"intervals of {problem.model}",
+        f"intervals of {name}",
         lambda s: _side(problem, best, s[0], s[1], float(known.deviations[s[0]]), RISE * scale),
         sides,
         workers,
@@ -163,7 +171,7 @@ def profiles(
 
 
 def _side(
-    problem: Problem, best: Found, k: int, side: float, deviation: float, rise: float
+    problem: Searched, best: Found, k: int, side: float, deviation: float, rise: float
 ) -> tuple[float, bool, list[Floats], Found | None]:
     """(end of the interval, whether it is the range's, points within, a better minimum or None)."""
     end = float(problem.high[k] if side > 0 else problem.low[k])
@@ -199,9 +207,10 @@ def _side(
             within.append(found.x)
             if value == end:
                 return end, True, within, better
-            step *= float(np.clip(np.sqrt(rise / max(risen, 1e-9)), 1.3, 3.0)) - (
-                0.0 if risen < 0.3 * rise else 0.9
-            )
+            # As far again as a parabola would rise from here, but never in smaller steps: chi^2
+            # may level out.
+            reach = abs(value - at) * (1.1 * np.sqrt(rise / max(risen, 1e-9)) - 1.0)
+            step = float(np.clip(reach, step, 3.0 * step))
         if outside is not None and abs(outside[1] - rise) < 0.1 * rise:
             return outside[0], False, within, better
         if outside is not None and abs(inside_rise - rise) < 0.1 * rise:

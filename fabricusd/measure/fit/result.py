@@ -42,6 +42,15 @@ class Estimate:
         return f"{self.label} {self.value:.4g}{unit} ({low} to {high}{how})"
 
 
+def as_numbers(estimate: Estimate) -> dict[str, Any]:
+    """An estimate as plain numbers and texts, without its label."""
+    return {
+        "value": estimate.value, "low": estimate.low, "high": estimate.high,
+        "unit": estimate.unit, "how": estimate.how, "open_low": estimate.open_low,
+        "open_high": estimate.open_high,
+    }  # fmt: skip
+
+
 @dataclass(frozen=True, kw_only=True)
 class Fitted:
     """One model fitted to the lobes of a thread.
@@ -74,20 +83,12 @@ class Fitted:
 
     def as_json(self) -> dict[str, Any]:
         """The fit as plain numbers and texts."""
-
-        def plain(estimate: Estimate) -> dict[str, Any]:
-            return {
-                "value": estimate.value, "low": estimate.low, "high": estimate.high,
-                "unit": estimate.unit, "how": estimate.how, "open_low": estimate.open_low,
-                "open_high": estimate.open_high,
-            }  # fmt: skip
-
         return {
             "model": self.model,
             "chi2_per_freedom": self.chi2,
             "freedom": self.freedom,
             "values": self.values,
-            "estimates": {name: plain(each) for name, each in self.estimates.items()},
-            "products": {each.label: plain(each) for each in self.products},
+            "estimates": {name: as_numbers(each) for name, each in self.estimates.items()},
+            "products": {each.label: as_numbers(each) for each in self.products},
             "notes": list(self.notes),
         }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,25 @@ CANDIDATES_WITH_TABLES, REFINED_WITH_TABLES = 48, 3
 ROWS = 600
 """Views by which candidates are judged."""
 STEPS = 60
+
+
+class Searched(Protocol):
+    """Least squares of (k,) numbers: their ranges, their usual changes, and weighted residuals."""
+
+    @property
+    def low(self) -> Floats:
+        """(k,) lower bounds."""
+
+    @property
+    def high(self) -> Floats:
+        """(k,) upper bounds."""
+
+    @property
+    def steps(self) -> Floats:
+        """(k,) usual changes."""
+
+    def residuals(self, x: Floats) -> Floats:
+        """(m,) weighted residuals."""
 
 
 class Found(NamedTuple):
@@ -64,9 +83,9 @@ def search(problem: Problem, *, seed: int, workers: int | None) -> Found:
     return min(found, key=lambda each: each.chi2)
 
 
-def refine(problem: Problem, start: Floats, fixed: int | None = None) -> Found:
+def refine(problem: Searched, start: Floats, fixed: int | None = None) -> Found:
     """The nearest minimum from `start`; fixed : index of a parameter that stays as it is."""
-    free = np.array([k for k in range(len(problem.names)) if k != fixed])
+    free = np.array([k for k in range(len(problem.low)) if k != fixed])
     x = np.clip(np.asarray(start, np.float64), problem.low, problem.high)
 
     def residuals(part: Floats) -> Floats:

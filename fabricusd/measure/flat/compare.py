@@ -86,9 +86,16 @@ def compare(flat: Flat, *, spp: int = 32) -> Comparison:
 
 
 def rendered_through(flat: Flat, *, spp: int = 32) -> Floats:
-    """(h, w, 3) the cloth lit from behind, as bright in the mean as its photograph: the power of
-    that lamp is not known."""
+    """(h, w, 3) the cloth lit from behind, made as bright as its photograph: the power of that lamp
+    is not known."""
     assert flat.behind is not None
     picture = rendered(flat, behind=True, spp=spp)
-    mean = max(float(np.median(picture)), 1e-12)
-    return np.asarray(picture * (float(np.median(flat.behind.linear)) / mean))
+    return as_bright(picture, flat.behind.linear)
+
+
+def as_bright(picture: Floats, photograph: Floats) -> Floats:
+    """(h, w, 3) `picture` times a number that makes most of it as bright as the photograph: by the
+    median over pixels, which specks of the lamp itself do not change, of the mean over channels,
+    some of which may be black."""
+    own, wanted = (float(np.median(p.mean(axis=2))) for p in (picture, photograph))
+    return np.asarray(picture * (wanted / max(own, 1e-12)))

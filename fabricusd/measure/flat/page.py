@@ -54,7 +54,7 @@ def page_text(flat: Flat, made: Comparison, through: Floats | None = None) -> st
         '<div class="row">',
         _picture(photograph, "the photograph"),
         _picture(render, "the fabric, by the path tracer under the stated light"),
-        _picture(difference, f"FLIP, mean {made.flip.mean():.3f}"),
+        _picture(difference, f"FLIP, mean {made.flip.mean():.3f}; black is alike"),
         '</div><div class="row near">',
         _picture(photograph[middle], "its middle"),
         _picture(render[middle], "its middle"),
@@ -65,7 +65,7 @@ def page_text(flat: Flat, made: Comparison, through: Floats | None = None) -> st
         rows_of_pictures += [
             '<div class="row">',
             _picture(shown(flat.behind.linear), "the photograph, lit from behind"),
-            _picture(shown(through), "the fabric, as bright in the mean"),
+            _picture(shown(through), "the fabric, lit from behind, made as bright"),
             "</div>",
         ]
     rows = "".join(

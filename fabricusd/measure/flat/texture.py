@@ -31,11 +31,17 @@ DARK = 0.004
 
 @dataclass(frozen=True, kw_only=True)
 class Texture:
-    """contrast : standard deviation of what repeats, over the mean; channels : (3,) contrast of
-    each channel over that of the luminance, with sign, NaN where it is too dark to tell
+    """contrast : standard deviation of what repeats, over the mean
+    waves : (k, 2) cycles per pixel of `color_waves`; slow : contrast of them alone, or of all
+    slow_error : what a lens may have changed of the logarithm of the latter, and a model of cloth
+    channels : (3,) slow contrast of each channel over that of the luminance, with sign, NaN where
+        it is too dark to tell
     """
 
     contrast: float
+    waves: Floats
+    slow: float
+    slow_error: float
     channels: Floats
 
 
@@ -51,17 +57,40 @@ class Unevenness:
     length: float
 
 
-def _middle(photograph: Photograph, share: int) -> Floats:
+LENS = 0.35
+"""By how much the variance of a lens's blur differs from that of a pixel's filter [square pixels],
+..."""
+MODEL_ERROR, MOST_ERROR = 0.1, 0.3
+"""... what the logarithm of a fitted cloth's contrast may be off by, and the most of both."""
+COARSEST = 2 / 40
+"""Cycles per pixel below which change is light and folds."""
+
+
+FINE = 3.0
+"""Pixels a thread below which no wave of the weave is slow: a lens blurs all of them alike."""
+
+
+def color_waves(lattice: Lattice) -> Floats:
+    """(k, 2) cycles per pixel of the waves of a weave that are slower than its threads, one of each
+    pair of opposites: what differs from cell to cell. The faster ones also tell the shape of
+    threads and the blur of a lens. None where threads are fine."""
+    waves = waves_of(lattice.weave)[0]
+    found = waves[np.abs(waves).max(axis=1) < 1.0] @ lattice.frequencies.T
+    clear = (np.hypot(*found.T) >= COARSEST) & (np.abs(found).max(axis=1) < 0.5)
+    return np.asarray(found[clear & (min(lattice.pitch) >= FINE)])
+
+
+def _middle(photograph: Photograph, reach: float) -> Floats:
     """(3 + 1, n, n) relative texture of the channels and of the luminance, row 0 at negative y.
 
-    share : of the side of this square, over which light is taken to be even
+    reach : pixels over which light is taken to be even
     """
     n = window_of(photograph)
     rows, columns = photograph.shape
     top, left = (rows - n) // 2, (columns - n) // 2
     planes = [photograph.linear[..., c] for c in range(3)] + [photograph.linear @ LUMINANCE]
     found = [
-        (p / np.maximum(gaussian_filter(p, n / share), 1e-5) - 1.0)[top : top + n, left : left + n]
+        (p / np.maximum(gaussian_filter(p, reach), 1e-5) - 1.0)[top : top + n, left : left + n]
         for p in planes
     ]
     return np.stack(found)[:, ::-1]
@@ -69,20 +98,27 @@ def _middle(photograph: Photograph, share: int) -> Floats:
 
 def near_lattice(lattice: Lattice, n: int, reach: float = REACH) -> NDArray[np.bool_]:
     """(n, n) which frequencies of an FFT are the weave's, up to `reach` beside the lattice."""
+    points = lattice_points(waves_of(lattice.weave)[0]) @ lattice.frequencies.T
+    return _near(points, n, reach)
+
+
+def _near(points: Floats, n: int, reach: float) -> NDArray[np.bool_]:
     f = np.fft.fftfreq(n)
     u, v = np.meshgrid(f, f)
-    points = lattice_points(waves_of(lattice.weave)[0]) @ lattice.frequencies.T
     points = points[(np.abs(points).max(axis=1) < 0.5 + reach) & (np.abs(points).max(axis=1) > 0)]
     found = np.zeros((n, n), bool)
     for x, y in points:
         found |= (u - x) ** 2 + (v - y) ** 2 < reach**2
-    found[np.hypot(u, v) < 2 / 40] = False
+    found[np.hypot(u, v) < COARSEST] = False
     return found
 
 
 def texture_of(photograph: Photograph, lattice: Lattice) -> Texture:
     """How strong the weave is."""
-    planes = _middle(photograph, 32)
+    slow = color_waves(lattice)
+    # What light is taken to be must not follow the slowest wave: this leaves it 2 % of it.
+    slowest = min(np.hypot(*slow.T), default=1.0)
+    planes = _middle(photograph, max(window_of(photograph) / 32, 0.45 / slowest))
     n = planes.shape[-1]
     mask = near_lattice(lattice, n)
     w = np.hanning(n + 1)[:n]
@@ -95,12 +131,22 @@ def texture_of(photograph: Photograph, lattice: Lattice) -> Texture:
     outside = np.where(mask, 0.0, power)
     count = np.bincount(radius.ravel(), (~mask).ravel().astype(float))
     floor = np.bincount(radius.ravel(), outside.ravel()) / np.maximum(count, 1.0)
-    variance = float((power - floor[radius])[mask].sum())
-    whole = float((np.abs(waves[3][mask]) ** 2).sum())
-    channels = (waves[:3, mask] * np.conj(waves[3, mask])).real.sum(axis=1) / max(whole, 1e-30)
+    clear = power - floor[radius]
+    mine = _near(np.concatenate((slow, -slow)), n, REACH) if len(slow) else mask
+    whole = float((np.abs(waves[3][mine]) ** 2).sum())
+    channels = (waves[:3, mine] * np.conj(waves[3, mine])).real.sum(axis=1) / max(whole, 1e-30)
     dark = photograph.linear.mean(axis=(0, 1)) < DARK
+    square = np.hypot(*np.meshgrid(np.fft.fftfreq(n), np.fft.fftfreq(n)))[mine] ** 2
+    steepness = float((power[mine] * square).sum() / max(power[mine].sum(), 1e-30))
+    blurred = 2.0 * np.pi**2 * LENS * steepness
     return Texture(
-        contrast=float(np.sqrt(max(variance, 1e-8))), channels=np.where(dark, np.nan, channels)
+        contrast=float(np.sqrt(max(clear[mask].sum(), 1e-8))),
+        waves=slow,
+        slow=float(np.sqrt(max(clear[mine].sum(), 1e-8))),
+        slow_error=float(min(np.hypot(MODEL_ERROR, blurred), MOST_ERROR))
+        if len(slow)
+        else MOST_ERROR,
+        channels=np.where(dark, np.nan, channels),
     )
 
 
@@ -110,7 +156,7 @@ def unevenness_of(photograph: Photograph, lattice: Lattice) -> tuple[Unevenness,
     From one thread to the next on, grain of the camera correlates with no neighbour; blotches
     correlate alike in all directions, which the autocorrelation aslant tells.
     """
-    planes = _middle(photograph, 8)
+    planes = _middle(photograph, window_of(photograph) / 8)
     n = planes.shape[-1]
     waves = np.fft.fft2(planes[3])
     # Uneven threads have their power beside the lattice too: where its points are close, less of

@@ -25,7 +25,8 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import FACETS, Fabric, TangentCurve, Thread, ThreadSet, Weave
 from fabricusd.measure.angles import DEGREE
 from fabricusd.measure.flat import law
-from fabricusd.measure.flat.photograph import LUMINANCE, Photograph, squares
+from fabricusd.measure.flat.contrast import SlowContrast
+from fabricusd.measure.flat.photograph import Photograph, squares
 from fabricusd.measure.flat.setup import Setup, turned
 from fabricusd.measure.flat.texture import Texture
 from fabricusd.steps import parts
@@ -48,7 +49,7 @@ INDEPENDENT = 60
 SLACK = 0.01
 """Added to light, over its mean, before cube roots: a phone's blacks are clipped."""
 LEAST = 0.02
-CONTRAST_ERROR, CHANNEL_ERROR, THROUGH_ERROR, CARD_ERROR = 0.3, 0.15, 0.2, 0.03
+CHANNEL_ERROR, THROUGH_ERROR, CARD_ERROR = 0.15, 0.2, 0.03
 SAME, SHADE = 3.0, 3.0
 """Usual difference between the sets, and usual spread, of logits of albedos."""
 ROUNDS, STEPS = 2, 6
@@ -197,6 +198,7 @@ class Search:
         self.level = front.light.mean()
         self.target = self.root(front.light)
         self.weight = math.sqrt(INDEPENDENT / self.target.size) / sigma
+        self.slow = SlowContrast(task.texture.waves)
 
     def root(self, light: Floats) -> Floats:
         """Cube roots, 1 for the mean."""
@@ -224,11 +226,12 @@ class Search:
         albedo = 1.0 / (1.0 + np.exp(-z[:6].reshape(2, 3)))
         gain = math.exp(float(z[6]))
         light = gain * law.radiance(front, albedo, shade) / task.front.square[:, None]
-        seen, slopes = contrast_of(law.patch_radiance(patch, albedo, shade))
-        clear = np.isfinite(task.texture.channels)
+        texture = task.texture
+        seen, slopes = self.slow(law.patch_radiance(patch, albedo, shade))
+        clear = np.isfinite(texture.channels)
         others = [
-            np.array([math.log(max(seen, 1e-4) / task.texture.contrast) / CONTRAST_ERROR]),
-            (slopes - task.texture.channels)[clear] / CHANNEL_ERROR,
+            np.array([math.log(max(seen, 1e-4) / texture.slow) / texture.slow_error]),
+            (slopes - texture.channels)[clear] / CHANNEL_ERROR,
             (z[:3] - z[3:6]) / SAME,
             z[:6] / SHADE,
         ]
@@ -258,16 +261,6 @@ class Search:
     def residuals(self, x: Floats) -> Floats:
         """All residuals for parameters x, colours and gain at their best."""
         return np.concatenate((self.solve(self.parts(x)).fun, (x - USUAL) / SPREAD))
-
-
-def contrast_of(picture: Floats) -> tuple[float, Floats]:
-    """(contrast of the luminance, (3,) of each channel over it, with sign) of a small picture."""
-    y = picture @ LUMINANCE
-    mean = np.maximum(picture.mean(axis=(0, 1)), 1e-12)
-    texture = y / max(float(y.mean()), 1e-12) - 1.0
-    variance = max(float((texture**2).mean()), 1e-12)
-    slopes = ((picture / mean - 1.0) * texture[..., None]).mean(axis=(0, 1)) / variance
-    return math.sqrt(variance), np.asarray(slopes)
 
 
 def fit_faces(tasks: list[Task]) -> tuple[int, Toned]:
@@ -345,7 +338,7 @@ def _toned(search: Search, x: Floats, made: tuple[Any, ...], misfit: float) -> T
     deviations = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
     albedo = 1.0 / (1.0 + np.exp(-z[:6].reshape(2, 3)))
     shade = made[3]
-    seen, _ = contrast_of(law.patch_radiance(made[1], albedo, shade))
+    seen, _ = search.slow(law.patch_radiance(made[1], albedo, shade))
     fabric = law.white_pair(cloth_of(search.task, x), tuple(albedo[0]), tuple(albedo[1]))
     return Toned(
         fabric=fabric, x=x, deviations=deviations[:6], albedo=albedo,

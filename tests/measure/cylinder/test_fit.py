@@ -12,8 +12,10 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import SURFACE_LAWS, even
 from fabricusd.measure.cylinder.fit import fit_cylinders
 from fabricusd.measure.cylinder.model import Model, numbers, require_template, worn
+from fabricusd.measure.cylinder.problem import shown
 from fabricusd.measure.cylinder.profile import FLOOR, RELATIVE, profile
 from fabricusd.measure.cylinder.simulate import photographed, three_wraps
+from fabricusd.measure.fit.parameters import volume_level
 from fabricusd.schema import load
 
 MASKED = SURFACE_LAWS[0]
@@ -41,7 +43,7 @@ def wraps(template, noise=1.0, stray=0.0):
     made = []
     for cylinder in stand.cylinders:
         p = profile(np.ones((180, 720, 3)), stand, cylinder, 0, "ones")
-        surface, volume = Model(template, p.wi, p.wo).columns(names, truth(template, names))
+        surface, volume = shown(Model(template), names, truth(template, names), [p])
         light = np.pi * (surface[:, None] + volume @ albedo)
         sigma = np.sqrt((RELATIVE * light) ** 2 + (FLOOR * light.max()) ** 2)
         if cylinder is stand.cylinders[0]:
@@ -58,9 +60,10 @@ def test_columns_add_up_to_the_law(law):
     template = template_of("silk_shot", law)
     names = numbers(template, coverage=False)
     p = profile(np.ones((180, 720, 3)), three_wraps(), three_wraps().cylinders[2], 0, "ones")
-    surface, volume = Model(template, p.wi, p.wo).columns(names, truth(template, names))
+    wi, wo = p.wi[0], p.wo[0]
+    surface, volume = Model(template).columns(names, truth(template, names), wi, wo)
     albedo = np.array([template.thread_list[k].albedo for k in worn(template)])
-    wanted = evaluate(even(template), p.wi, p.wo, shadow=mean_shadow(template), max_error=1e-3)
+    wanted = evaluate(even(template), wi, wo, shadow=mean_shadow(template), max_error=1e-3)
     found = surface[:, None] + volume @ albedo
     assert np.abs(found - wanted).max() < 0.01 * wanted.max()
 
@@ -75,7 +78,7 @@ def test_linen_comes_back_and_its_bias_is_predicted():
         e.low <= t / n.scale <= e.high
         for e, n, t in zip(found, names, truth(template, names), strict=True)
     ]
-    assert np.mean(held) >= 0.6
+    assert np.mean(held) >= 0.8
     assert made.estimates["Linen curve scale"].value == pytest.approx(1.0, abs=0.02)
     assert 0.8 < made.chi2 < 1.2
     bias = next(w for w in made.wraps if w.predicted)
@@ -93,6 +96,40 @@ def test_light_of_a_neighbour_is_named_with_its_side():
     assert "'Upright'" in said[0]
     assert "right" in said[0]
     assert "Round and Bias" in said[0]
+
+
+@pytest.mark.slow
+def test_what_flannel_does_not_tell_apart_is_told_as_a_product():
+    # Its light is wide: threads from kd .5 and gv 46 degrees to kd .9 and gv 12 are nearly alike.
+    template = template_of("wool_flannel", SURFACE_LAWS[1])
+    made = fit_cylinders(template, wraps(template, noise=2.0), irradiance=np.pi)
+    thread = template.thread_list[0]
+    assert made.estimates["Wool kd"].low <= thread.isotropic <= made.estimates["Wool kd"].high
+    assert any("gv, kd and A cannot be told apart" in note for note in made.notes)
+    level = volume_level(template.model_of(thread), thread.gamma_volume, thread.isotropic)
+    assert len(made.products) >= 3
+    for product, channel, albedo in zip(
+        made.products, ("red", "green", "blue"), thread.albedo, strict=False
+    ):
+        assert product.low <= albedo * level <= product.high
+        assert product.spread < 0.7 * made.estimates[f"Wool A {channel}"].spread
+
+
+@pytest.mark.parametrize("name", ["linen_plain", "wool_flannel"])
+def test_light_has_no_jumps_where_curves_are_scaled(name):
+    # At 1 the pieces of the presets' curves are whole numbers of nodes long: one more beyond.
+    template = template_of(name, load(name).surface_law)
+    names = numbers(template, coverage=False)
+    p = profile(np.ones((180, 720, 3)), three_wraps(), three_wraps().cylinders[0], 0, "ones")
+    model, x = Model(template), truth(template, names)
+    at = next(k for k, n in enumerate(names) if n.field == "curve")
+    light = []
+    for scale in (0.999, 1.0, 1.001):
+        x[at] = scale
+        light.append(sum(part.sum() for part in shown(model, names, x, [p])))
+    low, middle, high = light
+    assert abs(high - low) > 1e-5 * middle
+    assert abs(low + high - 2 * middle) < 0.02 * abs(high - low)
 
 
 def test_conserving_threads_are_refused():
@@ -117,6 +154,6 @@ def test_the_path_tracer_agrees_with_the_columns_across_every_wrap():
     albedo = np.array([template.thread_list[k].albedo for k in worn(template)])
     for cylinder in stand.cylinders:
         p = profile(picture, stand, cylinder, 0, "render")
-        surface, volume = Model(template, p.wi, p.wo).columns(names, truth(template, names))
+        surface, volume = shown(Model(template), names, truth(template, names), [p])
         light = np.pi * (surface[:, None] + volume @ albedo)
         assert np.sqrt(((p.light - light) ** 2).mean()) < 0.01 * light.mean()

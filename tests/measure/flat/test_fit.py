@@ -14,7 +14,7 @@ from fabricusd.appearance.surface import evaluate
 from fabricusd.errors import FabricError
 from fabricusd.fabric import FACETS, Fabric, TangentCurve, Thread, ThreadSet
 from fabricusd.measure.flat import law
-from fabricusd.measure.flat.compare import compare
+from fabricusd.measure.flat.compare import as_bright, compare
 from fabricusd.measure.flat.fit import fit_flat
 from fabricusd.measure.flat.page import page_text
 from fabricusd.measure.flat.photograph import Photograph, read_photograph
@@ -139,6 +139,13 @@ def test_the_colour_that_comes_through_leaves_out_clipped_channels():
     assert red == pytest.approx(np.log(2.0))
     assert green == pytest.approx(0.0)
     assert np.isnan(blue)
+
+
+def test_red_cloth_lit_from_behind_is_made_as_bright_though_two_channels_are_black():
+    photograph = np.tile([0.301, 0.001, 0.001], (8, 8, 1))
+    photograph[0, 0] = 1.0
+    picture = np.tile([0.52, 0.02, 0.02], (8, 8, 1))
+    assert as_bright(picture, photograph).mean(axis=2) == pytest.approx(0.101)
 
 
 def test_pitches_belong_to_a_weave():

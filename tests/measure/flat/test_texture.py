@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
-from fabricusd.measure.flat.photograph import Photograph
+from fabricusd.measure.flat.contrast import SlowContrast
+from fabricusd.measure.flat.law import PATCH
+from fabricusd.measure.flat.photograph import LUMINANCE, Photograph
 from fabricusd.measure.flat.texture import gap_of, texture_of, unevenness_of
 from fabricusd.measure.flat.weave import find_weave
 from tests.measure.flat.pictures import woven
@@ -25,6 +30,29 @@ def test_contrast_is_that_of_the_weave_without_the_grain():
     y = bare.luminance
     assert clean == pytest.approx(y.std() / y.mean(), rel=0.1)
     assert noisy == pytest.approx(clean, rel=0.05)
+
+
+def test_a_lens_hardly_changes_the_waves_that_tell_colours():
+    bare, lattice = seen(grain=0.0)
+    soft = replace(bare, linear=gaussian_filter(bare.linear, (0.6, 0.6, 0)))
+    sharp, blurred = (texture_of(p, lattice) for p in (bare, soft))
+    lost = np.log(sharp.slow / blurred.slow)
+    assert 0.01 < lost < 0.8 * np.log(sharp.contrast / blurred.contrast)
+    assert lost < sharp.slow_error < 0.2
+
+
+def test_contrast_of_a_patch_is_that_of_the_waves_that_are_asked_for():
+    x = np.arange(PATCH) + 0.5
+    slow, fast = (np.cos(2 * np.pi * f * x) for f in (0.07, 0.21))
+    row = np.stack((1 + 0.4 * slow + 0.3 * fast, 1 + 0.3 * fast, 1 - 0.2 * slow), axis=-1)
+    picture = np.repeat(row[None], PATCH, axis=0)
+    contrast, (red, green, blue) = SlowContrast(np.array([[0.07, 0.0]]))(picture)
+    own = 0.4 * LUMINANCE[0] - 0.2 * LUMINANCE[2]
+    assert contrast == pytest.approx(own / np.sqrt(2), rel=0.02)
+    assert [red, green, blue] == pytest.approx([0.4 / own, 0.0, -0.2 / own], abs=0.1)
+    y = picture @ LUMINANCE
+    whole, _ = SlowContrast(np.zeros((0, 2)))(picture)
+    assert whole == pytest.approx(y.std() / y.mean())
 
 
 def test_channels_tell_that_threads_differ_in_colour():
