@@ -13,7 +13,7 @@ import pytest
 from fabricusd.kernels.processor import LEVELS, level_of
 
 V4, V3 = LEVELS
-FEATURES = {level.name: ",".join(f"+{name}" for name in level.needs) for level in LEVELS}
+FEATURES = {level.name: ",".join(f"+{name}" for name in sorted(level.needs)) for level in LEVELS}
 
 
 @pytest.mark.parametrize(
