@@ -3,8 +3,7 @@
     python bench/model/bench_vectors.py [--presets linen_plain silk_shot]
 
 Runs `bench_surface` in processes of their own, with an empty cache of kernels each: as this machine
-compiles, kept to 256 bits, kept to AVX2, and for `cascadelake`, as LLVM chooses and wide. The last
-two need AVX-512; on another processor than that they show what the compiler does, not its clock.
+compiles, for the processor by name, for each level that it has, and kept to 256 bits and to AVX2.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from pathlib import Path
 
 import llvmlite.binding as llvm
 
-from fabricusd.kernels.processor import LEVELS, level_of
+from fabricusd.samples.kernels import levels
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -29,11 +28,12 @@ def settings() -> dict[str, tuple[str, str]]:
     alone."""
     name, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
     found = {"as fabricusd chooses": ("", ""), "this processor": (name, features)}
-    for level in LEVELS:
-        if level_of(features) in LEVELS[: LEVELS.index(level) + 1]:
-            found[level.name] = (level.name, level.features)
-    found["x86-64-v4, kept to 256 bits"] = ("x86-64-v4", "+prefer-256-bit")
-    found["haswell"] = ("haswell", "")
+    for level in levels():
+        found[level.name] = (level.name, level.features)
+        if "-prefer-256-bit" in level.features:
+            found[f"{level.name}, kept to 256 bits"] = (level.name, "+prefer-256-bit")
+    if levels():
+        found["haswell"] = ("haswell", "")
     return found
 
 

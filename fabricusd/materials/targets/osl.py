@@ -109,6 +109,8 @@ def _unmasked(law: Any, nodes: int) -> list[str]:
         f"    float softness = {float(getattr(law, 'softness', 1.0)):.9g},\n",
         *(_array("float", name, values) for name, values in shape.items()),
         _array("float", "horizons", horizons.ravel(), digits=4),
+        f"    int excess_rows = {ROWS},\n",
+        f"    int excess_columns = {AROUND},\n",
         _array("float", "excess", excess if excess.size > 1 else np.ones(ROWS * (AROUND + 1))),
     ]
 

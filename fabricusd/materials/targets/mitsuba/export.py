@@ -10,6 +10,7 @@ import numpy as np
 
 from fabricusd import __version__
 from fabricusd.appearance.laws import law_of
+from fabricusd.appearance.laws.excess import COLUMNS, ROWS
 from fabricusd.appearance.published.columns import NODE_COS, NODE_SIN, NODE_WEIGHT
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.scattering.columns import (
@@ -32,7 +33,7 @@ PLUGIN = Path(__file__).resolve().parent / "fabricusd_cloth.py"
 LAWS = ("masked", "unmasked", "projected")
 """Surface laws that the plugin has."""
 
-VERSION = 1
+VERSION = 2
 """Of the JSON file."""
 
 
@@ -98,6 +99,8 @@ def fabric_content(fabric: Fabric) -> dict[str, Any]:
     for name in ("horizons", "excess", "wide_2", "tall_2"):
         if hasattr(tables, name):
             own[name] = _numbers(getattr(tables, name))
+    if "excess" in own:
+        own["excess_shape"] = [ROWS, COLUMNS]
     return {
         "fabricusd_cloth": VERSION,
         "made_by": f"fabricusd {__version__}",

@@ -21,14 +21,11 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-VERSION = 1
+VERSION = 2
 """Of the JSON file."""
 
 LEAST_COSINE = 0.08715574274765817
 """cos 85 degrees: least cosine that steep thread counts with under `projected`."""
-
-ROWS, COLUMNS = 24, 32
-"""Of the table `excess`, see `excess_at`."""
 
 COS2_D_MINIMUM, COS_SUM_MINIMUM, NOTHING = 1e-6, 1e-3, 1e-12
 LEAST_WIDTH_2 = 1e-12
@@ -166,18 +163,19 @@ class Cloth:
         table = self.tables["excess"]
         if dr.width(table) == 1:
             return mi.Float(1)
-        across = dr.sqrt(dr.maximum(0, 1 - wo.z)) * (ROWS - 1)
-        turn = _diamond(wo.x, wo.y) * (0.25 * COLUMNS)
-        row = dr.clip(mi.Int32(across), 0, ROWS - 2)
-        column = dr.clip(mi.Int32(turn), 0, COLUMNS - 1)
+        rows, columns = self.said["excess_shape"]
+        across = (1 - dr.sqrt(dr.clip(wo.z, 0, 1))) * (rows - 1)
+        turn = _diamond(wo.x, wo.y) * (0.25 * columns)
+        row = dr.clip(mi.Int32(across), 0, rows - 2)
+        column = dr.clip(mi.Int32(turn), 0, columns - 1)
         a, b = across - mi.Float(row), turn - mi.Float(column)
-        near = mi.UInt32(row * (COLUMNS + 1) + column)
+        near = mi.UInt32(row * (columns + 1) + column)
 
         def at(index: Any) -> Any:
             return dr.gather(mi.Float, table, index)
 
         low = dr.lerp(at(near), at(near + 1), b)
-        far = near + (COLUMNS + 1)
+        far = near + (columns + 1)
         return dr.lerp(low, dr.lerp(at(far), at(far + 1), b), a)
 
 
