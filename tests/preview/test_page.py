@@ -13,11 +13,13 @@ from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric, even
 from fabricusd.preview.fabrics import fabric_of
 from fabricusd.preview.glsl.kernels import SHADER, shader
+from fabricusd.preview.lights import Lights
 from fabricusd.preview.page import make
 from fabricusd.preview.page.arrays import mesh_arrays
 from fabricusd.preview.page.make import FOLDER, page
 from fabricusd.preview.page.threads import thread_controls
 from fabricusd.preview.picture import Picture, preview
+from fabricusd.preview.reference import reference_picture
 from fabricusd.preview.shapes import SHAPES
 from fabricusd.quality.colors import delta_e_2000
 from fabricusd.srgb import srgb_decode
@@ -108,6 +110,42 @@ def test_the_page_draws_what_the_preview_draws(linen):
     wanted = preview(fabric_of("linen_plain")[0], size=size)
     mine, theirs = (srgb_decode(p.codes() / 255.0) for p in (shown, wanted))
     assert delta_e_2000(mine, theirs).mean() < 0.5
+
+
+def test_the_page_s_numbers_are_even_in_every_pair_and_independent_of_other_seeds(linen):
+    count = 64
+    code = "Float32Array.from([...Array(%d)].flatMap((_, k) => fabricusd.sobol(k, %d)))"
+    a, b = (linen.floats(code % (count, seed)).reshape(count, 4) for seed in (1, 2))
+
+    def cells(x, y):
+        return len({(int(8 * p), int(8 * q)) for p, q in zip(x, y, strict=True)})
+
+    for i, j in ((0, 1), (2, 3), (0, 2), (1, 3)):
+        assert cells(a[:, i], a[:, j]) == count
+    # Random numbers are in 63 % of the cells; those of two seeds are no evener, and no less.
+    assert all(30 < cells(a[:, i], b[:, j]) < 55 for i in range(4) for j in range(4))
+
+
+@pytest.mark.parametrize("shape", ["cylinder", "drape"])
+def test_threads_under_the_sky_are_as_bright_as_the_path_tracer_s(browser, tmp_path, shape):
+    fabric, size = even(fabric_of("linen_plain")[0]), 24
+    shown, lights = opened(browser, tmp_path, fabric), Lights(key=0.0)
+    found = shown.floats(
+        f"(document.getElementById('shape').value = '{shape}',"
+        "document.getElementById('shape').onchange(),"
+        f"viewer.resize({size}, {size}), viewer.level = 1, viewer.passes = 4, viewer.frames = 0,"
+        "[...Array(32)].forEach(() => viewer.draw(fabricusd.placed(),"
+        f"{{ key_power: 0, even: {lights.even}, slope: {lights.slope} }})),"
+        "viewer.read())"
+    ).reshape(size, size, 4)
+    wanted, _ = reference_picture(
+        fabric, shape=shape, level="weave", size=size, lights=lights, spp=128
+    )
+    both = (found[..., 3] > 0.99) & (wanted[..., 3] > 0.99)
+    a, b = (x[both][:, :3].mean(axis=0) for x in (found, wanted))
+    # A drape has 64 directions of the sky here, the same in all pixels.
+    assert a == pytest.approx(b, rel=0.04)
+    shown.tab.close()
 
 
 def test_the_page_asks_for_nothing_and_complains_of_nothing(linen):
@@ -261,7 +299,7 @@ def test_differences_on_the_page_are_those_of_delta_e_2000(linen):
     found = linen.floats(
         f"(viewer.resize({size}, {size}), viewer.sum = {{ texture: viewer.newTexture() }},"
         f"(gl => gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, {size}, {size}, 0, gl.RGBA, gl.FLOAT,"
-        f" a.mine))(viewer.gl), viewer.frames = 1, viewer.setTraced(a.theirs, {size}),"
+        f" a.mine))(viewer.gl), viewer.drawn = 1, viewer.setTraced(a.theirs, {size}),"
         "viewer.differences())",
         mine=mine[::-1], theirs=theirs,
     ).reshape(size, size, 4)[::-1]  # fmt: skip

@@ -1,13 +1,18 @@
 // Frame after frame, until the picture has settled.
-// On a slow machine the picture has fewer pixels, so that it follows the hand.
-const SLOW = 250, FAST = 17, COARSEST = 0.25;  // milliseconds, milliseconds, share of the pixels' sides
+// On a slow machine the picture has fewer pixels, so that it follows the hand; on a fast one, a frame more passes.
+const SLOW = 250, FAST = 20, STEADY = 50, COARSEST = 0.25, MOST_PASSES = 8;  // milliseconds, share of the pixels' sides
+let passesOf = '', mostPasses = MOST_PASSES;
 function adapt() {
-  const before = finer;
+  const before = [finer, viewer.passes], now = [viewer.level, state.shape, canvas.width, canvas.height].join();
+  if (passesOf !== now) { passesOf = now; mostPasses = MOST_PASSES; }
   if (mean > SLOW) slow = true;
   if (viewer.frames === 3 && slow && !still) finer = Math.max(COARSEST, finer / 2);
   if (viewer.frames === 3 && mean <= FAST) finer = Math.min(1, finer * 2);
   if (viewer.frames > 24 && !fingers.size && !spin) { finer = 1; still = true; }
-  if (finer !== before) mean = last = 0;
+  // What was too slow once is not tried again.
+  if (mean > STEADY && viewer.passes > 1) viewer.passes = mostPasses = viewer.passes / 2;
+  else if (mean && mean <= FAST && finer === 1 && viewer.frames % 8 === 7) viewer.passes = Math.min(mostPasses, 2 * viewer.passes);
+  if (finer !== before[0] || viewer.passes !== before[1]) mean = last = 0;
 }
 
 function fit() {
@@ -42,7 +47,7 @@ function frame(now) {
   last = now;
   adapt();
   watchFrame(now);
-  by('status').textContent = `${LEVELS[viewer.level]} · ${viewer.frames} of ${MOST_FRAMES} samples · ${mean.toFixed(0)} ms a frame`;
+  by('status').textContent = `${LEVELS[viewer.level]} · frame ${viewer.frames} of ${MOST_FRAMES}, ${viewer.samples} samples · ${mean.toFixed(0)} ms a frame`;
   showScale();
 }
 
@@ -60,6 +65,6 @@ fit();
 apply();
 requestAnimationFrame(frame);
 window.fabricusd = {
-  viewer, decode, placed, lights, showScale, whole: () => wholeOf(state), get traced() { return traced; }, get data() { return data; }, get cloth() { return cloth; },
+  viewer, decode, sobol, placed, lights, showScale, whole: () => wholeOf(state), get traced() { return traced; }, get data() { return data; }, get cloth() { return cloth; },
   get state() { return state; }, get camera() { return camera; },
 };

@@ -40,8 +40,8 @@ MOST_BYTES = 64 << 20
 LEVEL = "auto"
 
 SCRIPTS = (
-    "viewer.js", "server.js", "state.js", "inputs.js", "camera.js", "cloth.js", "weave.js",
-    "compare.js", "files.js", "main.js",
+    "sobol.js", "card.js", "viewer.js", "server.js", "state.js", "inputs.js", "camera.js",
+    "cloth.js", "weave.js", "compare.js", "files.js", "main.js",
 )  # fmt: skip
 """Parts of the page's script, one after the other: each may use those before it."""
 
@@ -126,7 +126,7 @@ def shaders() -> dict[str, str]:
     tone = read["tone"].replace("ACES_SCALE", repr(view._SCALE))
     return {
         "vertex": read["vertex"], "screen": read["screen"], "sum": read["sum"],
-        "surface": kernels + read["surface"],
+        "surface": kernels + read["sky"] + read["surface"],
         "display": tone + read["display"], "compare": tone + read["compare"],
     }  # fmt: skip
 

@@ -1,4 +1,4 @@
-// The sum of all frames so far and of one more.
+// The sum of all passes so far and of one more.
 uniform highp sampler2D before, frame;
 uniform float keep;
 out vec4 color;

@@ -1,186 +1,18 @@
-// WebGL2: the tables of a fabric, a mesh, and the mean of frames that each add a direction of sky.
-const HEAD = '#version 300 es\nprecision highp float;\nprecision highp int;\n';
-const WIDTH = 2048, SHADOW = 1024;
-const R4 = [0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101];  // [Roberts2018]
-const KINDS = { f4: Float32Array, i4: Int32Array, u1: Uint8Array, u2: Uint16Array, i2: Int16Array, u4: Uint32Array };
+// The mean of frames, each of which adds some samples of each pixel, and that mean beside another picture.
+const PLACES = 2, MOST_SKIES = 8;
+const PASS = 1, SKY = 2, POINTS = 3, COARSE = 5;  // seeds
 
-export const decode = a => {
-  const bytes = Uint8Array.from(atob(a.data), c => c.charCodeAt(0));
-  return new KINDS[a.type](bytes.buffer);
-};
-
-export class Viewer {
+export class Viewer extends Card {
   constructor(canvas, shaders) {
-    this.canvas = canvas;
-    this.shaders = shaders;
-    const gl = this.gl = canvas.getContext('webgl2', { antialias: false, preserveDrawingBuffer: true });
-    if (!gl) throw Error('this browser has no WebGL2');
-    if (!gl.getExtension('EXT_color_buffer_float')) throw Error('this graphics card cannot sum float pictures');
-    this.programs = new Map();
-    this.blank = gl.createVertexArray();
-    this.level = 0; this.frames = 0; this.view = 0; this.exposure = 0; this.ground = 0;
+    super(canvas, shaders);
+    this.level = 0; this.view = 0; this.exposure = 0; this.ground = 0;
     this.lay = [1, 0];
+    this.passes = 1;  // how often a frame draws the mesh
+    this.drawn = 0;   // passes of all frames
     this.light = { azimuth: 0, elevation: 0 };
-    this.shadowTargets = [this.depthTarget(), this.depthTarget()];
-    this.resize(canvas.width, canvas.height);
   }
 
-  resize(width, height) {
-    const gl = this.gl;
-    this.canvas.width = width; this.canvas.height = height;
-    for (const t of this.targets ?? []) {
-      gl.deleteFramebuffer(t.frame); gl.deleteTexture(t.texture);
-      if (t.depth) gl.deleteRenderbuffer(t.depth);
-    }
-    this.targets = [this.target(true), this.target(false), this.target(false)];
-    this.frames = 0;
-  }
-
-  target(deep) {
-    const gl = this.gl, { width, height } = this.canvas;
-    const t = { frame: gl.createFramebuffer(), texture: this.newTexture() };
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, width, height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, t.frame);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, t.texture, 0);
-    if (deep) {
-      t.depth = gl.createRenderbuffer();
-      gl.bindRenderbuffer(gl.RENDERBUFFER, t.depth);
-      gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT24, width, height);
-      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, t.depth);
-    }
-    return t;
-  }
-
-  depthTarget() {
-    const gl = this.gl, t = { frame: gl.createFramebuffer(), texture: this.newTexture() };
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT24, SHADOW, SHADOW);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, t.frame);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, t.texture, 0);
-    return t;
-  }
-
-  newTexture() {
-    const gl = this.gl, texture = gl.createTexture();
-    gl.activeTexture(gl.TEXTURE15);  // on a unit that nothing else uses
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    // Float, integer and depth textures are read by texel; with a filter they would read as black.
-    for (const p of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, p, gl.NEAREST);
-    for (const p of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, p, gl.CLAMP_TO_EDGE);
-    return texture;
-  }
-
-  program(vertex, fragment, defines = '') {
-    const key = vertex + fragment + defines;
-    if (this.programs.has(key)) return this.programs.get(key);
-    const gl = this.gl, program = gl.createProgram();
-    for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-      const shader = gl.createShader(kind);
-      gl.shaderSource(shader, HEAD + defines + text);
-      gl.compileShader(shader);
-      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw Error(gl.getShaderInfoLog(shader));
-      gl.attachShader(program, shader);
-    }
-    gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw Error(gl.getProgramInfoLog(program));
-    const places = new Map();
-    program.at = name => {
-      if (!places.has(name)) places.set(name, gl.getUniformLocation(program, name));
-      return places.get(name);
-    };
-    this.programs.set(key, program);
-    return program;
-  }
-
-  bind(program, name, unit, texture) {
-    const gl = this.gl;
-    gl.activeTexture(gl.TEXTURE0 + unit);
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.uniform1i(program.at(name), unit);
-  }
-
-  upload(flat, internal, format, type, channels = 1) {
-    const gl = this.gl, rows = Math.max(1, Math.ceil(flat.length / (WIDTH * channels)));
-    const padded = new flat.constructor(rows * WIDTH * channels), texture = this.newTexture();
-    padded.set(flat);
-    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    gl.texImage2D(gl.TEXTURE_2D, 0, internal, WIDTH, rows, 0, format, type, padded);
-    return texture;
-  }
-
-  setFabric(fabric) {
-    const gl = this.gl;
-    for (const t of Object.values(this.tables ?? {})) gl.deleteTexture(t);
-    for (const b of this.blocks ?? []) gl.deleteBuffer(b);
-    this.fabric = fabric;
-    this.floats = decode(fabric.floats);
-    this.tables = {
-      floats: this.upload(this.floats, gl.R32F, gl.RED, gl.FLOAT),
-      ints: this.upload(decode(fabric.ints), gl.R32I, gl.RED_INTEGER, gl.INT),
-      bytes: this.upload(decode(fabric.bytes), gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE),
-      quads: this.upload(decode(fabric.quads), gl.RGBA32F, gl.RGBA, gl.FLOAT, 4),
-    };
-    this.blocks = [decode(fabric.shapes), decode(fabric.numbers)].map(data => {
-      const buffer = gl.createBuffer();
-      gl.bindBuffer(gl.UNIFORM_BUFFER, buffer);
-      gl.bufferData(gl.UNIFORM_BUFFER, data, gl.STATIC_DRAW);
-      return buffer;
-    });
-    this.frames = 0;
-  }
-
-  writeFloats(start, values) {  // change some numbers of a table
-    const gl = this.gl;
-    this.floats.set(values, start);
-    gl.activeTexture(gl.TEXTURE15);
-    gl.bindTexture(gl.TEXTURE_2D, this.tables.floats);
-    values.forEach((value, k) => {
-      const at = start + k;
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, at % WIDTH, Math.floor(at / WIDTH), 1, 1, gl.RED, gl.FLOAT, new Float32Array([value]));
-    });
-    this.frames = 0;
-  }
-
-  get defines() {
-    return Object.entries(this.fabric.defines).map(([k, v]) => `#define ${k} ${v}\n`).join('');
-  }
-
-  useFabric(program) {
-    const gl = this.gl;
-    ['floats', 'ints', 'bytes', 'quads'].forEach((name, k) => this.bind(program, name, 9 + k, this.tables[name]));
-    ['Shapes', 'Numbers'].forEach((name, k) => {
-      const index = gl.getUniformBlockIndex(program, name);
-      if (index === gl.INVALID_INDEX) return;
-      gl.uniformBlockBinding(program, index, k);
-      gl.bindBufferBase(gl.UNIFORM_BUFFER, k, this.blocks[k]);
-    });
-    gl.uniform4iv(program.at('repeats'), this.fabric.repeats);
-  }
-
-  setMesh(mesh) {
-    const gl = this.gl;
-    for (const b of this.buffers ?? []) gl.deleteBuffer(b);
-    if (this.mesh) gl.deleteVertexArray(this.mesh.vao);
-    const vao = gl.createVertexArray(), indices = decode(mesh.indices);
-    this.buffers = [];
-    const buffer = (target, data) => {
-      const made = gl.createBuffer();
-      gl.bindBuffer(target, made);
-      gl.bufferData(target, data, gl.STATIC_DRAW);
-      this.buffers.push(made);
-    };
-    gl.bindVertexArray(vao);
-    const parts = [['places', 3, gl.UNSIGNED_SHORT, true, 8], ['normals', 3, gl.SHORT, true, 8],
-      ['tangents', 4, gl.SHORT, true, 8], ['metres', 2, gl.FLOAT, false, 8]];
-    parts.forEach(([name, size, type, unit, stride], k) => {
-      buffer(gl.ARRAY_BUFFER, decode(mesh[name]));
-      gl.enableVertexAttribArray(k);
-      gl.vertexAttribPointer(k, size, type, unit, stride, 0);
-    });
-    buffer(gl.ELEMENT_ARRAY_BUFFER, indices);
-    this.mesh = { ...mesh, vao, count: indices.length };
-    this.keyIsDrawn = false;
-    this.frames = 0;
-  }
+  get samples() { return PLACES * this.drawn; }  // of each pixel
 
   // Column-major matrix of a map of the whole mesh as seen from `towards`.
   shadowMatrix(towards) {
@@ -192,7 +24,7 @@ export class Viewer {
 
   drawShadow(number, towards) {
     const gl = this.gl, program = this.program(this.shaders.vertex, 'void main() {}'), matrix = this.shadowMatrix(towards);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.shadowTargets[number].frame);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.depths.frames[number]);
     gl.viewport(0, 0, SHADOW, SHADOW);
     gl.clear(gl.DEPTH_BUFFER_BIT);
     gl.useProgram(program);
@@ -214,51 +46,82 @@ export class Viewer {
     return [Math.cos(e) * Math.sin(a), Math.sin(e), Math.cos(e) * Math.cos(a)];
   }
 
-  // One frame more, of the camera's { eye, matrix }.
+  // One frame more, of the camera's { eye, matrix }: passes with the same shadows, each at a place in the pixels.
   draw(camera, lights) {
-    const gl = this.gl, { width, height } = this.canvas, k = this.frames;
-    const [tent, far] = [2 * k, 2 * k + 1].map(n => (n ? R4.slice(0, 2).map(a => tented((0.5 + n * a) % 1)) : [0, 0]));
-    const [sky, other] = [2 * k, 2 * k + 1].map(skyDirection), key = this.keyDirection(), shadows = !this.mesh.convex;
-    gl.bindVertexArray(this.mesh.vao);
-    gl.enable(gl.DEPTH_TEST);
-    let maps = [null, null];
+    const gl = this.gl, shadows = !this.mesh.convex, key = this.keyDirection();
+    if (!this.frames) this.drawn = 0;
+    const sky = shadows ? this.drawShadows(key) : null;
+    const program = this.program(this.shaders.vertex, this.shaders.surface, `${this.defines}#define LEVEL ${this.level}\n`);
+    gl.useProgram(program);
+    this.useFabric(program);
+    gl.uniform3fv(program.at('eye'), camera.eye);
+    gl.uniform3fv(program.at('key'), key);
+    gl.uniform3f(program.at('zenith'), 0, 1, 0);
+    for (const [name, value] of Object.entries(lights)) gl.uniform1f(program.at(name), value);
+    gl.uniform4f(program.at('lay'), ...this.fabric.density, ...this.lay);
+    gl.uniform2fv(program.at('repeat'), this.fabric.repeat);
+    gl.uniform1i(program.at('skies'), shadows ? sky.length : 0);
+    gl.uniform1f(program.at('lift'), 4 * this.mesh.radius / SHADOW);
     if (shadows) {
-      if (!this.keyIsDrawn) this.keyMap = this.drawShadow(0, key);
-      this.keyIsDrawn = true;
-      maps = [this.keyMap, this.drawShadow(1, sky)];
+      gl.uniform3fv(program.at('sky'), sky.flatMap(one => one.direction));
+      gl.uniformMatrix4fv(program.at('sky_maps'), false, sky.flatMap(one => one.maps).flat());
+      gl.uniformMatrix4fv(program.at('key_map'), false, this.keyMap);
     }
+    for (let k = 0; k < this.passes; ++k) this.drawPass(program, camera);
+    ++this.frames;
+  }
+
+  drawPass(program, camera) {
+    const gl = this.gl, { width, height } = this.canvas, at = sobol(this.drawn, PASS).slice(0, 2).map(tented);
+    // Each place is even by itself, and with its directions: see surface.glsl.
+    const numbers = seed => [...Array(PLACES)].map((_, p) => sobol(this.drawn, seed + p));
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.targets[0].frame);
     gl.viewport(0, 0, width, height);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    const program = this.program(this.shaders.vertex, this.shaders.surface, `${this.defines}#define LEVEL ${this.level}\n`);
+    gl.enable(gl.DEPTH_TEST);
     gl.useProgram(program);
-    this.useFabric(program);
-    this.aim(program, camera.matrix, [-2 * tent[0] / width, 2 * tent[1] / height]);
-    gl.uniform3fv(program.at('eye'), camera.eye);
-    gl.uniform3fv(program.at('key'), key);
-    gl.uniform3fv(program.at('sky'), sky);
-    gl.uniform3fv(program.at('other_sky'), other);
-    gl.uniform2f(program.at('other_place'), far[0] - tent[0], tent[1] - far[1]);
-    gl.uniform3f(program.at('zenith'), 0, 1, 0);
-    for (const [name, value] of Object.entries(lights)) gl.uniform1f(program.at(name), value);
-    gl.uniform4f(program.at('lay'), ...this.fabric.density, ...this.lay);
-    gl.uniform1i(program.at('shadows'), shadows ? 1 : 0);
-    gl.uniform1f(program.at('lift'), 4 * this.mesh.radius / SHADOW);
-    this.shadowTargets.forEach((t, n) => this.bind(program, ['key_depth', 'sky_depth'][n], 3 + n, t.texture));
-    maps.forEach((m, n) => { if (m) gl.uniformMatrix4fv(program.at(['key_map', 'sky_map'][n]), false, m); });
+    gl.bindVertexArray(this.mesh.vao);
+    this.bind(program, 'depths', 3, this.depths?.texture ?? null, gl.TEXTURE_2D_ARRAY);
+    this.aim(program, camera.matrix, [-2 * at[0] / width, 2 * at[1] / height]);
+    gl.uniform2f(program.at('seen_at'), at[0], -at[1]);
+    gl.uniform4fv(program.at('points'), numbers(POINTS).flat());
+    gl.uniform2fv(program.at('coarse'), numbers(COARSE).flatMap(one => one.slice(0, 2)));
     gl.drawElements(gl.TRIANGLES, this.mesh.count, gl.UNSIGNED_INT, 0);
     gl.disable(gl.DEPTH_TEST);
-    const [before, after] = k % 2 ? [1, 2] : [2, 1], add = this.program(this.shaders.screen, this.shaders.sum);
+    this.add();
+  }
+
+  // Pairs of opposite directions to the sky with maps of their shadows: those of the last frames, and new
+  // ones in place of the oldest. Once for each light, a map in the direction of the key light.
+  drawShadows(key) {
+    const gl = this.gl;
+    this.depths ??= this.depthTargets(1 + 2 * MOST_SKIES);
+    gl.bindVertexArray(this.mesh.vao);
+    gl.enable(gl.DEPTH_TEST);
+    if (!this.keyIsDrawn) this.keyMap = this.drawShadow(0, key);
+    this.keyIsDrawn = true;
+    for (let k = Math.max(1, this.passes >> 1); k > 0; --k) {
+      const direction = skyDirection(this.skies), n = this.skies % MOST_SKIES;
+      const maps = [this.drawShadow(2 * n + 1, direction), this.drawShadow(2 * n + 2, direction.map(x => -x))];
+      this.sky[n] = { direction, maps };
+      ++this.skies;
+    }
+    return this.sky;
+  }
+
+  add() {  // the pass that was drawn to the sum
+    const gl = this.gl, k = this.drawn, [before, after] = k % 2 ? [1, 2] : [2, 1];
+    const program = this.program(this.shaders.screen, this.shaders.sum);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.targets[after].frame);
-    gl.useProgram(add);
+    gl.useProgram(program);
     gl.bindVertexArray(this.blank);
-    this.bind(add, 'before', 5, this.targets[before].texture);
-    this.bind(add, 'frame', 6, this.targets[0].texture);
-    gl.uniform1f(add.at('keep'), k ? 1 : 0);
+    this.bind(program, 'before', 5, this.targets[before].texture);
+    this.bind(program, 'frame', 6, this.targets[0].texture);
+    gl.uniform1f(program.at('keep'), k ? 1 : 0);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     this.sum = this.targets[after];
-    ++this.frames;
+    ++this.drawn;
   }
 
   show() {
@@ -274,7 +137,7 @@ export class Viewer {
 
   tone(program) {
     const gl = this.gl;
-    gl.uniform1f(program.at('scale'), 1 / this.frames);
+    gl.uniform1f(program.at('scale'), 1 / this.drawn);
     gl.uniform1f(program.at('exposure'), this.exposure);
     gl.uniform1f(program.at('ground'), this.ground);
     gl.uniform1i(program.at('view'), this.view);
@@ -326,7 +189,7 @@ export class Viewer {
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, out);
     const turned = new Float32Array(out.length);
     for (let y = 0; y < height; ++y) turned.set(out.subarray(y * row, (y + 1) * row), (height - 1 - y) * row);
-    return turned.map(x => x / this.frames);
+    return turned.map(x => x / this.drawn);
   }
 
   // The kernels at n pairs of directions; to, from : (w h 4) floats, whose fourth is u and v in threads.
@@ -367,9 +230,8 @@ function axesAlong(towards) {
 // A place in a tent filter one pixel in radius, for u in [0, 1).
 const tented = u => (u < 0.5 ? Math.sqrt(2 * u) - 1 : 1 - Math.sqrt(2 - 2 * u));
 
-// Direction number k of the sky: evenly over the sphere, apart from the places in the pixels.
+// Direction number k of the sky: evenly over the sphere.
 function skyDirection(k) {
-  const [y, turn] = [1 - 2 * ((0.5 + k * R4[2]) % 1), 2 * Math.PI * ((0.5 + k * R4[3]) % 1)];
-  const flat = Math.sqrt(1 - y * y);
+  const [, , u, v] = sobol(k, SKY), y = 1 - 2 * u, turn = 2 * Math.PI * v, flat = Math.sqrt(1 - y * y);
   return [flat * Math.cos(turn), y, flat * Math.sin(turn)];
 }
