@@ -20,10 +20,11 @@ Charts = Mapping[str, tuple[Panel, Sequence[Row]]]
 """Name of a panel -> the panel and its rows."""
 
 
-def write_csv(path: Path, rows: Sequence[Row]) -> None:
-    """One line a row; further figures are columns of their own."""
+def write_csv(path: Path, charts: Charts) -> None:
+    """One line a row of each panel; further figures are columns of their own."""
     lines = [
-        {**row.as_dict(), "relative_cost": relative}
+        {"panel": name, **row.as_dict(), "relative_cost": relative}
+        for name, (_, rows) in charts.items()
         for row, relative in zip(rows, relative_costs(rows), strict=True)
     ]
     names = list(dict.fromkeys(name for line in lines for name in line))

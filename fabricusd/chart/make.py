@@ -92,7 +92,7 @@ def _write(
 ) -> list[Path]:  # fmt: skip
     """Write the figures, the pictures and the pages."""
     written = [folder / "charts.csv", folder / "charts.json"]
-    write_csv(written[0], [row for _, rows in charts.values() for row in rows])
+    write_csv(written[0], charts)
     write_json(written[1], charts, seconds, quick)
     for name, (panel, rows) in charts.items():
         written += draw_panel(panel, rows, folder / name)

@@ -40,10 +40,26 @@ def test_groups_are_judged_apart():
     assert relative_costs(rows) == [1.0, 1.0, 2.0]
 
 
+def panel_of(name: str, *rows: Row) -> tuple[Panel, list[Row]]:
+    made = list(rows)
+    return Panel(name=name, title="", cost="s", error="e", about="", run=lambda _: made), made
+
+
+def written(path, *panels: tuple[Panel, list[Row]]) -> list[dict[str, str]]:
+    write_csv(path, {panel.name: (panel, rows) for panel, rows in panels})
+    with path.open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
 def test_further_figures_are_columns(tmp_path):
     one = Row(group="g", method="m", cost=1, error=1, figures={"megabytes": 3.0})
-    write_csv(tmp_path / "a.csv", [row("n", 2, 1), one])
-    with (tmp_path / "a.csv").open(newline="") as stream:
-        lines = list(csv.DictReader(stream))
+    lines = written(tmp_path / "a.csv", panel_of("p", row("n", 2, 1), one))
     assert [line["megabytes"] for line in lines] == ["", "3.0"]
     assert [line["relative_cost"] for line in lines] == ["2.0", "1.0"]
+
+
+def test_groups_of_the_same_name_in_two_panels_are_apart(tmp_path):
+    panels = panel_of("p", row("n", 2, 1)), panel_of("q", row("m", 1, 1))
+    lines = written(tmp_path / "a.csv", *panels)
+    assert [line["panel"] for line in lines] == ["p", "q"]
+    assert [line["relative_cost"] for line in lines] == ["1.0", "1.0"]

@@ -101,7 +101,7 @@ export class Viewer extends Card {
     gl.enable(gl.DEPTH_TEST);
     if (!this.keyIsDrawn) this.keyMap = this.drawShadow(0, key);
     this.keyIsDrawn = true;
-    for (let k = Math.max(1, this.passes >> 1); k > 0; --k) {
+    for (let k = Math.min(this.passes, Math.max(2, this.passes >> 1)); k > 0; --k) {
       const direction = skyDirection(this.skies), n = this.skies % MOST_SKIES;
       const maps = [this.drawShadow(2 * n + 1, direction), this.drawShadow(2 * n + 2, direction.map(x => -x))];
       this.sky[n] = { direction, maps };
