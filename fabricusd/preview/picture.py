@@ -8,7 +8,7 @@ at `far`, and drawn directions at the other levels.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from fabricusd.preview.kernels.start import start
 from fabricusd.preview.lights import Lights
 from fabricusd.preview.occlusion import Visibility, shadow_map, sky_directions, visibility_of
 from fabricusd.preview.shapes import SHAPES, Shape
-from fabricusd.preview.surfaces import R2, SKY_DIRECTIONS, Cloth, Seen, Surface
+from fabricusd.preview.surfaces import R4, SKY_DIRECTIONS, Cloth, Seen, Surface
 from fabricusd.preview.tables import tables_of
 from fabricusd.ranges import RANGES
 from fabricusd.scene.scene import Camera
@@ -39,6 +39,9 @@ SAMPLES = {"far": 8, "weave": 8, "thread": 8}
 
 BACKGROUND = 0.16
 """Radiance behind the shape in pictures without transparency."""
+
+R2 = np.array([0.7548776662466927, 0.5698402909980532])
+"""Steps of the R2 sequence [Roberts2018]."""
 
 SHADOW_SIZE = 1024
 """Texels of a shadow map along each side."""
@@ -278,7 +281,7 @@ def _corners(points: Any, camera: Camera, size: tuple[int, int]) -> NDArray[np.f
 
 def _offset(number: int) -> Any:
     """(2,) place of a sample in a tent filter one pixel in radius, from the middle of the pixel."""
-    u = ((0.5 + number * R2) % 1.0) if number else np.full(2, 0.5)
+    u = (0.5 + number * R2) % 1.0
     return np.where(u < 0.5, np.sqrt(2.0 * u) - 1.0, 1.0 - np.sqrt(2.0 * (1.0 - u)))
 
 
@@ -305,13 +308,39 @@ def _near(scene: _Scene, worn: _Worn, level: str, samples: int) -> tuple[Any, An
     """As `_far`, for the levels that look up the thread under each sample."""
     count = scene.size[0] * scene.size[1]
     radiance, cover = np.zeros((3, count), REAL), np.zeros(count, REAL)
-    rotation = np.random.default_rng(0).random((2, count), np.float32)
+    rotation = np.random.default_rng(0).random((4, count), np.float32)
+    extent: Any = None
     for k in range(samples):
         triangle, weights = scene.drawn(_offset(k))
         pixels = np.flatnonzero(triangle != NOTHING)
         cover[pixels] += 1.0
         seen = scene.seen(pixels, triangle, weights)
-        step = (k * SKY_DIRECTIONS * R2).astype(REAL)
+        if extent is None:
+            extent = _extent(seen.uv, pixels, scene.size)
+        seen = replace(seen, extent=extent[pixels])
+        step = (k * SKY_DIRECTIONS * R4).astype(REAL)
         numbers = rotation[:, pixels] + step[:, None]
         radiance[:, pixels] += worn.radiance(triangle[pixels], seen, scene.lights, level, numbers)
     return radiance / samples, cover / samples
+
+
+def _extent(uv: Any, pixels: Any, size: tuple[int, int]) -> Reals:
+    """(h w, 2) threads across each pixel, 0 where nothing is seen.
+
+    uv : (n, 2) weave coordinates that the covered `pixels` see
+
+    The differences to the nearer of two neighbours, along rows and along columns, are added: a seam
+    or an edge beside a pixel does not count.
+    """
+    width, height = size
+    held = np.full((height + 2, width + 2, 2), np.nan, REAL)
+    # Differences of threads beyond millions would be lost in single precision.
+    middle = uv.mean(axis=0) if len(uv) else 0.0
+    held[1 + pixels // width, 1 + pixels % width] = uv - middle
+    total = np.zeros((height, width, 2), REAL)
+    for axis in (0, 1):
+        step = np.abs(np.diff(held, axis=axis))
+        step = step[:, 1:-1] if axis == 0 else step[1:-1]
+        before, after = (step[:-1], step[1:]) if axis == 0 else (step[:, :-1], step[:, 1:])
+        total += np.nan_to_num(np.fmin(before, after))
+    return total.reshape(-1, 2)

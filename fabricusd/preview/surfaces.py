@@ -20,8 +20,11 @@ Reals = NDArray[np.float32]
 SKY_DIRECTIONS = 2
 """Directions of the sky for each sample at levels `weave` and `thread`."""
 
-R2 = np.array([0.7548776662466927, 0.5698402909980532])
-"""Steps of the R2 sequence [Roberts2018]."""
+R4 = 1.1673039782614187 ** -np.arange(1.0, 5.0)
+"""Steps of the R sequence in four dimensions [Roberts2018]: two for the sky, two for the place."""
+
+MANY = 2.0
+"""Repeats that a pixel holds each way from which on its samples are even over one of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +34,7 @@ class Seen:
     wo, wi, zenith : (3, n) - to the viewer, to the key light, and upwards, in the surface frame
     uv : (n, 2) float64 - weave coordinates [threads]
     lit, open : (n,) - share of the key light and of the sky that the rest of the shape lets through
+    extent : (n, 2) - threads across the pixel; None at level `far`
     """
 
     wo: Reals
@@ -39,17 +43,19 @@ class Seen:
     uv: NDArray[np.float64]
     lit: Reals
     open: Reals
+    extent: Reals | None = None
 
     def of(self, some: NDArray[np.int64]) -> Seen:
         """The same of some of the pixels."""
         wo, wi, zenith = (np.ascontiguousarray(w[:, some]) for w in (self.wo, self.wi, self.zenith))
-        return Seen(wo, wi, zenith, self.uv[some], self.lit[some], self.open[some])
+        extent = None if self.extent is None else self.extent[some]
+        return Seen(wo, wi, zenith, self.uv[some], self.lit[some], self.open[some], extent)
 
 
 class Surface(Protocol):
     """What can be shaded: (3, n) radiance at a level.
 
-    numbers : (2, n) in which the pixels' draws of the sky begin; None at level `far`
+    numbers : (4, n) where a sample's draws begin, see R4; None at level `far`
     """
 
     def radiance(self, seen: Seen, lights: Lights, level: str, numbers: Any) -> Reals:
@@ -81,16 +87,32 @@ class Cloth:
             even, slope = REAL(lights.even), REAL(lights.slope)
             sky_light(REAL, self.tables.sky, even, slope, seen.wo, seen.zenith, sky)
             return np.asarray(value + sky * seen.open, REAL)
-        hit = look_up(self.tables, seen.uv)
+        hit = look_up(self.tables, self._even(seen, numbers[2:]))
         value = value_near(self.tables, level, hit, seen.wi, seen.wo) * key
         for number in range(SKY_DIRECTIONS):
-            u = (numbers + (number * R2).astype(REAL)[:, None]) % 1.0
+            u = (numbers[:2] + (number * R4[:2]).astype(REAL)[:, None]) % 1.0
             wi = _cosine_directions(u)
             f = value_near(self.tables, level, hit, wi, seen.wo)
             light = lights.even + lights.slope * (wi * seen.zenith).sum(axis=0)
             weight = light * seen.open * (math.pi / SKY_DIRECTIONS)
             value += f * (weight / np.maximum(wi[2], REAL(1e-4)))
         return np.asarray(value, REAL)
+
+    def _even(self, seen: Seen, numbers: Reals) -> NDArray[np.float64]:
+        """(n, 2) weave coordinates; of many repeats in a pixel, even over the nearest one.
+
+        Where in which repeat a sample lies is of no account there, and where in the repeat is: even
+        places leave no grain, and no moire. The picture is blurred by up to half a repeat.
+        """
+        cloth = self.tables.cloth
+        repeat = np.lcm(cloth.grid.shape, cloth.sequence_length)
+        if seen.extent is None:
+            return seen.uv
+        many = np.flatnonzero((seen.extent > MANY * repeat).all(axis=1))
+        off = numbers[:, many].T - seen.uv[many] / repeat
+        uv = seen.uv.copy()
+        uv[many] += repeat * (off - np.floor(off + 0.5))
+        return uv
 
     def value_far(self, wi: Reals, wo: Reals) -> Reals:
         """See `Surface`."""

@@ -74,7 +74,9 @@ def _rows(name: str, shape: str, quick: bool) -> list[Row]:
                 np.asarray(picture[..., :3])[covered][None], reference[..., :3][covered][None]
             )
             found[title].append((seconds, float(differ.mean())))
-    return [_row(f"{name} on a {shape}", title, np.array(values)) for title, values in found.items()]
+    return [
+        _row(f"{name} on a {shape}", title, np.array(values)) for title, values in found.items()
+    ]
 
 
 def _row(group: str, method: str, values: NDArray[np.float64]) -> Row:
