@@ -238,6 +238,8 @@ class Cluster:
         done: Callable[[int, Any], Any],
         stop: Stop,
     ) -> bool:
+        from distributed.client import FutureCancelledError
+
         if self._shared is None or self._shared.thing is not thing:
             self._shared = self._sent(thing, _packed(thing))
         waiting = list(range(len(jobs)))[::-1]
@@ -263,14 +265,16 @@ class Cluster:
                 except queue.Empty:
                     continue
                 k = out.pop(future)
-                if future.status == "finished":
-                    done(k, future.result())
-                elif future.status == "error":
-                    future.result()
-                else:
-                    # Cancelled, or lost with the last worker that held the shared thing.
+                try:
+                    # Raises the error of a job.
+                    found = future.result()
+                except FutureCancelledError:
+                    # Cancelled, or lost with the last worker that held the shared thing, which may
+                    # be while the result is on its way.
                     waiting.append(k)
                     self._shared = self._sent(thing, self._shared.packed)
+                    continue
+                done(k, found)
             return True
         finally:
             self.client.cancel(list(out), force=True)

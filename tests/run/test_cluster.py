@@ -49,6 +49,23 @@ def test_jobs_of_a_lost_worker_are_done_by_others(cluster):
     cluster.client.wait_for_workers(2, timeout=60)
 
 
+def test_a_result_that_is_lost_on_its_way_is_computed_again(cluster, monkeypatch):
+    from distributed import Future
+
+    found, lost, result = {}, [], Future.result
+
+    def lose_two(future, *args):
+        if len(lost) < 2:
+            lost.append(future)
+            future.client.cancel([future], force=True)
+        return result(future, *args)
+
+    monkeypatch.setattr(Future, "result", lose_two)
+    assert cluster.run(double, {"plus": 3}, range(8), lambda k, x: found.update({k: x}))
+    assert len(lost) == 2
+    assert found == {k: 2 * k + 3 for k in range(8)}
+
+
 def test_stop_is_heard(cluster):
     stop, found = Stop(), []
 
