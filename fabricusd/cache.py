@@ -8,11 +8,12 @@ out of date; at most, nobody asks for it any more. Losing the whole cache costs 
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
@@ -110,6 +111,51 @@ def kept(kind: str, key: Iterable[object], make: Callable[[], NDArray[Any]]) -> 
             os.unlink(partial)
             raise
     return made
+
+
+def kept_groups(
+    kind: str,
+    key: Iterable[object],
+    make: Callable[[], Mapping[str, Any]],
+    kinds: Mapping[str, Any],
+) -> dict[str, Any]:
+    """What `make` returns, named arrays, numbers, and named tuples of them, as `kept`.
+
+    kinds : class of each named tuple; None in its place is kept, too
+    """
+    archive = kept(kind, key, lambda: packed(make()))
+    return unpacked(archive, kinds)
+
+
+def packed(groups: Mapping[str, Any]) -> NDArray[np.uint8]:
+    """All arrays and numbers of `kept_groups` as the bytes of an .npz archive."""
+    arrays: dict[str, Any] = {}
+    for name, group in groups.items():
+        if hasattr(group, "_asdict"):
+            arrays.update({f"{name}.{field}": value for field, value in group._asdict().items()})
+        elif group is not None:
+            arrays[name] = group
+    stream = io.BytesIO()
+    np.savez(stream, **arrays)
+    return np.frombuffer(stream.getvalue(), np.uint8)
+
+
+def unpacked(archive: NDArray[np.uint8], kinds: Mapping[str, Any]) -> dict[str, Any]:
+    """The inverse of `packed`."""
+    with np.load(io.BytesIO(archive.tobytes()), allow_pickle=False) as found:
+        arrays = {name: _value(found[name]) for name in found.files}
+    out = {name: value for name, value in arrays.items() if "." not in name}
+    for name, kind in kinds.items():
+        there = any(key.startswith(f"{name}.") for key in arrays)
+        out[name] = kind(*(arrays[f"{name}.{field}"] for field in kind._fields)) if there else None
+    return out
+
+
+def _value(array: NDArray[Any]) -> Any:
+    """A number where the array has no dimension: whole ones as Python's, reals as they were."""
+    if array.ndim:
+        return array
+    return int(array) if array.dtype.kind in "iub" else array[()]
 
 
 def entries() -> list[Entry]:

@@ -574,3 +574,14 @@ class Binding:
                 raise FabricError("metres_per_uv", f"is {metres}; it must be above 0")
             scale_u, scale_v = metres * self.fabric.warp.density, metres * self.fabric.weft.density
         return np.stack((u * scale_u, v * scale_v), axis=-1)
+
+
+_ANY_WEAVE = Weave(np.eye(2, dtype=bool))
+
+
+def one_side(fabric: Fabric) -> tuple[str, NDArray[np.bool_]]:
+    """What tables of one side of `fabric` depend on, as `cache.kept` takes it: all but its back and
+    its words."""
+    with np.printoptions(legacy=False):
+        said = repr(replace(fabric, weave=_ANY_WEAVE, back=None, documentation=""))
+    return said, fabric.weave.cells

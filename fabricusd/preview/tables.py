@@ -7,9 +7,7 @@ second to several, reading them a hundredth.
 from __future__ import annotations
 
 import hashlib
-import io
 import math
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -29,8 +27,8 @@ from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.surface import fuzz_of
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.yarn.compiled import Yarn, compile_yarn
-from fabricusd.cache import kept
-from fabricusd.fabric import Fabric, Weave
+from fabricusd.cache import kept_groups
+from fabricusd.fabric import Fabric, one_side
 from fabricusd.kernels.cache import fingerprint
 from fabricusd.preview.kernels.sky import COLUMNS, ROWS
 from fabricusd.preview.values import value_far
@@ -42,8 +40,6 @@ RINGS, AROUND = 32, 96
 
 LOWEST = 0.01
 """Sine of the lowest view in the table of the sky: at 0 a law need not be defined."""
-
-_ANY_WEAVE = Weave(np.eye(2, dtype=bool))
 
 
 class Tables(NamedTuple):
@@ -74,11 +70,9 @@ _GROUPS: dict[str, Any] = {
 @lru_cache(maxsize=64)
 def tables_of(fabric: Fabric) -> Tables:
     """The tables of `fabric`, from the cache if they were made before."""
-    with np.printoptions(legacy=False):
-        said = repr(replace(fabric, weave=_ANY_WEAVE, back=None, documentation=""))
-    key = (fingerprint(), _sources(), said, fabric.weave.cells)
-    archive = kept("preview", key, lambda: _packed(_made(fabric)))
-    return _unpacked(archive, law_of(fabric).tables)
+    key = (fingerprint(), _sources(), *one_side(fabric))
+    kinds = {"published": law_of(fabric).tables, **_GROUPS}
+    return Tables(**kept_groups("preview", key, lambda: _made(fabric)._asdict(), kinds))
 
 
 def _made(fabric: Fabric) -> Tables:
@@ -138,42 +132,6 @@ def _view(turn: float, z: float) -> tuple[float, float, float]:
         x, y = -y, x
     flat = math.sqrt(1.0 - z * z) / math.hypot(x, y)
     return flat * x, flat * y, z
-
-
-def _packed(tables: Tables) -> NDArray[np.uint8]:
-    """All arrays and numbers as the bytes of an .npz archive."""
-    arrays: dict[str, Any] = {"kind": tables.kind, "sky": tables.sky}
-    for group in ("published", *_GROUPS):
-        held = getattr(tables, group)
-        if held is not None:
-            arrays.update({f"{group}.{name}": value for name, value in held._asdict().items()})
-    stream = io.BytesIO()
-    np.savez(stream, **arrays)
-    return np.frombuffer(stream.getvalue(), np.uint8)
-
-
-def _unpacked(archive: NDArray[np.uint8], published: Any) -> Tables:
-    """The inverse of `_packed`; published : class of the law's tables."""
-    with np.load(io.BytesIO(archive.tobytes()), allow_pickle=False) as found:
-        arrays = {name: found[name] for name in found.files}
-
-    def group(name: str, kind: Any) -> Any:
-        if not any(key.startswith(f"{name}.") for key in arrays):
-            return None
-        return kind(*(_value(arrays[f"{name}.{field}"]) for field in kind._fields))
-
-    parts = {name: group(name, kind) for name, kind in _GROUPS.items()}
-    return Tables(
-        kind=int(arrays["kind"]), published=group("published", published), sky=arrays["sky"],
-        **parts,
-    )  # fmt: skip
-
-
-def _value(array: NDArray[Any]) -> Any:
-    """A number where the array has no dimension: whole ones as Python's, reals as they were."""
-    if array.ndim:
-        return array
-    return int(array) if array.dtype.kind in "iub" else array[()]
 
 
 @lru_cache(maxsize=1)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from fabricusd.appearance import surface
+from fabricusd.cache import packed, unpacked
 from fabricusd.preview.fabrics import fabric_of
 from fabricusd.preview.kernels.sky import sky_light
-from fabricusd.preview.tables import _made, _packed, _unpacked, tables_of
+from fabricusd.preview.tables import _GROUPS, Tables, _made, tables_of
 from fabricusd.preview.values import look_up, value_far, value_near
 
 NAMES = ("linen_plain", "denim")
@@ -29,7 +30,8 @@ def rows(w: np.ndarray) -> np.ndarray:
 def test_tables_are_read_as_they_were_made(name):
     fabric, _ = fabric_of(name)
     made = _made(fabric)
-    read = _unpacked(_packed(made), type(made.published))
+    kinds = {"published": type(made.published), **_GROUPS}
+    read = Tables(**unpacked(packed(made._asdict()), kinds))
     for group in ("published", "conserving", "cloth", "shadow", "yarn", "fuzz"):
         wanted, found = getattr(made, group), getattr(read, group)
         if wanted is None:

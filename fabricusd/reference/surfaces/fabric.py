@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from fabricusd.appearance.conserving.blocks import conserving_point_values
+from fabricusd.appearance.conserving.single import ConservingTables
 from fabricusd.appearance.fuzz import Fuzz, optical_depth
 from fabricusd.appearance.law import (
     CONSERVING_ONLY,
@@ -29,7 +30,7 @@ from fabricusd.appearance.law import (
 from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.published.levels import point_values
 from fabricusd.appearance.sampling.blocks import Drawn, sample_points, sample_points_both
-from fabricusd.appearance.sampling.mixture import density, direction
+from fabricusd.appearance.sampling.mixture import Mixture, density, direction
 from fabricusd.appearance.scattering.models import translucent
 from fabricusd.appearance.shadow.kinds import Shadow
 from fabricusd.appearance.shadow.methods import compile_shadow
@@ -39,7 +40,9 @@ from fabricusd.appearance.weave.coverage import GAP, WARP
 from fabricusd.appearance.weave.lookup import back_of
 from fabricusd.appearance.weave.place import place_at
 from fabricusd.appearance.weave.yarn.compiled import compile_yarn
-from fabricusd.fabric import Fabric
+from fabricusd.cache import kept_groups
+from fabricusd.fabric import Fabric, one_side
+from fabricusd.kernels.cache import fingerprint
 from fabricusd.kernels.real import INLINE, KERNEL, LEAN
 from fabricusd.reference.rays.embree import aligned_empty
 from fabricusd.reference.rays.wave import (
@@ -142,9 +145,18 @@ class _Side:
         """The surface law, made when it is first needed: often a cloth's back is never seen."""
         with _ONE_AT_A_TIME:
             if self._law is None:
-                held = self._made()[1] if law_of(self.fabric).absolute else None
-                self._law = surface_law(self.fabric, precision=np.float32, shadow=held)
+                key = fingerprint(), self.method, *one_side(self.fabric)
+                kinds = {
+                    "published": law_of(self.fabric).tables, "lobes": Mixture,
+                    "conserving": ConservingTables, "conserving_lobes": Mixture,
+                }  # fmt: skip
+                found = kept_groups("laws", key, lambda: self._new_law()._asdict(), kinds)
+                self._law = SurfaceLaw(**found)
             return self._law
+
+    def _new_law(self) -> SurfaceLaw:
+        held = self._made()[1] if law_of(self.fabric).absolute else None
+        return surface_law(self.fabric, precision=np.float32, shadow=held)
 
     @property
     def fuzz(self) -> Fuzz | None:
