@@ -10,7 +10,7 @@ function adapt() {
   if (viewer.frames === 3 && mean <= FAST) finer = Math.min(1, finer * 2);
   if (viewer.frames > 24 && !fingers.size && !spin) { finer = 1; still = true; }
   // What was too slow once is not tried again.
-  const least = viewer.level ? 1 : 2;  // at `far` a pass is cheap
+  const least = viewer.level || slow ? 1 : 2;  // at `far` a pass is cheap
   if (mean > STEADY && viewer.passes > least) viewer.passes = mostPasses = viewer.passes / 2;
   else if (mean && mean <= FAST && finer === 1 && viewer.frames % 8 === 7) viewer.passes = Math.min(mostPasses, 2 * viewer.passes);
   viewer.passes = Math.max(viewer.passes, least);
