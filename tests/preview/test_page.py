@@ -225,6 +225,14 @@ def test_a_narrow_window_has_all_controls_below_the_picture(browser, tmp_path):
     )
     assert panel[0] >= stage[1] - 1
     assert stage[2] == panel[2] == width == 390
+    apart = tab.evaluate(
+        "(() => { document.getElementById('status').textContent ="
+        " 'thread · frame 256 of 256, 4096 samples · 1000 ms a frame';"
+        "document.getElementById('scale').querySelector('i').style.width = '120px';"
+        "const [a, b] = ['status', 'scale'].map(i => document.getElementById(i)"
+        ".getBoundingClientRect()); return a.right < b.left || a.top > b.bottom; })()"
+    )
+    assert apart, "the status lies over the scale"
     tab.close()
 
 
