@@ -3,10 +3,10 @@
     pip install 'fabricusd[mitsuba]'; apt-get install libllvm19
     python bench/tracer/bench_mitsuba.py [--size 512] [--spp 16]
 
-The scene is the draped cloth of `samples` in the microcylinder model at level `far`, over a diffuse
-floor, with the same lights, camera, box filter and depth for both. The plugin evaluates the same
-nodes of the same tables and samples by cosine, as users would write it; Mitsuba uses the sampler
-`multijitter`. Only sampling is timed: scenes are built and kernels compiled before.
+The scene is the draped cloth of `samples` in the microcylinder model and the law `masked` at level
+`far`, over a diffuse floor, with the same lights, camera, box filter and depth for both. The plugin
+evaluates the same nodes of the same tables and samples by cosine, as users would write it; Mitsuba
+uses the sampler `multijitter`. Only sampling is timed: scenes are built and kernels compiled before.
 
 Printed are the times, as medians over pictures; relative MSE against the mean of twice as many
 other pictures by the same renderer, on the cloth alone and on the whole picture, also as medians,
@@ -219,14 +219,13 @@ def _moved(frame: Any, centre: Any) -> Any:
 
 
 def plain_scene() -> Scene:
-    """The draped cloth in the microcylinder model over a diffuse floor."""
+    """The draped cloth in the microcylinder model and the law `masked`, over a diffuse floor."""
     scene = drape("silk_shot")
+    law = {"model": "microcylinder", "surface_law": "masked", "back": None}
     scene.materials = [
         FabricSurface(
             name=m.name,
-            binding=replace(
-                m.binding, fabric=replace(m.binding.fabric, model="microcylinder", back=None)
-            ),
+            binding=replace(m.binding, fabric=replace(m.binding.fabric, **law)),
         )
         if isinstance(m, FabricSurface)
         else PreviewSurface(diffuse=m.diffuse, ior=1.0)
