@@ -6,7 +6,8 @@
 The scene is the draped cloth of `samples` in the microcylinder model and the law `masked` at level
 `far`, over a diffuse floor, with the same lights, camera, box filter and depth for both. The plugin
 evaluates the same nodes of the same tables and samples by cosine, as users would write it; Mitsuba
-uses the sampler `multijitter`. Only sampling is timed: scenes are built and kernels compiled before.
+uses the sampler `multijitter`. Only sampling is timed: scenes are built and kernels compiled
+before.
 
 Printed are the times, as medians over pictures; relative MSE against the mean of twice as many
 other pictures by the same renderer, on the cloth alone and on the whole picture, also as medians,
