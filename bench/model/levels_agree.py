@@ -1,13 +1,15 @@
 """Whether cloth keeps its brightness as the camera comes nearer: level `weave` against `far`.
 
     python bench/model/levels_agree.py [--presets NAME ...] [--law LAW] [--places N]
+        [--spacing S]
 
 For each preset, in the law that it wears, and each shadowing method: the mean of `weave` over even
 places of the repeat, over `far`, less 1; for single lights from 5 degrees above the cloth, over
 azimuths, and for views of 0, 35 and 65 degrees. `worst` is the largest of any channel, at the light
 that is named (elevation, azimuth); `typical` is the median over lights and views. `noise` is the
 worst of two halves of the places. Threads are even: uneven ones keep the mean over many threads
-only (docs/yarn.md). `far` holds the mean of `horizon` under laws that do not mask.
+only (docs/yarn.md). `far` holds the mean of `horizon` under laws that do not mask. `--spacing .5`
+puts the nodes of `far` half as far apart.
 """
 
 from __future__ import annotations
@@ -19,8 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.appearance.laws import law_of
+from fabricusd.appearance.published import tables
 from fabricusd.appearance.surface import evaluate
 from fabricusd.appearance.weave.compiled import true_repeat
+from fabricusd.appearance.weave.quadrature import Rule, default_rule
 from fabricusd.fabric import SURFACE_LAWS, Fabric, even
 from fabricusd.schema import load, published_names
 
@@ -70,7 +74,14 @@ def main() -> None:
     parser.add_argument("--law", choices=SURFACE_LAWS, help="in place of each preset's own")
     parser.add_argument("--shadows", nargs="+", default=["none", "peak", "horizon"])
     parser.add_argument("--places", type=int, default=40000)
+    parser.add_argument("--spacing", type=float, default=1.0, help="of the nodes, times the usual")
     options = parser.parse_args()
+
+    def spaced(fabric: Fabric, *, cells: bool = True) -> Rule:
+        rule = default_rule(fabric, cells=cells)
+        return rule._replace(spacing=rule.spacing * options.spacing)
+
+    tables.default_rule = spaced
     print("| preset | law | shadow | worst | at | typical | noise |")
     print("|---|---|---|---|---|---|---|")
     for name in options.presets:

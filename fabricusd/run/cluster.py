@@ -18,7 +18,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -45,6 +45,9 @@ LOSSES = 1000
 """Lost workers after which Dask calls a job the reason for the losses. Farms kill workers."""
 KEPT = 2
 """Shared things that a worker keeps, with what it has built from them."""
+
+_LOST: Any = object()
+"""In place of a result that no worker has any more."""
 
 _kept: OrderedDict[str, dict[str, Any]] = OrderedDict()
 _lock = threading.Lock()
@@ -265,10 +268,11 @@ class Cluster:
                 except queue.Empty:
                     continue
                 k = out.pop(future)
-                try:
-                    # Raises the error of a job.
-                    found = future.result()
-                except FutureCancelledError:
+                found = _LOST
+                if future.status in ("finished", "error"):
+                    with suppress(FutureCancelledError):
+                        found = future.result()  # raises the error of a job
+                if found is _LOST:
                     # Cancelled, or lost with the last worker that held the shared thing, which may
                     # be while the result is on its way.
                     waiting.append(k)
