@@ -14,7 +14,7 @@ from fabricusd.appearance.scattering.model import PUBLISHED
 from fabricusd.appearance.scattering.models import model_of
 from fabricusd.appearance.scattering.table import pack_threads
 from fabricusd.appearance.shadow.kinds import Shadow
-from fabricusd.appearance.shadow.mean import node_groups
+from fabricusd.appearance.shadow.mean import node_means
 from fabricusd.appearance.weave.coverage import coverage
 from fabricusd.appearance.weave.quadrature import Rule, curve_nodes, default_rule
 from fabricusd.errors import FabricError
@@ -73,8 +73,7 @@ def surface_tables(
     law = law_of(fabric)
     held = None
     if law.absolute and shadow is not None:
-        groups = node_groups(shadow, q, fabric)
-        held = None if groups is None else (groups, float(shadow.softness))
+        held = node_means(shadow, q, fabric)
     nodes = np.stack((np.cos(q.psi0), np.sin(q.psi0), q.weight, q.half), axis=1)
     made: SurfaceTables = law.tables(
         threads=threads.astype(precision),

@@ -25,8 +25,8 @@ SOURCE = Path(__file__).resolve().parent / "blender" / "fabric_thread.osl"
 LAWS = ("masked", "unmasked", "projected")
 """Surface laws of the shader, by its parameter `law`."""
 
-COLUMNS, GROUPS = 16, 4
-"""Azimuths of the shader's horizons, and groups of places: a part of those of `laws.lit`."""
+AZIMUTHS, ELEVATIONS = 16, 17
+"""Azimuths and elevations of the shader's mean shadows: a part of those of `laws.lit`."""
 
 
 def check(where: None, clobber: bool) -> None:
@@ -96,19 +96,18 @@ def osl_source(fabric: Fabric) -> str:
 
 def _unmasked(law: Any, nodes: int) -> list[str]:
     """The tables of laws that do not mask, of a single entry each where the law does."""
-    horizons, columns = np.zeros(1), 1
+    means, columns = np.ones(1), 1
     if getattr(law, "columns", 0):
-        whole = law.horizons.reshape(law.columns + 1, nodes, law.groups)[:: law.columns // COLUMNS]
-        horizons = whole.reshape(COLUMNS + 1, nodes, GROUPS, -1).mean(axis=3)
-        columns = COLUMNS
+        whole = law.means.reshape(law.columns + 1, law.lit_rows, nodes)
+        means = whole[:: law.columns // AZIMUTHS, :: (law.lit_rows - 1) // (ELEVATIONS - 1)]
+        columns = AZIMUTHS
     shape = {name: getattr(law, name, np.zeros(2)) for name in ("wide_2", "tall_2")}
     excess = np.asarray(getattr(law, "excess", np.ones(1)))
     return [
         f"    int columns = {columns},\n",
-        f"    int groups = {GROUPS},\n",
-        f"    float softness = {float(getattr(law, 'softness', 1.0)):.9g},\n",
+        f"    int elevations = {ELEVATIONS},\n",
         *(_array("float", name, values) for name, values in shape.items()),
-        _array("float", "horizons", horizons.ravel(), digits=4),
+        _array("float", "means", means.ravel(), digits=4),
         f"    int excess_rows = {ROWS},\n",
         f"    int excess_columns = {AROUND},\n",
         _array("float", "excess", excess if excess.size > 1 else np.ones(ROWS * (AROUND + 1))),

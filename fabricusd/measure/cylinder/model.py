@@ -21,7 +21,7 @@ from fabricusd.appearance.published.tables import has_cell_lobes
 from fabricusd.appearance.scattering.columns import LAW
 from fabricusd.appearance.scattering.model import PUBLISHED
 from fabricusd.appearance.scattering.table import pack_threads
-from fabricusd.appearance.shadow.mean import node_groups
+from fabricusd.appearance.shadow.mean import node_means
 from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.surface import far_all
 from fabricusd.appearance.weave.coverage import coverage as cover
@@ -198,7 +198,7 @@ class Model:
         self.rule = Rule(CELLS, SPACING) if cells else Rule(POINTS, SPACING / WIDTH)
         self.law = law_of(template)
         self.held = False
-        self._groups: Kept[tuple[Floats, float]] = Kept(KEPT_SHADOWS)
+        self._means: Kept[Floats] = Kept(KEPT_SHADOWS)
         self._shapes: Kept[dict[str, Any]] = Kept(KEPT)
 
     def hold(self, held: bool) -> None:
@@ -270,9 +270,9 @@ class Model:
         threads = {k: replace(t, gamma_surface=WIDTH) for k, t in made.threads.items()}
         return replace(made, threads=threads)
 
-    def _light(self, names: Sequence[Number], x: Floats) -> tuple[Floats, float] | None:
-        """(horizons of the nodes, width of a shadow's edge) of a cloth, which its curves and
-        coverage make; None under a law that masks instead."""
+    def _light(self, names: Sequence[Number], x: Floats) -> Floats | None:
+        """The mean of g at the nodes of a cloth, which its curves and coverage make; None under a
+        law that masks instead."""
         if not self.law.absolute:
             return None
         shapes = [n for n in names if n.field in SHAPES]
@@ -282,24 +282,24 @@ class Model:
         steps = np.array([GRID[n.field] for n in shapes])
         first = np.floor(own / steps)
         weights = [_shares(t, smooth=len(shapes) <= 2) for t in own / steps - first]
-        total, softness = np.zeros(0), 1.0
+        total = np.zeros(0)
         for corner in product(*weights):
             weight = math.prod(share for _, share in corner)
             if abs(weight) > 1e-12:
                 at = (first + [step for step, _ in corner]) * steps
-                groups, softness = self._light_at(tuple(shapes), at)
-                total = weight * groups if not total.size else total + weight * groups
-        return total, softness
+                means = self._light_at(tuple(shapes), at)
+                total = weight * means if not total.size else total + weight * means
+        return total
 
-    def _light_at(self, shapes: tuple[Number, ...], at: Floats) -> tuple[Floats, float]:
+    def _light_at(self, shapes: tuple[Number, ...], at: Floats) -> Floats:
         """`_light` on the grid."""
         key = tuple(float(v) for v in at)
 
-        def make() -> tuple[Floats, float]:
+        def make() -> Floats:
             fabric = self._shaped(shapes, at)
             shadow = compile_shadow(fabric, "horizon", precision=np.float64)
-            groups = node_groups(shadow, self._nodes(shapes, at), fabric)
-            assert groups is not None
-            return groups, float(shadow.softness)
+            means = node_means(shadow, self._nodes(shapes, at), fabric)
+            assert means is not None
+            return means
 
-        return self._groups.get(key, make)
+        return self._means.get(key, make)

@@ -6,24 +6,11 @@ ivec4 split_cell; vec2 split_place; ivec2 split_entry;
 uniform sampler2D floats;
 uniform highp isampler2D ints;
 uniform highp usampler2D bytes;
-uniform sampler2D quads;
 layout(std140) uniform Shapes { ivec4 shapes[74]; };
-layout(std140) uniform Numbers { vec4 numbers[17]; };
+layout(std140) uniform Numbers { vec4 numbers[16]; };
 float F(int k) { return texelFetch(floats, ivec2(k & 2047, k >> 11), 0).r; }
 int I(int k) { return texelFetch(ints, ivec2(k & 2047, k >> 11), 0).r; }
 int B(int k) { return int(texelFetch(bytes, ivec2(k & 2047, k >> 11), 0).r); }
-// `laws.lit.mean_over`, by four groups at a time.
-float mean_of_groups(int at, int here, int beside, float c, float level) {
-  float total = 0.0;
-  for (int k = 0; k < 6; ++k) {
-    int i = at + (here >> 2) + k, j = at + (beside >> 2) + k;
-    vec4 a = texelFetch(quads, ivec2(i & 2047, i >> 11), 0);
-    vec4 b = texelFetch(quads, ivec2(j & 2047, j >> 11), 0);
-    vec4 t = clamp(level - (a + (b - a) * c), 0.0, 1.0);
-    total += dot(t * t * (3.0 - 2.0 * t), vec4(1.0));
-  }
-  return total * 0.041666666666666664;
-}
 #define published_threads_at shapes[0].x
 #define published_threads_n0 shapes[0].y
 #define published_threads_n1 shapes[0].z
@@ -38,8 +25,8 @@ float mean_of_groups(int at, int here, int beside, float c, float level) {
 #define published_wide_2_n0 shapes[8].y
 #define published_tall_2_at shapes[10].x
 #define published_tall_2_n0 shapes[10].y
-#define published_horizons_at shapes[12].x
-#define published_horizons_n0 shapes[12].y
+#define published_means_at shapes[12].x
+#define published_means_n0 shapes[12].y
 #define published_excess_at shapes[14].x
 #define published_excess_n0 shapes[14].y
 #define conserving_threads_at shapes[16].x
@@ -132,19 +119,18 @@ float mean_of_groups(int at, int here, int beside, float c, float level) {
 #define published_gap numbers[1].x
 #define published_precision numbers[2].x
 #define published_columns int(numbers[3].x)
-#define published_lit_nodes int(numbers[4].x)
-#define published_groups int(numbers[5].x)
-#define published_softness numbers[6].x
-#define conserving_warp_start int(numbers[7].x)
-#define conserving_covered numbers[8].x
-#define conserving_opaque int(numbers[9].x)
-#define cloth_gap numbers[10].x
-#define cloth_last numbers[11].x
-#define cloth_tiny numbers[12].x
-#define shadow_softness numbers[13].x
-#define shadow_mean_columns int(numbers[14].x)
-#define shadow_groups int(numbers[15].x)
-#define fuzz_depth numbers[16].x
+#define published_lit_rows int(numbers[4].x)
+#define published_lit_nodes int(numbers[5].x)
+#define conserving_warp_start int(numbers[6].x)
+#define conserving_covered numbers[7].x
+#define conserving_opaque int(numbers[8].x)
+#define cloth_gap numbers[9].x
+#define cloth_last numbers[10].x
+#define cloth_tiny numbers[11].x
+#define shadow_softness numbers[12].x
+#define shadow_mean_columns int(numbers[13].x)
+#define shadow_mean_rows int(numbers[14].x)
+#define fuzz_depth numbers[15].x
 
 struct Place { int thread_set_; int thread_; float psi0_; float w_; float shade_; };
 
@@ -577,35 +563,45 @@ T_if k_column_of(int columns, float x, float y) {
   return T_if(column, (turn - float(column)));
 }
 
-float k_asin32(float x) {
-  float c;
-  float square;
-  c = min(max(x, -1.0), 1.0);
-  square = ((1.0 - c) * (1.0 + c));
-  return k_atan2_32(c, sqrt(square));
+T_if k_row_of(int rows, float z) {
+  float across;
+  int row;
+  across = (sqrt(max(z, 0.0)) * float((rows - 1)));
+  row = max(min(int(across), (rows - 2)), 0);
+  return T_if(row, min((across - float(row)), 1.0));
 }
 
-float k_level_of(float z, float softness) {
-  return ((k_asin32(z) / softness) + 0.5);
+float k_mean_at(int here, int beside, int step_, float c, float r) {
+  float low;
+  float high;
+  low = F(published_means_at + here);
+  low = (low + ((F(published_means_at + beside) - low) * c));
+  high = F(published_means_at + (here + step_));
+  high = (high + ((F(published_means_at + (beside + step_)) - high) * c));
+  return (low + ((high - low) * r));
 }
 
 float k_lit_alone_1(int node, float x, float y, float z) {
   T_if t1;
   int column;
   float c;
-  int step_;
-  int begin;
-  float level;
+  T_if t2;
+  int row;
+  float r;
+  int nodes;
+  int here;
   if ((published_columns == 0)) {
     return 1.0;
   }
   t1 = k_column_of(published_columns, x, y);
   column = t1.m0_;
   c = t1.m1_;
-  step_ = (published_lit_nodes * 24);
-  begin = ((column * step_) + (node * 24));
-  level = k_level_of(z, published_softness);
-  return mean_of_groups(published_horizons_at, begin, (begin + step_), c, level);
+  t2 = k_row_of(published_lit_rows, z);
+  row = t2.m0_;
+  r = t2.m1_;
+  nodes = published_lit_nodes;
+  here = ((((column * published_lit_rows) + row) * nodes) + node);
+  return k_mean_at(here, (here + (published_lit_rows * nodes)), nodes, c, r);
 }
 
 float k_law_lit_alone(int a2, float a3, float a4, float a5) {
@@ -845,6 +841,14 @@ T_fff k_point_value(Place place, float ix, float iy, float iz, float ox, float o
 
 T_ii k_shape_of() {
   return T_ii((conserving_sides_n1 - 2), (conserving_sides_n2 - 4));
+}
+
+float k_asin32(float x) {
+  float c;
+  float square;
+  c = min(max(x, -1.0), 1.0);
+  square = ((1.0 - c) * (1.0 + c));
+  return k_atan2_32(c, sqrt(square));
 }
 
 struct T_iiff { int m0_; int m1_; float m2_; float m3_; };
@@ -1716,20 +1720,52 @@ int k_stretch_of(int which, int thread, float s) {
   return k_stretch_in(which, thread, k_piece_of(thread, s), s);
 }
 
-float k_mean_of(int stretch, float x, float y, float z) {
+struct T_iff { int m0_; float m1_; float m2_; };
+
+T_iff k_mean_entry(int stretch, float x, float y, float z) {
   int columns;
+  int rows;
   T_if t1;
   int column;
   float c;
-  int begin;
-  float level;
+  T_if t2;
+  int row;
+  float r;
   columns = shadow_mean_columns;
+  rows = shadow_mean_rows;
   t1 = k_column_of(columns, x, y);
   column = t1.m0_;
   c = t1.m1_;
-  begin = (((stretch * (columns + 1)) + column) * 24);
-  level = k_level_of(z, shadow_softness);
-  return mean_of_groups(shadow_mean_at, begin, (begin + 24), c, level);
+  t2 = k_row_of(rows, z);
+  row = t2.m0_;
+  r = t2.m1_;
+  return T_iff(((((stretch * (columns + 1)) + column) * rows) + row), c, r);
+}
+
+float k_mean_at_1(int here, int beside, int step_, float c, float r) {
+  float low;
+  float high;
+  low = F(shadow_mean_at + here);
+  low = (low + ((F(shadow_mean_at + beside) - low) * c));
+  high = F(shadow_mean_at + (here + step_));
+  high = (high + ((F(shadow_mean_at + (beside + step_)) - high) * c));
+  return (low + ((high - low) * r));
+}
+
+float k_mean_from(int entry, float c, float r) {
+  return k_mean_at_1(entry, (entry + shadow_mean_rows), 1, c, r);
+}
+
+float k_mean_of(int stretch, float x, float y, float z) {
+  T_iff t1;
+  int entry;
+  float c;
+  float r;
+  t1 = k_mean_entry(stretch, x, y, z);
+  entry = t1.m0_;
+  c = t1.m1_;
+  r = t1.m2_;
+  return k_mean_from(entry, c, r);
 }
 
 float k_mean_lit(Hit hit, float x, float y, float z) {

@@ -33,7 +33,7 @@ PLUGIN = Path(__file__).resolve().parent / "fabricusd_cloth.py"
 LAWS = ("masked", "unmasked", "projected")
 """Surface laws that the plugin has."""
 
-VERSION = 2
+VERSION = 3
 """Of the JSON file."""
 
 
@@ -93,12 +93,14 @@ def fabric_content(fabric: Fabric) -> dict[str, Any]:
     tables: Any = surface_tables(fabric, rule=DEFAULT, shadow=shadow)
     nodes, threads = tables.nodes, tables.threads
     own: dict[str, Any] = {}
-    for name in ("precision", "columns", "groups", "softness"):
+    for name in ("precision", "columns"):
         if hasattr(tables, name):
             own[name] = float(getattr(tables, name))
-    for name in ("horizons", "excess", "wide_2", "tall_2"):
+    for name in ("means", "excess", "wide_2", "tall_2"):
         if hasattr(tables, name):
             own[name] = _numbers(getattr(tables, name))
+    if "means" in own:
+        own["elevations"] = tables.lit_rows
     if "excess" in own:
         own["excess_shape"] = [ROWS, COLUMNS]
     return {

@@ -21,7 +21,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-VERSION = 2
+VERSION = 3
 """Of the JSON file."""
 
 LEAST_COSINE = 0.08715574274765817
@@ -39,9 +39,7 @@ class Cloth:
             raise ValueError(f"is no fabric of version {VERSION}; write it with --mitsuba")
         self.said = said
         self.law, self.nodes, self.threads = said["law"], said["nodes"], said["threads"]
-        self.tables = {
-            name: mi.Float(said[name]) for name in ("horizons", "excess") if name in said
-        }
+        self.tables = {name: mi.Float(said[name]) for name in ("means", "excess") if name in said}
         self.columns = int(said.get("columns", 0))
 
     def value(self, wi: Any, wo: Any) -> Any:
@@ -137,20 +135,19 @@ class Cloth:
         """Return the share of the light that neighbouring threads let through to a node."""
         if not self.columns:
             return mi.Float(1)
-        groups = int(self.said["groups"])
+        nodes, rows = len(self.nodes), int(self.said["elevations"])
         turn = _diamond(wi.x, wi.y) * (0.25 * self.columns)
+        across = dr.sqrt(dr.clip(wi.z, 0, 1)) * (rows - 1)
         column = dr.clip(mi.Int32(turn), 0, self.columns - 1)
-        part = turn - mi.Float(column)
-        level = dr.asin(dr.clip(wi.z, -1, 1)) / self.said["softness"] + 0.5
-        step = len(self.nodes) * groups
-        here = mi.UInt32(column) * step + node * groups
-        total = mi.Float(0)
-        for group in range(groups):
-            low = dr.gather(mi.Float, self.tables["horizons"], here + group)
-            high = dr.gather(mi.Float, self.tables["horizons"], here + (group + step))
-            t = dr.clip(level - dr.lerp(low, high, part), 0, 1)
-            total += t * t * (3 - 2 * t)
-        return total / groups
+        row = dr.clip(mi.Int32(across), 0, rows - 2)
+        here = mi.UInt32(column * rows + row) * nodes + node
+
+        def at(index: Any) -> Any:
+            low = dr.gather(mi.Float, self.tables["means"], index)
+            high = dr.gather(mi.Float, self.tables["means"], index + rows * nodes)
+            return dr.lerp(low, high, turn - mi.Float(column))
+
+        return dr.lerp(at(here), at(here + nodes), across - mi.Float(row))
 
     def _total(self, seen: Any, wo: Any) -> Any:
         if self.law == "masked":

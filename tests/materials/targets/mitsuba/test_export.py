@@ -28,7 +28,8 @@ def test_it_writes_a_fabric_each_and_the_plugin(tmp_path):
     assert said["law"] == "projected"
     weight = sum(one["weight"] for one in said["nodes"])
     assert weight + said["gap"] == pytest.approx(1.0)
-    assert len(said["horizons"]) == (said["columns"] + 1) * len(said["nodes"]) * said["groups"]
+    shape = said["columns"] + 1, said["elevations"], len(said["nodes"])
+    assert len(said["means"]) == np.prod(shape)
     assert made[1].read_text() == export.PLUGIN.read_text()
     assert not notes
 
