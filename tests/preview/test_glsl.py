@@ -141,6 +141,8 @@ def test_the_shader_declares_all_tables_and_has_all_kernels():
         assert re.search(rf"^\w+ k_{kernel.__name__}\(", text, re.M)
     for law in LAWS:
         assert f"LAW == {law.upper()}" in text
+    # All horizons of groups are read by fours, the only way in which their texture can be read.
+    assert text.count("shadow_mean_at") == 2
     # Nodes are points: the error functions are those of the profile across a thread.
     assert len(re.findall(r"k_erf32\(", text)) == 5
 

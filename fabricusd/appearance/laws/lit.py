@@ -1,7 +1,7 @@
 """The mean of `g` at the nodes of level `far`, which laws with an absolute shadow multiply by.
 
-Means are held in a table by the light's azimuth and elevation, see `shadow.mean`, and read between four entries. Entries of all nodes lie side by side, so that LLVM vectorises the
-loop over them.
+Means are held in a table by the light's azimuth and elevation, see `shadow.mean`, and read between
+four entries. Entries of all nodes lie side by side, so that LLVM vectorises the loop over them.
 """
 
 from __future__ import annotations

@@ -77,7 +77,8 @@ def add_weight(R, tables, k, size, block, at=0):
 def divide(R, tables, wo, out, start, size, block):
     """Write the sums of a block, divided by the law's total, to out (3, n).
 
-    The value is 0 where either direction is not above the cloth.
+    The value is 0 where either direction is not above the cloth, and where the sum is below 0: see
+    `quadrature.shares`.
     """
     for x in range(size):
         k = index(start, x)
@@ -86,9 +87,9 @@ def divide(R, tables, wo, out, start, size, block):
         dark = min(block[UP_I + x], block[UP_O + x]) <= R(0) or q <= R(NOTHING)
         inverse = R(0) if dark else R(1) / q
         # The sums of dark entries may be NaN, so they are not multiplied by 0.
-        block[RED + x] = R(0) if dark else block[RED + x] * inverse
-        block[GREEN + x] = R(0) if dark else block[GREEN + x] * inverse
-        block[BLUE + x] = R(0) if dark else block[BLUE + x] * inverse
+        block[RED + x] = R(0) if dark or block[RED + x] < R(0) else block[RED + x] * inverse
+        block[GREEN + x] = R(0) if dark or block[GREEN + x] < R(0) else block[GREEN + x] * inverse
+        block[BLUE + x] = R(0) if dark or block[BLUE + x] < R(0) else block[BLUE + x] * inverse
     for c in range(3):
         for x in range(size):
             out[c, index(start, x)] = block[RED + c * BLOCK + x]

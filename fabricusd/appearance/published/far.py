@@ -93,7 +93,10 @@ def far_value(R, tables, ix, iy, iz, ox, oy, oz):
     if q <= R(NOTHING):
         return none, none, none
     inverse = R(1) / q
-    return red * inverse, green * inverse, blue * inverse
+    red = none if red < none else red * inverse
+    green = none if green < none else green * inverse
+    blue = none if blue < none else blue * inverse
+    return red, green, blue
 
 
 @njit(**KERNEL)

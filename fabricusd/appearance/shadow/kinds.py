@@ -23,11 +23,9 @@ class Shadow(NamedTuple):
     crest_height : (k,) real - height there, in run lengths
     table, kinds : of `horizon.Horizon`; a single zero and (0, 0) for the other methods
     texels : the same memory as a one-dimensional array
-    groups : (stretches, columns + 1, GROUPS) real - `mean.groups_of`, horizons in softnesses; one
-        entry for `none`
-    mean : (stretches, mean_columns + 1, mean_rows) real, flat - `mean.mean_table`; one entry for
-        `none`, and where all threads are `absolute`
-    mean_columns, mean_rows : int - its azimuths; its elevations
+    mean : (stretches, columns + 1, GROUPS) real, flat - `mean.groups_of`, horizons in softnesses;
+        one entry for `none`
+    mean_columns, groups : int - its azimuths; GROUPS
     mean_first, piece_first, piece_last, piece_scale : see `mean.Stretches`
     absolute : (k,) uint8 - whether threads of the type follow a law with an absolute shadow
     all_absolute : int - whether all do
@@ -42,10 +40,9 @@ class Shadow(NamedTuple):
     table: NDArray[np.uint8]
     kinds: NDArray[np.int32]
     texels: NDArray[np.uint8]
-    groups: NDArray[Any]
     mean: NDArray[Any]
     mean_columns: int
-    mean_rows: int
+    groups: int
     mean_first: NDArray[np.int32]
     piece_first: NDArray[np.int32]
     piece_last: NDArray[np.int32]

@@ -7,8 +7,8 @@ which a surface law may treat a shadow, `laws.Law.absolute`.
 Each linear piece of each thread type's curve is cut into stretches over which the tangent angle
 changes by no more than a quarter of the surface lobe's width. For each set that shows the type, the
 horizons of places of all its runs are sorted and put into groups of equal size, by azimuth: the
-mean of g is that over the groups. What a picture needs of it is put into tables by azimuth and
-elevation, which take a tenth of the time: see docs/decisions/025.
+mean of g is that over the groups. For the nodes of level `far` it is put into a table by azimuth
+and elevation: see docs/decisions/030.
 """
 
 from __future__ import annotations
@@ -20,12 +20,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fabricusd.appearance.laws.lit import AZIMUTHS, ROWS, column_of, mean_at, row_of
-from fabricusd.appearance.shadow.horizon_lookup import soft_edge
+from fabricusd.appearance.laws.lit import AZIMUTHS, ROWS, column_of
 from fabricusd.appearance.weave.coverage import WARP, WEFT
 from fabricusd.appearance.weave.curve import Pieces, pieces
 from fabricusd.appearance.weave.lookup import find_all, piece_of
-from fabricusd.appearance.weave.quadrature import CurveNodes
+from fabricusd.appearance.weave.quadrature import CurveNodes, shares
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE, asin, index
 
@@ -43,9 +42,6 @@ PLACES = 1 << 16
 GROUPS = 24
 """Groups of places that scatter alike: within .001 of the mean over all places. With 16, `far` is
 4 % off `weave` on flannel in the light of a sun at 5 degrees."""
-
-MEAN_AZIMUTHS, MEAN_ROWS = 64, 33
-"""Size of the table of stretches, by which `g` is divided."""
 
 LEAST_LIGHT = 0.1
 """Where a stretch's mean of g is below this, g is not divided by all of it: what a stretch in the
@@ -150,63 +146,36 @@ def groups_of(number: NDArray[np.int64], count: int, horizon: Floats) -> Floats:
     return found
 
 
-@njit(cache=True)
-def _fill(R, groups, weight, softness, out):
-    """Add the mean of g over groups of horizons to a table.
-
-    groups : (columns + 1, GROUPS) horizons in softnesses; weight : what the mean is multiplied by
-    softness : of the shadow's edge [rad]; out : (azimuths + 1, rows)
-    """
-    azimuths, rows = out.shape[0] - 1, out.shape[1]
-    columns, count = groups.shape[0] - 1, groups.shape[1]
-    share = weight / R(count)
-    horizon = np.empty(count)
-    for azimuth in range(azimuths + 1):
-        turn = azimuth * columns / azimuths
-        column = min(int(turn), columns - 1)
-        for k in range(count):
-            horizon[k] = groups[column, k]
-            horizon[k] += (groups[column + 1, k] - horizon[k]) * (turn - column)
-        for row in range(rows):
-            level = asin(R, (R(row) / R(rows - 1)) ** 2) / softness
-            total = R(0)
-            for k in range(count):
-                total += soft_edge(R, level - horizon[k], R(1))
-            out[azimuth, row] += share * total
-
-
-def mean_table(groups: Floats, softness: float) -> Floats:
-    """(n, MEAN_AZIMUTHS + 1, MEAN_ROWS) mean of g over n stretches.
-
-    groups : (n, columns + 1, GROUPS) of `groups_of`; softness : width of a shadow's edge [rad]
-    """
-    found = np.zeros((len(groups), MEAN_AZIMUTHS + 1, MEAN_ROWS))
-    for one, out in zip(groups, found, strict=True):
-        _fill(np.float64, one, 1.0, softness, out)
-    return found
+@njit(**INLINE)
+def level_of(R, z, softness):
+    """The light's elevation in softnesses, plus a half; z : sine of the elevation."""
+    return asin(R, z) / softness + R(0.5)
 
 
 @njit(**INLINE)
-def mean_entry(R, shadow, stretch, x, y, z):
-    """(entry of `Shadow.mean`, weights of the next column and of the next row) for light from
-    (x, y, z)."""
-    columns, rows = shadow.mean_columns, shadow.mean_rows
-    column, c = column_of(R, columns, x, y)
-    row, r = row_of(R, rows, z)
-    return (stretch * np.int32(columns + 1) + column) * np.int32(rows) + row, c, r
+def mean_over(R, horizons, groups, here, beside, c, level):
+    """Mean of g over the groups whose horizons begin at `here`, and at `beside` in the next
+    column.
 
-
-@njit(**INLINE)
-def mean_from(R, shadow, entry, c, r):
-    """Mean of g from what `mean_entry` found."""
-    return mean_at(R, shadow.mean, entry, index(entry, shadow.mean_rows), 1, c, r)
+    groups : GROUPS, read from memory: LLVM would unroll a loop of known length, not vectorise it
+    """
+    total = R(0)
+    for k in range(groups):
+        horizon = horizons[index(here, k)]
+        horizon += (horizons[index(beside, k)] - horizon) * c
+        t = max(R(0), min(R(1), level - horizon))
+        total += t * t * (R(3) - R(2) * t)
+    return total * R(1.0 / GROUPS)
 
 
 @njit(**INLINE)
 def mean_of(R, shadow, stretch, x, y, z):
     """Mean of g over a stretch, for light from (x, y, z) above the cloth."""
-    entry, c, r = mean_entry(R, shadow, stretch, x, y, z)
-    return mean_from(R, shadow, np.uintp(entry), c, r)
+    columns = shadow.mean_columns
+    column, c = column_of(R, columns, x, y)
+    begin = (np.int64(stretch) * (columns + 1) + column) * GROUPS
+    level = level_of(R, z, shadow.softness)
+    return mean_over(R, shadow.mean, shadow.groups, begin, begin + GROUPS, c, level)
 
 
 @njit(**INLINE)
@@ -216,15 +185,36 @@ def relative(R, g, mean):
     return g * scale + (R(1) - mean * scale)
 
 
-def node_means(shadow: Any, nodes: CurveNodes, fabric: Fabric) -> Floats | None:
-    """(AZIMUTHS + 1, ROWS, q) mean of g over what each of q nodes stands for; None without a
-    shadow.
+@njit(cache=True)
+def _fill(R, groups, softness, out):
+    """The mean of g over groups of horizons, by azimuth and elevation.
 
-    shadow : the `Shadow` of `fabric`. A node stands for as much of its curve as its weight says.
+    groups : (columns + 1, GROUPS) horizons in softnesses; softness : width of a shadow's edge [rad]
+    out : (azimuths + 1, rows), elevations even in the root of their sine
+    """
+    azimuths, rows = out.shape[0] - 1, out.shape[1]
+    columns, count = groups.shape[0] - 1, groups.shape[1]
+    for azimuth in range(azimuths + 1):
+        turn = azimuth * columns / azimuths
+        column = min(int(turn), columns - 1)
+        here = groups.reshape(-1)
+        for row in range(rows):
+            level = level_of(R, (R(row) / R(rows - 1)) ** 2, softness)
+            begin = column * count
+            out[azimuth, row] = mean_over(
+                R, here, count, begin, begin + count, turn - column, level
+            )
+
+
+def node_means(shadow: Any, nodes: CurveNodes, fabric: Fabric) -> Floats | None:
+    """(AZIMUTHS + 1, ROWS, q) mean of g that each of q nodes takes; None without a shadow.
+
+    shadow : the `Shadow` of `fabric`. See `quadrature.shares`: the sum over nodes of what scatters
+    times this mean is the integral of their product.
     """
     if shadow.method == 0:
         return None
-    softness = float(shadow.softness)
+    groups, softness = _groups(shadow), float(shadow.softness)
     found = np.zeros((len(nodes.psi0), AZIMUTHS + 1, ROWS))
     for which in (WEFT, WARP):
         mine = np.arange(len(nodes.psi0)) >= nodes.warp_start
@@ -233,16 +223,14 @@ def node_means(shadow: Any, nodes: CurveNodes, fabric: Fabric) -> Floats | None:
             here = np.flatnonzero(mine & (nodes.thread == kind))
             if not len(here):
                 continue
-            weight = nodes.weight[here]
-            ends = np.concatenate(((0.0,), np.cumsum(weight) / weight.sum()))
             cuts = _cuts(pieces(thread.curve), shadow.piece_last[kind] + 1)
             first = int(shadow.mean_first[which, kind])
-            rows = shadow.groups[first : first + len(cuts) - 1]
-            for node, low, high in zip(here, ends[:-1], ends[1:], strict=True):
-                shared = np.minimum(cuts[1:], high) - np.maximum(cuts[:-1], low)
-                on = np.flatnonzero(shared > 1e-12)
-                for row, part in zip(rows[on], shared[on] / shared[on].sum(), strict=True):
-                    _fill(np.float64, row, part, softness, found[node])
+            part = shares(nodes, here, cuts)
+            for stretch in np.flatnonzero(part.any(axis=0)):
+                table = np.empty(found.shape[1:])
+                _fill(np.float64, groups[first + stretch], softness, table)
+                for node in np.flatnonzero(part[:, stretch]):
+                    found[here[node]] += part[node, stretch] * table
     return np.ascontiguousarray(np.moveaxis(found, 0, -1))
 
 
@@ -263,7 +251,7 @@ def angle_groups(shadow: Any, fabric: Fabric, which: int, kind: int, psi0: Float
     high = np.concatenate([np.maximum(e[:-1], e[1:]) for e in ends])
     piece = np.repeat(np.arange(len(counts)), counts)
     first = int(shadow.mean_first[which, kind])
-    rows = shadow.groups[first : first + len(length)]
+    rows = _groups(shadow)[first : first + len(length)]
     found = np.empty((rows.shape[1], len(psi0), GROUPS))
     for k, angle in enumerate(psi0):
         away = np.maximum(np.maximum(low - angle, angle - high), 0.0)
@@ -274,22 +262,9 @@ def angle_groups(shadow: Any, fabric: Fabric, which: int, kind: int, psi0: Float
     return found
 
 
-@njit(**INLINE)
-def mean_over(R, groups, shape, number, x, y, z, softness):
-    """Mean of g over row `number` of `angle_groups`, for light from (x, y, z).
-
-    groups : flat; shape : of `angle_groups`; softness : width of a shadow's edge [rad]
-    """
-    column, c = column_of(R, shape[0] - 1, x, y)
-    begin = (column * shape[1] + number) * shape[2]
-    step = shape[1] * shape[2]
-    level = asin(R, z) / softness
-    total = R(0)
-    for k in range(shape[2]):
-        horizon = groups[begin + k]
-        horizon += (groups[begin + step + k] - horizon) * c
-        total += soft_edge(R, level - horizon, R(1))
-    return total / R(shape[2])
+def _groups(shadow: Any) -> Floats:
+    """(stretches, columns + 1, GROUPS) `Shadow.mean`."""
+    return np.asarray(shadow.mean, np.float64).reshape(-1, shadow.mean_columns + 1, GROUPS)
 
 
 def _cuts(p: Pieces, counts: NDArray[np.int32]) -> Floats:

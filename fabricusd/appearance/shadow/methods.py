@@ -26,6 +26,7 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from fabricusd.appearance.laws import law_of
+from fabricusd.appearance.laws.lit import column_of
 from fabricusd.appearance.scattering.model import PUBLISHED
 from fabricusd.appearance.scattering.models import model_of
 from fabricusd.appearance.shadow.crests import to_crest
@@ -58,13 +59,11 @@ from fabricusd.appearance.shadow.kinds import (
     Shadow,
 )
 from fabricusd.appearance.shadow.mean import (
-    MEAN_AZIMUTHS,
-    MEAN_ROWS,
+    GROUPS,
     groups_of,
-    mean_entry,
-    mean_from,
+    level_of,
     mean_of,
-    mean_table,
+    mean_over,
     places_on,
     relative,
     stretch_in,
@@ -158,10 +157,9 @@ def compile_shadow(
         table=table,
         kinds=kinds,
         texels=table.reshape(-1),
-        groups=np.zeros((1, 1, 1)),
         mean=np.ones(1),
-        mean_columns=MEAN_AZIMUTHS,
-        mean_rows=MEAN_ROWS,
+        mean_columns=_COLUMNS[METHODS.index(method)],
+        groups=GROUPS,
         mean_first=cut.first,
         piece_first=cut.piece_first,
         piece_last=cut.piece_last,
@@ -170,11 +168,7 @@ def compile_shadow(
         all_absolute=int(_absolute(fabric).all()),
     )
     if double.method != NONE:
-        groups = _groups(fabric, cloth, double, cut.total)
-        double = double._replace(groups=groups)
-        if not double.all_absolute:
-            mean = mean_table(groups, float(double.softness))
-            double = double._replace(mean=mean.reshape(-1))
+        double = double._replace(mean=_mean(fabric, cloth, double, cut.total))
     return Shadow(*(_in_precision(value, precision) for value in double))
 
 
@@ -198,14 +192,14 @@ def _in_precision(value: Any, precision: type[np.floating[Any]]) -> Any:
     return precision(value) if isinstance(value, np.float64) else value
 
 
-def _groups(fabric: Fabric, cloth: CompiledFabric, shadow: Shadow, count: int) -> NDArray[Any]:
-    """`Shadow.groups`; shadow : the fields that `stretch_of` and the methods read, in float64."""
+def _mean(fabric: Fabric, cloth: CompiledFabric, shadow: Shadow, count: int) -> NDArray[Any]:
+    """`Shadow.mean`; shadow : the other fields, in float64."""
     traced = shadow.method == TRACED
-    columns = _COLUMNS[shadow.method]
+    columns = shadow.mean_columns
     each = FEWER_PLACES if traced else MEAN_PLACES
     uv, number = places_on(cloth, shape_repeat(fabric), shadow, count, each)
     sine = horizons_towards(cloth, shadow, uv, diamond_directions(columns))
-    return groups_of(number, count, np.arcsin(sine) / float(shadow.softness))
+    return groups_of(number, count, np.arcsin(sine) / float(shadow.softness)).reshape(-1)
 
 
 @njit(**INLINE)
@@ -302,6 +296,7 @@ def mean_block(R, cloth, shadow, wi, begin, size, ints, reals):
     """
     if shadow.all_absolute != 0:
         return
+    columns = np.int32(shadow.mean_columns)
     for k in range(size):
         # In gaps and for NaN the stretch is arbitrary: the result is not used.
         which, s = np.uintp(min(ints[OF_SET + k], 1)), reals[S + k]
@@ -310,14 +305,15 @@ def mean_block(R, cloth, shadow, wi, begin, size, ints, reals):
         ints[SECOND + k] = ints[FREE + k] | np.int32(shadow.absolute[thread])
     for k in range(size):
         m = index(begin, k)
-        x, y, z = wi[0, m], wi[1, m], wi[2, m]
-        entry, c, r = mean_entry(R, shadow, ints[FIRST + k], x, y, z)
-        ints[FIRST + k] = entry
-        reals[SHARES + k], reals[SHARES + BLOCK + k] = c, r
-        ints[SECOND + k] = ints[SECOND + k] | np.int32(z <= R(0))
+        column, c = column_of(R, columns, wi[0, m], wi[1, m])
+        reals[SHARES + k] = c
+        reals[SHARES + BLOCK + k] = level_of(R, wi[2, m], shadow.softness)
+        ints[FIRST + k] = (ints[FIRST + k] * (columns + 1) + column) * GROUPS
+        ints[SECOND + k] = ints[SECOND + k] | np.int32(wi[2, m] <= R(0))
     for k in range(size):
-        c, r = reals[SHARES + k], reals[SHARES + BLOCK + k]
-        mean = mean_from(R, shadow, np.uintp(ints[FIRST + k]), c, r)
+        first = np.uintp(ints[FIRST + k])
+        c, level = reals[SHARES + k], reals[SHARES + BLOCK + k]
+        mean = mean_over(R, shadow.mean, shadow.groups, first, first + np.uintp(GROUPS), c, level)
         g = reals[LIT + k]
         reals[LIT + k] = g if ints[SECOND + k] != 0 else relative(R, g, mean)
 

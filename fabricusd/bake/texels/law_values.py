@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from fabricusd.appearance.fuzz import Fuzz, fuzz_over_all
 from fabricusd.appearance.law import PUBLISHED_ONLY, SurfaceLaw, law_value, surface_law
 from fabricusd.appearance.laws import law_of
+from fabricusd.appearance.laws.lit import column_of
 from fabricusd.appearance.levels import WEAVE
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.shadow.kinds import Shadow
-from fabricusd.appearance.shadow.mean import angle_groups, mean_over
+from fabricusd.appearance.shadow.mean import angle_groups, level_of, mean_over
 from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.surface import evaluate, fuzz_of, places_of, points_all
 from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
@@ -169,10 +170,14 @@ def _hold_back(R, horizons, shape, softness, number, wi, out):  # type: ignore[n
 
     horizons : of `angle_groups`, flat; shape : (columns + 1, angles, groups)
     """
+    columns, step, groups = shape[0] - 1, shape[1] * shape[2], shape[2]
     for k in prange(out.shape[1]):
         if wi[2, k] <= R(0):
             continue
-        g = mean_over(R, horizons, shape, number[k], wi[0, k], wi[1, k], wi[2, k], softness)
+        column, c = column_of(R, columns, wi[0, k], wi[1, k])
+        here = column * step + number[k] * groups
+        level = level_of(R, wi[2, k], softness)
+        g = mean_over(R, horizons, groups, here, here + step, c, level)
         for channel in range(3):
             out[channel, k] *= g
 

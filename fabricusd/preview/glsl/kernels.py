@@ -12,6 +12,7 @@ from fabricusd.appearance.fuzz import fuzz_over
 from fabricusd.appearance.published.far import far_value
 from fabricusd.appearance.published.levels import point_value
 from fabricusd.appearance.shadow.horizon_lookup import entry_at
+from fabricusd.appearance.shadow.mean import mean_over
 from fabricusd.appearance.shadow.methods import shade
 from fabricusd.appearance.weave.lookup import split, thread_at
 from fabricusd.appearance.weave.place import Hit, Place
@@ -52,6 +53,7 @@ def shader() -> str:
     """The GLSL of all kernels that the page needs."""
     special: dict[int, Any] = {
         id(split): _split, id(entry_at): _entry, id(real._unless_nan): _nan,
+        id(mean_over): _mean, id(mean_over.py_func): _mean,
     }  # fmt: skip
     for name in FACES:
         single = real._atan2_32 if name == "atan2" else getattr(real, f"_{name}32")
@@ -86,6 +88,12 @@ def _precise(single: Any) -> Any:
 def _nan(translation: Translation, arguments: list[Value]) -> Value:
     """Directions on the page are finite."""
     return arguments[1]
+
+
+def _mean(translation: Translation, arguments: list[Value]) -> Value:
+    _, table, _, here, beside, c, level = arguments
+    given = ", ".join(a.code for a in (here, beside, c, level))
+    return Value(f"mean_of_groups({table.type.name}_at, {given})", FLOAT)
 
 
 def _split(translation: Translation, arguments: list[Value]) -> Value:

@@ -118,6 +118,7 @@ export class Card {
       floats: this.upload(this.floats, gl.R32F, gl.RED, gl.FLOAT),
       ints: this.upload(decode(fabric.ints), gl.R32I, gl.RED_INTEGER, gl.INT),
       bytes: this.upload(decode(fabric.bytes), gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE),
+      quads: this.upload(decode(fabric.quads), gl.RGBA32F, gl.RGBA, gl.FLOAT, 4),
     };
     this.blocks = [decode(fabric.shapes), decode(fabric.numbers)].map(data => {
       const buffer = gl.createBuffer();
@@ -146,7 +147,7 @@ export class Card {
 
   useFabric(program) {
     const gl = this.gl;
-    ['floats', 'ints', 'bytes'].forEach((name, k) => this.bind(program, name, 9 + k, this.tables[name]));
+    ['floats', 'ints', 'bytes', 'quads'].forEach((name, k) => this.bind(program, name, 9 + k, this.tables[name]));
     ['Shapes', 'Numbers'].forEach((name, k) => {
       const index = gl.getUniformBlockIndex(program, name);
       if (index === gl.INVALID_INDEX) return;

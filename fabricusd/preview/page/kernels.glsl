@@ -6,11 +6,24 @@ ivec4 split_cell; vec2 split_place; ivec2 split_entry;
 uniform sampler2D floats;
 uniform highp isampler2D ints;
 uniform highp usampler2D bytes;
+uniform sampler2D quads;
 layout(std140) uniform Shapes { ivec4 shapes[74]; };
 layout(std140) uniform Numbers { vec4 numbers[16]; };
 float F(int k) { return texelFetch(floats, ivec2(k & 2047, k >> 11), 0).r; }
 int I(int k) { return texelFetch(ints, ivec2(k & 2047, k >> 11), 0).r; }
 int B(int k) { return int(texelFetch(bytes, ivec2(k & 2047, k >> 11), 0).r); }
+// `shadow.mean.mean_over`, by four groups at a time.
+float mean_of_groups(int at, int here, int beside, float c, float level) {
+  float total = 0.0;
+  for (int k = 0; k < 6; ++k) {
+    int i = at + (here >> 2) + k, j = at + (beside >> 2) + k;
+    vec4 a = texelFetch(quads, ivec2(i & 2047, i >> 11), 0);
+    vec4 b = texelFetch(quads, ivec2(j & 2047, j >> 11), 0);
+    vec4 t = clamp(level - (a + (b - a) * c), 0.0, 1.0);
+    total += dot(t * t * (3.0 - 2.0 * t), vec4(1.0));
+  }
+  return total * 0.041666666666666664;
+}
 #define published_threads_at shapes[0].x
 #define published_threads_n0 shapes[0].y
 #define published_threads_n1 shapes[0].z
@@ -129,7 +142,7 @@ int B(int k) { return int(texelFetch(bytes, ivec2(k & 2047, k >> 11), 0).r); }
 #define cloth_tiny numbers[11].x
 #define shadow_softness numbers[12].x
 #define shadow_mean_columns int(numbers[13].x)
-#define shadow_mean_rows int(numbers[14].x)
+#define shadow_groups int(numbers[14].x)
 #define fuzz_depth numbers[15].x
 
 struct Place { int thread_set_; int thread_; float psi0_; float w_; float shade_; };
@@ -727,7 +740,10 @@ T_fff k_far_value(float ix, float iy, float iz, float ox, float oy, float oz) {
     return T_fff(0.0, 0.0, 0.0);
   }
   inverse = (1.0 / q);
-  return T_fff((red * inverse), (green * inverse), (blue * inverse));
+  red = mix((red * inverse), 0.0, (red < 0.0));
+  green = mix((green * inverse), 0.0, (green < 0.0));
+  blue = mix((blue * inverse), 0.0, (blue < 0.0));
+  return T_fff(red, green, blue);
 }
 
 float k_normalization(float ix, float iy, float iz, float ox, float oy, float oz) {
@@ -1720,52 +1736,24 @@ int k_stretch_of(int which, int thread, float s) {
   return k_stretch_in(which, thread, k_piece_of(thread, s), s);
 }
 
-struct T_iff { int m0_; float m1_; float m2_; };
-
-T_iff k_mean_entry(int stretch, float x, float y, float z) {
-  int columns;
-  int rows;
-  T_if t1;
-  int column;
-  float c;
-  T_if t2;
-  int row;
-  float r;
-  columns = shadow_mean_columns;
-  rows = shadow_mean_rows;
-  t1 = k_column_of(columns, x, y);
-  column = t1.m0_;
-  c = t1.m1_;
-  t2 = k_row_of(rows, z);
-  row = t2.m0_;
-  r = t2.m1_;
-  return T_iff(((((stretch * (columns + 1)) + column) * rows) + row), c, r);
-}
-
-float k_mean_at_1(int here, int beside, int step_, float c, float r) {
-  float low;
-  float high;
-  low = F(shadow_mean_at + here);
-  low = (low + ((F(shadow_mean_at + beside) - low) * c));
-  high = F(shadow_mean_at + (here + step_));
-  high = (high + ((F(shadow_mean_at + (beside + step_)) - high) * c));
-  return (low + ((high - low) * r));
-}
-
-float k_mean_from(int entry, float c, float r) {
-  return k_mean_at_1(entry, (entry + shadow_mean_rows), 1, c, r);
+float k_level_of(float z, float softness) {
+  return ((k_asin32(z) / softness) + 0.5);
 }
 
 float k_mean_of(int stretch, float x, float y, float z) {
-  T_iff t1;
-  int entry;
+  int columns;
+  T_if t1;
+  int column;
   float c;
-  float r;
-  t1 = k_mean_entry(stretch, x, y, z);
-  entry = t1.m0_;
+  int begin;
+  float level;
+  columns = shadow_mean_columns;
+  t1 = k_column_of(columns, x, y);
+  column = t1.m0_;
   c = t1.m1_;
-  r = t1.m2_;
-  return k_mean_from(entry, c, r);
+  begin = (((stretch * (columns + 1)) + column) * 24);
+  level = k_level_of(z, shadow_softness);
+  return mean_of_groups(shadow_mean_at, begin, (begin + 24), c, level);
 }
 
 float k_mean_lit(Hit hit, float x, float y, float z) {

@@ -19,7 +19,7 @@ from fabricusd.appearance.weave.compiled import compile_fabric, true_repeat
 from fabricusd.appearance.weave.coverage import WARP, WEFT
 from fabricusd.appearance.weave.quadrature import default_rule
 from fabricusd.fabric import Fabric
-from fabricusd.preview.glsl.tables import BYTE, NUMBERS, TABLES
+from fabricusd.preview.glsl.tables import BYTE, NUMBERS, QUAD, TABLES
 from fabricusd.preview.glsl.values import FLOAT, INT
 from fabricusd.preview.page.arrays import array
 
@@ -29,7 +29,7 @@ REAL: Any = np.float32
 def fabric_tables(fabric: Fabric) -> tuple[dict[str, Any], dict[str, Any]]:
     """(tables, where the page finds the threads' rows)."""
     groups = _groups(fabric)
-    flat: dict[str, list[NDArray[Any]]] = {FLOAT: [], INT: [], BYTE: []}
+    flat: dict[str, list[NDArray[Any]]] = {FLOAT: [], INT: [], BYTE: [], QUAD: []}
     used = dict.fromkeys(flat, 0)
     shapes = np.zeros((2 * len(TABLES), 4), np.int32)
     starts: dict[str, int] = {}
@@ -37,14 +37,19 @@ def fabric_tables(fabric: Fabric) -> tuple[dict[str, Any], dict[str, Any]]:
         found = _field(groups, name)
         values = np.zeros((0,) * dimensions) if found is None else np.asarray(found)
         starts[name] = used[kind]
-        row = [used[kind], *values.shape]
+        if name == "shadow.mean" and groups["shadow"].all_absolute:
+            # It is not read, and would be half of what the page loads.
+            values = np.zeros(0)
+        row = [used[kind] // (4 if kind == QUAD else 1), *values.shape]
         shapes[2 * k : 2 * k + 2].reshape(-1)[: len(row)] = row
         flat[kind].append(values.reshape(-1))
         used[kind] += values.size
     numbers = np.zeros((len(NUMBERS), 4), np.float32)
     for k, name in enumerate(NUMBERS):
         numbers[k, 0] = _field(groups, name) or 0
-    kinds = {FLOAT: ("floats", "f4"), INT: ("ints", "i4"), BYTE: ("bytes", "u1")}
+    kinds = {
+        FLOAT: ("floats", "f4"), INT: ("ints", "i4"), BYTE: ("bytes", "u1"), QUAD: ("quads", "f4")
+    }  # fmt: skip
     arrays = {name: array(np.concatenate(flat[kind]), code) for kind, (name, code) in kinds.items()}
     lengths = groups["cloth"].sequence_length
     tables = {

@@ -59,7 +59,7 @@ class Cloth:
                 total += p * (surface + volume * mi.Color3f(thread["albedo"]))
         q = self._total(seen, wo)
         above = (wi.z > 0) & (wo.z > 0) & (q > NOTHING)
-        return dr.select(above, total / dr.maximum(q, NOTHING), 0)
+        return dr.select(above, dr.maximum(total, 0) / dr.maximum(q, NOTHING), 0)
 
     def openness(self, wo: Any) -> Any:
         """Return the share of a view that passes between the threads."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 
 import pytest
@@ -29,7 +30,7 @@ def test_it_writes_a_fabric_each_and_the_plugin(tmp_path):
     weight = sum(one["weight"] for one in said["nodes"])
     assert weight + said["gap"] == pytest.approx(1.0)
     shape = said["columns"] + 1, said["elevations"], len(said["nodes"])
-    assert len(said["means"]) == np.prod(shape)
+    assert len(said["means"]) == math.prod(shape)
     assert made[1].read_text() == export.PLUGIN.read_text()
     assert not notes
 

@@ -1,0 +1,65 @@
+"""Speed of level `far` with and without the mean shadow, in one run.
+
+    python bench/model/bench_far.py [--presets NAME ...] [--pairs N] [--repeats N]
+
+Pairs of directions above the cloth, in float32, on one worker: millions a second, the medians of
+alternating runs, and the share that is left with the shadow.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabricusd.appearance.published.far import far_values
+from fabricusd.appearance.published.tables import surface_tables
+from fabricusd.appearance.shadow.methods import compile_shadow
+from fabricusd.schema import load
+
+PRESETS = ("polyester_satin_charmeuse", "linen_plain", "silk_shot", "wool_flannel")
+REAL: Any = np.float32
+
+
+def directions(count: int, rng: np.random.Generator) -> NDArray[np.float32]:
+    """(3, count) directions that are even over the half sphere."""
+    z, turn = rng.random(count), 2.0 * np.pi * rng.random(count)
+    flat = np.sqrt(1.0 - z * z)
+    return np.ascontiguousarray(np.stack((flat * np.cos(turn), flat * np.sin(turn), z)), REAL)
+
+
+def main() -> None:
+    """Print a row for each preset."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--presets", nargs="+", default=PRESETS)
+    parser.add_argument("--pairs", type=int, default=1 << 15)
+    parser.add_argument("--repeats", type=int, default=9)
+    options = parser.parse_args()
+    rng = np.random.default_rng(0)
+    wi, wo = directions(options.pairs, rng), directions(options.pairs, rng)
+    out = np.zeros((3, options.pairs), REAL)
+    print("| preset | nodes | without shadow | with it | ratio |\n|---|---|---|---|---|")
+    for name in options.presets:
+        fabric = load(name)
+        shadow = compile_shadow(fabric, "horizon", precision=np.float64)
+        tables: list[Any] = [
+            surface_tables(fabric, precision=REAL, shadow=s) for s in (None, shadow)
+        ]
+        times: list[list[float]] = [[], []]
+        for _ in range(options.repeats + 1):
+            for one, taken in zip(tables, times, strict=True):
+                start = time.perf_counter()
+                far_values(REAL, one, wi, wo, out, 0, options.pairs)
+                taken.append(time.perf_counter() - start)
+        # The first of each compiles.
+        open_, held = (options.pairs / statistics.median(t[1:]) / 1e6 for t in times)
+        nodes = len(tables[0].nodes)
+        print(f"| {name} | {nodes} | {open_:.1f} | {held:.1f} | {held / open_:.2f} |")
+
+
+if __name__ == "__main__":
+    main()
