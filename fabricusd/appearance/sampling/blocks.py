@@ -209,6 +209,24 @@ def _choose(R, even, shares, count, u0, block, x):
     return k
 
 
+@njit(**PART)
+def _choose_all(R, even, count, size, block):
+    """`_choose` out of all lobes for the numbers in the row _U1, into the row _LOBE.
+
+    A loop over hits for each lobe: shares are at least 0, so a lobe that is passed stays passed.
+    """
+    for x in range(size):
+        left = block[_U1 + x] - even
+        block[_U2 + x] = left
+        block[_LOBE + x] = R(-1) if left < R(0) or count == 0 else R(0)
+    for k in range(count - 1):
+        shares = block[_SHARES + k * BLOCK :]
+        for x in range(size):
+            left = block[_U2 + x] - shares[x]
+            block[_U2 + x] = left
+            block[_LOBE + x] += R(1) if left >= R(0) else R(0)
+
+
 @njit(**INLINE)
 def _choose_side(R, mixture, lobe, lobes, u0, block, x):
     """Write the number and the side of lobe `lobe` out of `lobes` of each side and the cosine
@@ -329,8 +347,11 @@ def _sample_far(R, both, sampling, wo, wi, numbers, drawn, first, n, block, mixe
         _find_views(R, size, block)
         _read_shares(R, sampling.shares, size, block, mixed)
         for x in range(size):
+            block[_U1 + x] = u0[first + start + x]
+        _choose_all(R, sampling.even, count, size, block)
+        for x in range(size):
             h = first + start + x
-            k = _choose(R, sampling.even, _SHARES, count, u0[h], block, x)
+            k = int(block[_LOBE + x])
             block[_U1 + x], block[_U2 + x] = u1[h], u2[h]
             if both:
                 k = _choose_side(R, sampling, k, lobes, u0[h], block, x)
@@ -368,8 +389,9 @@ def _add_stretch(R, both, row, shares, others, size, block):
         _choose_shares(R, shares, others, _IZ, _OURS, size, block)
         _choose_shares(R, shares, others, _GZ, _OTHERS, size, block)
     else:
+        ours, chosen = block[shares:], block[_OURS:]
         for x in range(THREAD_LOBES * BLOCK):
-            block[_OURS + x] = block[shares + x]
+            chosen[x] = ours[x]
     of_go = _OTHERS if both else _OURS
     for x in range(size):
         theta_o, _, _ = _viewer(R, stretch, block, x)
@@ -386,10 +408,13 @@ def _add_stretch(R, both, row, shares, others, size, block):
 @njit(**INLINE)
 def _choose_shares(R, shares, others, z, into, size, block):
     """Copy a stretch's shares on the side of the direction whose N.w is in row z."""
+    up = block[z:]
     for lobe in range(THREAD_LOBES):
+        at = lobe * BLOCK
+        own, other, chosen = block[shares + at :], block[others + at :], block[into + at :]
         for x in range(size):
-            own, other = block[shares + lobe * BLOCK + x], block[others + lobe * BLOCK + x]
-            block[into + lobe * BLOCK + x] = own if block[z + x] > R(0) else other
+            ours, its = own[x], other[x]
+            chosen[x] = ours if up[x] > R(0) else its
 
 
 @njit(**KERNEL)
