@@ -26,7 +26,7 @@ from fabricusd.appearance.weave.curve import Pieces, pieces
 from fabricusd.appearance.weave.lookup import find_all, piece_of
 from fabricusd.appearance.weave.quadrature import CurveNodes, shares
 from fabricusd.fabric import Fabric
-from fabricusd.kernels.real import INLINE, asin, index
+from fabricusd.kernels.real import INLINE, KERNEL, asin, index
 
 Floats = NDArray[np.float64]
 
@@ -185,8 +185,8 @@ def relative(R, g, mean):
     return g * scale + (R(1) - mean * scale)
 
 
-@njit(cache=True)
-def _fill(R, groups, softness, out):
+@njit(**KERNEL)
+def fill_means(R, groups, softness, out):
     """The mean of g over groups of horizons, by azimuth and elevation.
 
     groups : (columns + 1, GROUPS) horizons in softnesses; softness : width of a shadow's edge [rad]
@@ -228,7 +228,7 @@ def node_means(shadow: Any, nodes: CurveNodes, fabric: Fabric) -> Floats | None:
             part = shares(nodes, here, cuts)
             for stretch in np.flatnonzero(part.any(axis=0)):
                 table = np.empty(found.shape[1:])
-                _fill(np.float64, groups[first + stretch], softness, table)
+                fill_means(np.float64, groups[first + stretch], softness, table)
                 for node in np.flatnonzero(part[:, stretch]):
                     found[here[node]] += part[node, stretch] * table
     return np.ascontiguousarray(np.moveaxis(found, 0, -1))

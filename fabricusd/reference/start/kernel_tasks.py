@@ -20,6 +20,7 @@ from fabricusd.appearance.sampling.blocks import Drawn, sample_points
 from fabricusd.appearance.sampling.fit import no_mixture
 from fabricusd.appearance.scattering.models import any_conserving
 from fabricusd.appearance.shadow.kinds import Shadow
+from fabricusd.appearance.shadow.mean import GROUPS, fill_means
 from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.place import Places
@@ -188,6 +189,10 @@ def _shadow_table() -> None:
     compile_shadow(Fabric(), "horizon", azimuths=16, texels=2)
 
 
+def _mean_table() -> None:
+    fill_means(np.float64, np.zeros((2, GROUPS)), 1.0, np.zeros((2, 2)))
+
+
 def _look_up() -> None:
     look_up(R, *_woven(), R(1), _sample().wave.hits.rows, 0, _points())
 
@@ -251,7 +256,7 @@ TASKS: dict[str, tuple[Callable[[], None], ...]] = {
         _trace_and_settle, _shade_preview, _depart, _camera_rays, _arrive, _prepare,
     ),
     MASKED: (_shade_far, _share_lobes),
-    PROJECTED: (_shadow_table, _share_lobes_projected, _shade_far_projected),
+    PROJECTED: (_shadow_table, _mean_table, _share_lobes_projected, _shade_far_projected),
     CLOSE_UPS: (
         _sample_points, _look_up_uneven, _shadows, _finish_point, _look_up, _shadow_table,
     ),
