@@ -129,5 +129,5 @@ def test_the_back_is_as_the_front(mi, cloth):
 def test_another_file_is_refused(mi, tmp_path):
     path = tmp_path / "other.json"
     path.write_text("{}")
-    with pytest.raises(Exception, match="is no fabric of version 2"):
+    with pytest.raises(Exception, match="is no fabric of version 3"):
         plugin(mi, path)
