@@ -878,10 +878,8 @@ T_iiff k_cell(int rows, int columns, float x, float y, float z) {
   t = (k_asin32((k_acos32(z) * 0.6366197723675814)) * 0.6366197723675814);
   i = (t * float((rows - 1)));
   j = (k_atan2_32(y, x) * (float(columns) / 6.283185307179586));
-  if ((j < 0.0)) {
-    j = (j + float(columns));
-  }
-  row = min(int(i), (rows - 2));
+  j = mix(j, (j + float(columns)), (j < 0.0));
+  row = int(min(i, float((rows - 2))));
   column = int(j);
   return T_iiff(row, column, (i - float(row)), (j - float(column)));
 }
