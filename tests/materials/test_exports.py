@@ -12,6 +12,9 @@ import OpenImageIO as oiio
 import pytest
 from pxr import Usd, UsdGeom, UsdShade, UsdUtils
 
+from fabricusd.appearance.shadow.mean import node_means
+from fabricusd.appearance.shadow.methods import compile_shadow
+from fabricusd.appearance.weave.quadrature import curve_nodes
 from fabricusd.cli.main import main
 from fabricusd.errors import FabricError
 from fabricusd.materials.materials import write_materials
@@ -88,6 +91,19 @@ def test_the_shader_carries_the_fabric_as_its_defaults(packed):
 def test_a_model_that_the_shader_lacks_is_refused():
     with pytest.raises(FabricError, match="'microcylinder'"):
         osl_source(replace(load("linen_plain"), model="thesis"))
+
+
+def test_osl_has_the_law_s_mean_shadow_at_directions_that_it_keeps():
+    fabric = load("linen_plain")
+    said = osl_source(fabric)
+    (numbers,) = re.findall(r"float means\[\d+\] = \{(.*?)\}", said)
+    shadow = compile_shadow(fabric, "horizon", precision=np.float64)
+    nodes = curve_nodes(fabric)
+    whole = node_means(shadow, nodes, fabric)
+    kept = np.array(numbers.split(","), float).reshape(17, 17, len(nodes.psi0))
+    assert "int columns = 16," in said
+    assert "int elevations = 17," in said
+    assert np.allclose(kept, whole[::16, ::6], rtol=1e-3, atol=1e-5)
 
 
 # The keys that version 1.1 of the schema requires of a side, and nothing else is allowed.

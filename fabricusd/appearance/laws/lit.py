@@ -18,8 +18,8 @@ from fabricusd.kernels.real import INLINE, index
 
 AZIMUTHS, ROWS = 256, 97
 """Azimuths and elevations of the table of the nodes; elevations are even in the root of their sine.
-With half of either, `far` is off `weave` by .02 to .04 in the light of a low sun, see
-docs/shadowing.md."""
+With 128 azimuths, or 64 elevations even in the sine, `far` is off `weave` by .02 to .04 in the
+light of a low sun, see docs/decisions/030."""
 
 LIGHT_FIELDS = ("means", "columns", "lit_rows", "lit_nodes")
 """Fields of the tables of a law that uses `lit`.
