@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import hashlib
 import io
+import math
 import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -32,6 +34,10 @@ MOST_BYTES = 1 << 30
 
 KEPT_SECONDS = 24 * 3600.0
 """An entry used within this time is not removed to make room: a running process may need it."""
+
+PRUNED_EVERY = 60.0
+"""Seconds for which a process that creates entries does not count them again: each has to be
+looked at, and there may be thousands."""
 
 _USED = ".used"
 """File in each entry; its modification time says when the entry was last asked for."""
@@ -72,11 +78,12 @@ def root() -> Path:
 def cache_folder(kind: str, key: str) -> Path:
     """The folder of an entry, created if necessary and marked as used now.
 
-    Before it creates an entry, old entries are removed to keep the cache below MOST_BYTES.
+    Before it creates an entry, old entries are removed to keep the cache below MOST_BYTES, at most
+    every PRUNED_EVERY seconds.
     """
     folder = root() / kind / key
     if not folder.is_dir():
-        prune()
+        _prune_now_and_then()
         folder.mkdir(parents=True, exist_ok=True)
     # A cache that cannot be written can still be read.
     with suppress(OSError):
@@ -96,11 +103,72 @@ def kept(kind: str, key: Iterable[object], make: Callable[[], NDArray[Any]]) -> 
             digest.update(np.ascontiguousarray(part).data)
         else:
             digest.update(repr(part).encode())
-    path = cache_folder(kind, digest.hexdigest()) / "array.npy"
+    name = digest.hexdigest()
+    path = cache_folder(kind, name) / "array.npy"
+    watch = _watch.get()
     # Whatever is wrong with the file, the array can be made again.
     with suppress(OSError, ValueError, EOFError):
-        return np.asarray(np.load(path, allow_pickle=False))
+        found = np.asarray(np.load(path, allow_pickle=False))
+        watch.note(kind, name, found)
+        return found
+    if watch.only_known and kind in watch.kinds:
+        raise Unknown(kind)
     made = make()
+    _write(path, made)
+    watch.note(kind, name, made)
+    return made
+
+
+class Unknown(LookupError):
+    """An array of that kind is not in the cache, where `only_known` asks for none to be made."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Watch:
+    """What is done with arrays of some kinds, beside keeping them."""
+
+    kinds: frozenset[str] = frozenset()
+    only_known: bool = False
+    notes: list[tuple[str, str, NDArray[Any]]] = field(default_factory=list)
+
+    def note(self, kind: str, name: str, array: NDArray[Any]) -> None:
+        if kind in self.kinds and not self.only_known:
+            self.notes.append((kind, name, array))
+
+
+_watch: ContextVar[_Watch] = ContextVar("watch", default=_Watch())  # noqa: B039, without kinds
+
+
+@contextmanager
+def recorded(*kinds: str) -> Iterator[list[tuple[str, str, NDArray[Any]]]]:
+    """A context in which every array of these kinds that is asked for is noted.
+
+    The notes are the arguments of `keep`, with which another machine knows the arrays, too.
+    """
+    watch = _Watch(kinds=frozenset(kinds))
+    token = _watch.set(watch)
+    try:
+        yield watch.notes
+    finally:
+        _watch.reset(token)
+
+
+@contextmanager
+def only_known(*kinds: str) -> Iterator[None]:
+    """A context in which an array of these kinds that is not in the cache raises `Unknown`."""
+    token = _watch.set(_Watch(kinds=frozenset(kinds), only_known=True))
+    try:
+        yield
+    finally:
+        _watch.reset(token)
+
+
+def keep(kind: str, name: str, array: NDArray[Any]) -> None:
+    """Put an array into the cache that `kept` made elsewhere, as `recorded` noted it."""
+    _write(cache_folder(kind, name) / "array.npy", array)
+
+
+def _write(path: Path, made: NDArray[Any]) -> None:
     with suppress(OSError):
         handle, partial = tempfile.mkstemp(dir=path.parent)
         try:
@@ -110,7 +178,6 @@ def kept(kind: str, key: Iterable[object], make: Callable[[], NDArray[Any]]) -> 
         except BaseException:
             os.unlink(partial)
             raise
-    return made
 
 
 def kept_groups(
@@ -185,6 +252,17 @@ def prune(most: int = MOST_BYTES, now: float | None = None) -> list[Entry]:
         removed.append(entry)
         total -= entry.size
     return removed
+
+
+_pruned: dict[Path, float] = {}
+"""When this process pruned each cache [seconds of the monotonic clock]."""
+
+
+def _prune_now_and_then() -> None:
+    now = time.monotonic()
+    if now - _pruned.get(root(), -math.inf) >= PRUNED_EVERY:
+        _pruned[root()] = now
+        prune()
 
 
 def clear() -> list[Entry]:

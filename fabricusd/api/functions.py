@@ -57,6 +57,7 @@ def bake(
     units: str | None = None,
     resume: bool = False,
     workers: int | None = None,
+    scheduler: str | None = None,
     **settings: Any,
 ) -> Baked:
     """Bake every mesh of `scene` that wears a fabric: write textures and a report to `out`.
@@ -65,6 +66,7 @@ def bake(
     mesh : path of a single mesh to bake; None bakes all
     units : of the lengths in an .obj or .ply: "m", "cm", "mm" or "in"
     resume : continue an interrupted bake of the same job
+    workers, scheduler : threads of this process, or the address of a Dask cluster
     settings : fields of `bake.job.Settings`: resolution, texels_per_thread, maps, light, shadow,
         level, udim, fit, unwrap, max_error, btf, file_format, margin
 
@@ -91,18 +93,20 @@ def bake(
 
     return baked(
         scene, out, chosen, fabric=fabric, mesh=mesh, units=units, resume=resume, workers=workers,
-        portrait=portrait,
+        scheduler=scheduler, portrait=portrait,
     )  # fmt: skip
 
 
 def material(
-    bake: Source, out: Source | None = None, *, scene: Source | None = None, **settings: Any
-) -> Written:
+    bake: Source, out: Source | None = None, *, scene: Source | None = None,
+    scheduler: str | None = None, **settings: Any,
+) -> Written:  # fmt: skip
     """Write a look for a bake: a USD layer, a MaterialX document beside it, and a report.
 
     bake : folder that `fabricusd.bake` wrote; it is only read
     out : the layer to write, by default `look.usda` in that folder
     scene : the USD scene that was baked, to bind the look to its prims
+    scheduler : address of the Dask cluster that does the fits; None for this process
     settings : fields of `materials.recipes.Settings`: surfaces, fitted, lobes, max_error, near,
         targets, colorway
 
@@ -122,7 +126,7 @@ def material(
     from fabricusd.materials.recipes import Settings
 
     chosen = Settings(**_fields_of(Settings, settings))
-    return write_materials(bake, out, chosen, scene=scene)
+    return write_materials(bake, out, chosen, scene=scene, scheduler=scheduler)
 
 
 def fit(lobes: Lobes | Source, model: str = "microcylinder", **settings: Any) -> Fitted:
@@ -130,7 +134,7 @@ def fit(lobes: Lobes | Source, model: str = "microcylinder", **settings: Any) ->
 
     lobes : Lobes, or a table of them that `fabricusd measure` wrote
     model : "thesis", "microcylinder" or "conserving"
-    settings : gain, offset, lean, seed and workers of `measure.fit_thread`
+    settings : gain, offset, lean, seed, workers and scheduler of `measure.fit_thread`
 
     The result's `thread` is a `Thread`: its angles are in radians.
 

@@ -77,6 +77,8 @@ def run(options: argparse.Namespace) -> int:
     if options.flat is not None:
         if options.cylinder is not None:
             raise FabricError("--flat", "cannot be used with --cylinder")
+        if options.scheduler is not None:
+            raise FabricError("--scheduler", "cannot be used with --flat, which is one short fit")
         return run_flat(options)
     if options.cylinder is not None:
         return run_cylinder(options)

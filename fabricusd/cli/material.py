@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fabricusd.cli.arguments.number import number
+from fabricusd.cli.arguments.scheduler import add_scheduler
 from fabricusd.materials.near import AUTO, NEAR
 from fabricusd.materials.targets import TARGETS
 
@@ -17,7 +18,8 @@ EPILOG = """example:
   fabricusd material baked --surface openpbr lobes --lobes 6
   fabricusd material baked --usdz coat.usdz --osl
   fabricusd material baked --scene coat.usda -o coat_look.usda --glb coat.glb --swatch tiles
-  fabricusd material baked_red --asset assets/coat --colorway red"""
+  fabricusd material baked_red --asset assets/coat --colorway red
+  fabricusd material wardrobe --surface openpbr lobes --scheduler tcp://10.0.0.1:8786"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -67,6 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--colorway", default="", metavar="NAME",
         help="variant of --asset that the bake becomes (default: its fabrics' names)",
     )  # fmt: skip
+    add_scheduler(parser)
     parser.add_argument("--no-fit", action="store_true", help="leave the textures as they are")
     parser.add_argument("-n", "--dry-run", action="store_true", help="check, but write nothing")
     parser.add_argument("--no-clobber", action="store_true", help="never replace a file")
@@ -100,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
             near=options.near,
         ),
         scene=options.scene, clobber=not options.no_clobber, dry_run=options.dry_run,
-        progress=None if options.quiet else say,
+        progress=None if options.quiet else say, scheduler=options.scheduler,
     )  # fmt: skip
     for path in made.files:
         print(path)

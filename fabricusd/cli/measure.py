@@ -97,8 +97,9 @@ def run(options: argparse.Namespace) -> int:
         raise FabricError(
             "-o", "is missing; give -o for the thread, --lobes for the lobes, or both"
         )
-    if options.output is None and (options.plots or options.report):
-        raise FabricError("--plots" if options.plots else "--report", "needs a fit: give -o too")
+    for option in ("plots", "report", "scheduler"):
+        if options.output is None and getattr(options, option):
+            raise FabricError(f"--{option}", "needs a fit: give -o too")
     require_outputs(options)
     return _measure(options)
 
@@ -130,7 +131,7 @@ def _simulate(options: argparse.Namespace) -> int:
     from fabricusd.measure.gantry.camera import Camera
     from fabricusd.measure.gantry.simulate import Shoot, require_empty, simulate
 
-    for option in ("folder", "output", "lobes", "plots", "report"):
+    for option in ("folder", "output", "lobes", "plots", "report", "scheduler"):
         if getattr(options, option):
             name = "DIR" if option == "folder" else f"--{option}"
             raise FabricError(name, "cannot be used with --simulate; measure in a second command")

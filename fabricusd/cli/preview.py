@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fabricusd.cli.arguments.number import number
+from fabricusd.cli.arguments.scheduler import add_scheduler
 from fabricusd.cli.arguments.units import add_units
 from fabricusd.errors import FabricError
 
@@ -35,7 +36,7 @@ example:
   fabricusd preview silk_shot --page silk.html --reference
   fabricusd preview denim.usda --serve --save denim.usda
   fabricusd preview --sheet linen_plain denim velvet -o sheet.png
-  fabricusd preview --presets -o presets.png"""
+  fabricusd preview --presets -o presets.png --scheduler tcp://10.0.0.1:8786"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -110,6 +111,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     many.add_argument(
         "--variants", action="store_true", help="one sheet of all variants of each SOURCE"
     )
+    add_scheduler(parser)
     scene = parser.add_argument_group("scenes")
     scene.add_argument(
         "--fabric", metavar="FILE[:/PRIM]",
@@ -165,6 +167,10 @@ def _require_together(options: argparse.Namespace) -> None:
     ):  # fmt: skip
         if given and not getattr(options, needed[2:]):
             raise FabricError(option, f"needs {needed}")
+    if options.scheduler is not None and not many:
+        raise FabricError(
+            "--scheduler", "draws the tiles of a sheet: add --sheet, --presets or --variants"
+        )
 
 
 def _cloth(options: argparse.Namespace, source: str) -> tuple[Fabric, Any]:
@@ -285,7 +291,8 @@ def _scene(options: argparse.Namespace, source: str, lights: Lights) -> Any:
 def _sheet(options: argparse.Namespace, lights: Lights, begun: float) -> int:
     """Make a contact sheet, as a PNG and as an HTML file beside it."""
     from fabricusd.preview.fabrics import names_of_presets
-    from fabricusd.preview.sheet import sheet_html, sheet_png, tiles_of
+    from fabricusd.preview.sheet import Drawing, sheet_html, sheet_png, tiles_of
+    from fabricusd.run.cluster import cluster_or_threads
 
     sources = [*options.sources]
     if options.presets:
@@ -306,11 +313,18 @@ def _sheet(options: argparse.Namespace, lights: Lights, begun: float) -> int:
     _require_new(page, options.no_clobber)
     shape = options.shape or "cylinder"
 
-    def draw(fabric: Fabric) -> Any:
-        picture = _drawn(fabric, shape, options, lights, options.size or 256)
-        return picture.codes(options.exposure, options.view)
-
-    tiles = tiles_of(((source, _fabric(source, options)) for source in sources), draw)
+    how = Drawing(
+        shape=shape, level=options.level, size=options.size or 256, lights=lights,
+        samples=options.samples,
+    )  # fmt: skip
+    named = [(source, _fabric(source, options)) for source in sources]
+    with cluster_or_threads(options.scheduler, None) as cluster:
+        tiles = tiles_of(
+            named, how, lambda picture: picture.codes(options.exposure, options.view),
+            1 if cluster is None else cluster,
+        )  # fmt: skip
+    for note in cluster.notes if cluster is not None else ():
+        _say(options, note)
     _write(str(output), sheet_png(tiles))
     _write(str(page), sheet_html(f"{len(tiles)} fabrics on a {shape}", tiles).encode())
     seconds = time.perf_counter() - begun

@@ -26,6 +26,7 @@ from fabricusd.materials.targets.layer import write_baked_look, write_scene_look
 from fabricusd.materials.targets.mtlx import write_mtlx
 from fabricusd.materials.targets.paths import asset_path
 from fabricusd.ranges import RANGES
+from fabricusd.run.cluster import Cluster, cluster_or_threads
 
 
 def write_materials(
@@ -37,6 +38,7 @@ def write_materials(
     clobber: bool = True,
     dry_run: bool = False,
     progress: Progress | None = None,
+    scheduler: str | Cluster | None = None,
 ) -> Written:
     """Write a look for a bake: a USD layer, a MaterialX document beside it, and a report.
 
@@ -46,6 +48,8 @@ def write_materials(
         meshes
     clobber : whether existing files may be overwritten
     dry_run : return what would be written, but write nothing
+    scheduler : of the Dask cluster that does the fits, see `run.cluster.cluster_or_threads`; None
+        for this process
 
     Raises FabricError if the folder holds no bake, if the layer exists and fabricusd did not write
     it, or if the scene is not the one that was baked.
@@ -71,7 +75,9 @@ def write_materials(
         for place in _written_folders(path, settings):
             locks.enter_context(locked(place))
         remove_partial_files(path.with_name(f"{path.stem}_maps"))
-        _write(folder, path, settings, made, bound, scene, clobber, progress)
+        cluster = locks.enter_context(cluster_or_threads(scheduler, None))
+        made.remarks += cluster.notes if cluster is not None else ()
+        _write(folder, path, settings, made, bound, scene, clobber, progress, cluster)
     return made
 
 
@@ -84,9 +90,10 @@ def _write(
     scene: str | os.PathLike[str] | None,
     clobber: bool,
     progress: Progress | None,
+    cluster: Cluster | None,
 ) -> None:
     """Write all files of a look; their folders must be locked."""
-    made_of, documents = recipes(folder, path, settings, made, progress)
+    made_of, documents = recipes(folder, path, settings, made, progress, cluster)
     custom = {
         "version": __version__,
         "bake": asset_path(folder.path / "manifest.json", path.parent),

@@ -12,18 +12,19 @@ import numpy as np
 from fabricusd.errors import FabricError
 from fabricusd.images.files import read_mip_level, write_png
 from fabricusd.materials.bake_folder import BakedLay, BakeFolder, MapSet
-from fabricusd.materials.fit.fit import Fitted, bounds_met, thread_factors, with_threads
-from fabricusd.materials.fit.keep import kept_fit, kept_fit_threads
+from fabricusd.materials.fit.fit import Fitted, bounds_met
+from fabricusd.materials.fit.keep import fit_lay
 from fabricusd.materials.fit.spanning import takes_the_mean, write_spanning_maps
 from fabricusd.materials.fit.texels import draw_texels, mean_texel
 from fabricusd.materials.fit.thread_maps import COLUMNS, Factors, write_thread_maps
+from fabricusd.materials.fit_ahead import Lobes, Surfaces, fit_ahead
 from fabricusd.materials.lobes.fit import COUNT
 from fabricusd.materials.lobes.inputs import inputs as lobe_inputs
 from fabricusd.materials.lobes.known import mixture_of
 from fabricusd.materials.lobes.mixture import CYCLES, MATERIALX, Mixture, of_covered
 from fabricusd.materials.lobes.network import Texel, lobes
 from fabricusd.materials.lobes.parameters import at_bounds
-from fabricusd.materials.near import AUTO
+from fabricusd.materials.near import AUTO, OFF
 from fabricusd.materials.near.inputs import near_inputs
 from fabricusd.materials.near.keep import moved_to, near_of
 from fabricusd.materials.near.network import NearTexel
@@ -44,6 +45,7 @@ from fabricusd.materials.networks.surfaces import (
 )
 from fabricusd.materials.targets import Wanted, chosen
 from fabricusd.materials.targets.layer import MaterialRecipe, Recipes
+from fabricusd.run.cluster import Cluster
 from fabricusd.schema.names import prim_name
 
 Progress = Callable[[str], None]
@@ -113,13 +115,20 @@ class Written:
 
 def recipes(
     folder: BakeFolder, path: Path, settings: Settings, made: Written,
-    progress: Progress | None,
+    progress: Progress | None, cluster: Cluster | None = None,
 ) -> tuple[Recipes, list[Any]]:  # fmt: skip
-    """Return the materials of every garment and fabric, and those of the MaterialX document."""
+    """Return the materials of every garment and fabric, and those of the MaterialX document.
+
+    cluster : does the fits; None for this process
+    """
     found: dict[tuple[str, int, str], MaterialRecipe] = {}
     documents = []
+    seen_of = {maps.name: _shown(maps, path, made) for maps in folder.garments}
+    if cluster is not None:
+        fit_ahead(_jobs(folder, seen_of, settings), cluster, progress)
     for maps in folder.garments:
-        found_looks, seen, fitted = _garment_looks(maps, path, settings, made, progress)
+        seen = seen_of[maps.name]
+        found_looks, fitted = _garment_looks(maps, seen, path, settings, made, progress)
         threads = _threads(maps, path, settings, made)
         for number, lay in enumerate(maps.lays):
             textures = texture_inputs(seen[number], path, made)
@@ -320,30 +329,66 @@ def mean_inputs(maps: MapSet, number: int) -> dict[str, Value]:
     }
 
 
-def _garment_looks(
-    maps: MapSet, path: Path, settings: Settings, made: Written, progress: Progress | None
-) -> tuple[list[dict[str, Look]], list[MapSet], MapSet]:
-    """Return the looks and the maps of each lay, and the maps that include each thread's own fit.
-
-    Where texels resolve threads, all surfaces except UsdPreviewSurface take the latter. Where they
-    do not, the maps that shape reflections are those of `spanning`.
-    """
-    looks, seen, factors = [], [], {}
+def _shown(maps: MapSet, path: Path, made: Written) -> list[MapSet]:
+    """Return the maps of each lay: where texels do not resolve threads, those that shape
+    reflections are those of `spanning`."""
+    seen = []
     for number, lay in enumerate(maps.lays):
         shown = maps
         if takes_the_mean(maps, lay):
             shown, files = write_spanning_maps(maps, number, maps_folder(path))
             made.files += files
         seen.append(shown)
-        of_lay, of_threads = _looks(shown, number, settings, made, progress)
+    return seen
+
+
+def _garment_looks(
+    maps: MapSet, seen: list[MapSet], path: Path, settings: Settings, made: Written,
+    progress: Progress | None,
+) -> tuple[list[dict[str, Look]], MapSet]:  # fmt: skip
+    """Return the looks of each lay, and the maps that include each thread's own fit.
+
+    seen : the maps of each lay
+
+    Where texels resolve threads, all surfaces except UsdPreviewSurface take the latter.
+    """
+    looks, factors = [], {}
+    for number in range(len(maps.lays)):
+        of_lay, of_threads = _looks(seen[number], number, settings, made, progress)
         looks.append(of_lay)
         if of_threads:
             factors[number] = of_threads
     if not factors:
-        return looks, seen, maps
+        return looks, maps
     fitted = write_thread_maps(maps, factors, maps_folder(path))
     made.files += [fitted.textures[name][t] for name in COLUMNS for t in fitted.textures[name]]
-    return looks, seen, fitted
+    return looks, fitted
+
+
+def _kinds(settings: Settings) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The surfaces that are written, and all that are fitted to texels."""
+    besides = [kind for target, _ in chosen(settings.targets) for kind in target.fits]
+    named = tuple(dict.fromkeys((*settings.surfaces, *besides)))
+    return named, ("preview", "principled", *(s for s in named if s in GRAPHS))
+
+
+def _jobs(
+    folder: BakeFolder, seen: Mapping[str, list[MapSet]], settings: Settings
+) -> list[Surfaces | Lobes]:
+    """The fits of a look, each of which a worker of a cluster can do."""
+    found: dict[Any, Surfaces | Lobes] = {}
+    _, kinds = _kinds(settings)
+    for maps in folder.garments:
+        for number, lay in enumerate(maps.lays):
+            if lay.fabric is None or not settings.fitted:
+                continue
+            texels = draw_texels(seen[maps.name][number], number, lay)
+            if texels is not None:
+                found[maps.name, number] = Surfaces(texels, lay.fabric, kinds)
+            if "lobes" in settings.surfaces:
+                near = settings.near != OFF
+                found[lay.name] = Lobes(lay.fabric, settings.lobes, settings.max_error, near)
+    return list(found.values())
 
 
 def _looks(
@@ -352,9 +397,7 @@ def _looks(
 ) -> tuple[dict[str, Look], Factors]:  # fmt: skip
     """Return the look of each surface that is written, and the factors of each thread, if any."""
     lay = maps.lays[number]
-    besides = [kind for target, _ in chosen(settings.targets) for kind in target.fits]
-    named = dict.fromkeys((*settings.surfaces, *besides))
-    kinds = ("preview", "principled", *(s for s in named if s in GRAPHS))
+    named, kinds = _kinds(settings)
     plain = dict.fromkeys(("preview", "principled", *named), Look())
     if not settings.fitted:
         return plain, {}
@@ -370,23 +413,16 @@ def _looks(
             made.notes.append(note)
         return plain, {}
 
-    where, fabric = f"{maps.name} {lay.name}", lay.fabric
+    where = f"{maps.name} {lay.name}"
 
     def waiting(what: str) -> Callable[[], None]:
         line = f"fitting {what} to {lay.name} on {maps.name}"
         return lambda: progress(line) if progress else None
 
-    factors: Factors = {}
-    own = texels
-    if texels.threads:
-        threads = kept_fit_threads(texels, fabric, waiting=waiting("threads"))
-        looks = {one: fitted.look for one, fitted in threads.items()}
-        own, factors = with_threads(texels, looks), thread_factors(looks, texels.shares)
+    found, threads, factors = fit_lay(texels, lay.fabric, kinds, waiting=waiting)
+    if threads:
         made.threads[where] = threads
-    found = {}
     for kind in kinds:
-        takes = texels if kind == "preview" else own
-        found[kind] = kept_fit(kind, takes, fabric, baked=texels, waiting=waiting(kind))
         made.remarks += [
             f"{kind} of {where}: {told}" for told in bounds_met(kind, found[kind].look)
         ]

@@ -5,14 +5,17 @@ from __future__ import annotations
 import base64
 import html
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fabricusd.fabric import Fabric
+from fabricusd.preview.lights import Lights
+from fabricusd.preview.picture import Picture, preview
 from fabricusd.preview.png import png_bytes
+from fabricusd.run.spread import Place, spread
 
 TEXT = 15
 """Height of the labels [pixels]."""
@@ -30,11 +33,33 @@ class Tile:
     pixels: NDArray[np.uint8]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Drawing:
+    """How all tiles are drawn: arguments of `picture.preview`."""
+
+    shape: str
+    level: str | None
+    size: int
+    lights: Lights
+    samples: int | None
+
+
 def tiles_of(
-    named: Iterable[tuple[str, Fabric]], draw: Callable[[Fabric], NDArray[np.uint8]]
+    named: Sequence[tuple[str, Fabric]],
+    how: Drawing,
+    codes: Callable[[Picture], NDArray[np.uint8]],
+    place: Place = 1,
 ) -> list[Tile]:
-    """A tile of each (name, fabric); draw : the codes of its picture."""
-    return [Tile(name=name, below=words(fabric), pixels=draw(fabric)) for name, fabric in named]
+    """A tile of each (name, fabric), drawn at `place`; codes : of a picture, taken here."""
+    pictures = spread("tiles", _drawn, how, [fabric for _, fabric in named], place)
+    return [
+        Tile(name=name, below=words(fabric), pixels=codes(picture))
+        for (name, fabric), picture in zip(named, pictures, strict=True)
+    ]
+
+
+def _drawn(how: Drawing, fabric: Fabric) -> Picture:
+    return preview(fabric, **vars(how))
 
 
 def words(fabric: Fabric) -> str:

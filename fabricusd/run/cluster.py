@@ -151,9 +151,11 @@ def _greet(scheduler: str) -> None:
 
 
 def cluster_or_threads(
-    scheduler: str | None, workers: int | None
+    scheduler: str | Cluster | None, workers: int | None
 ) -> AbstractContextManager[Cluster | None]:
     """The cluster of `scheduler`; None, for threads of this process, where none is asked for.
+
+    scheduler : as `open_cluster` takes it, or a cluster that is open and stays so
 
     Raises `FabricError` where both a scheduler and a number of threads are asked for.
     """
@@ -163,6 +165,8 @@ def cluster_or_threads(
         raise FabricError(
             "--workers", "counts threads of this process; it cannot be had with --scheduler"
         )
+    if isinstance(scheduler, Cluster):
+        return nullcontext(scheduler)
     return open_cluster(scheduler)
 
 

@@ -35,3 +35,10 @@ def build_once(kept: Kept, job: int) -> tuple[int, int]:
             kept.built["tracer"] = job
             kept.built["count"] += 1
     return os.getpid(), kept.built["count"]
+
+
+def plus(shared: int, item: int) -> int:
+    """A part of a step: the sum."""
+    if item < 0:
+        raise ValueError(f"no item {item}")
+    return shared + item

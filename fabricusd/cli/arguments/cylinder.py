@@ -74,7 +74,7 @@ def run_cylinder(options: argparse.Namespace) -> int:
         return 0
     made = fit_cylinders(
         template, profiles, irradiance=stand.irradiance, coverage=bool(options.coverage),
-        seed=options.seed, workers=options.workers,
+        seed=options.seed, workers=options.workers, scheduler=options.scheduler,
     )  # fmt: skip
     print("\n".join(made.lines()))
     if options.output is not None:

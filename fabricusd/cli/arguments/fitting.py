@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fabricusd.cli.arguments.number import number
+from fabricusd.cli.arguments.scheduler import add_scheduler
 from fabricusd.errors import FabricError
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def add_fitting(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="worker threads (default: one per processor)",
     )
+    add_scheduler(parser)
     parser.add_argument(
         "--plots",
         metavar="DIR",
@@ -91,15 +93,17 @@ def fitted(lobes: Lobes, options: argparse.Namespace) -> list[Fitted]:
     """The fits that the options ask for, the best first."""
     from fabricusd.fabric import MODELS
     from fabricusd.measure import fit_thread
+    from fabricusd.run.cluster import cluster_or_threads
 
     gain = None if options.gain is None else options.gain == "free"
-    fits = [
-        fit_thread(
-            lobes, model, gain=gain, offset=options.offset, lean=options.lean, seed=options.seed,
-            workers=options.workers,
-        )
-        for model in (MODELS if options.model == "all" else (options.model,))
-    ]  # fmt: skip
+    with cluster_or_threads(options.scheduler, options.workers) as cluster:
+        fits = [
+            fit_thread(
+                lobes, model, gain=gain, offset=options.offset, lean=options.lean,
+                seed=options.seed, workers=options.workers, scheduler=cluster,
+            )
+            for model in (MODELS if options.model == "all" else (options.model,))
+        ]  # fmt: skip
     return sorted(fits, key=lambda fit: fit.chi2)
 
 

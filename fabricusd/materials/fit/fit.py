@@ -25,6 +25,7 @@ from fabricusd.materials.fit.judge import Judge, albedo, direction_pairs
 from fabricusd.materials.fit.target import Target, TexelSample, target_of
 from fabricusd.materials.fit.through import fit_through
 from fabricusd.materials.networks.look import Look
+from fabricusd.run.blas import one_blas_thread
 
 Floats = NDArray[np.float64]
 
@@ -74,6 +75,7 @@ class Fitted:
         return {"parameters": said.pop("look"), **said}
 
 
+@one_blas_thread()
 def fit(
     kind: str, texels: TexelSample, fabric: Fabric, *, baked: TexelSample | None = None
 ) -> Fitted:
@@ -96,6 +98,7 @@ def fit(
     )
 
 
+@one_blas_thread()
 def fit_threads(texels: TexelSample, fabric: Fabric) -> dict[int, Fitted]:
     """Fit a look of surface `openpbr` without fuzz to each thread that the texels resolve.
 

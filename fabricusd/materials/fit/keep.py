@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
@@ -17,12 +17,35 @@ from fabricusd.appearance.cloth_key import cloth_key
 from fabricusd.cache import kept
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.cache import fingerprint
-from fabricusd.materials.fit.fit import Fitted, fit, fit_threads
+from fabricusd.materials.fit.fit import Fitted, fit, fit_threads, thread_factors, with_threads
 from fabricusd.materials.fit.target import TexelSample
+from fabricusd.materials.fit.thread_maps import Factors
 from fabricusd.materials.networks.look import Look
 
 Waiting = Callable[[], None]
 """Is called before a fit that is not in the cache."""
+
+
+def fit_lay(
+    texels: TexelSample, fabric: Fabric, kinds: Sequence[str], *, waiting: Callable[[str], Waiting]
+) -> tuple[dict[str, Fitted], dict[int, Fitted], Factors]:
+    """Return the fit of each kind of surface to a lay, and those of single threads with their
+    factors, if texels resolve threads.
+
+    waiting : for "threads" or a kind, what to call before that fit if it is not in the cache
+    """
+    factors: Factors = {}
+    threads: dict[int, Fitted] = {}
+    own = texels
+    if texels.threads:
+        threads = kept_fit_threads(texels, fabric, waiting=waiting("threads"))
+        looks = {one: fitted.look for one, fitted in threads.items()}
+        own, factors = with_threads(texels, looks), thread_factors(looks, texels.shares)
+    found = {}
+    for kind in kinds:
+        takes = texels if kind == "preview" else own
+        found[kind] = kept_fit(kind, takes, fabric, baked=texels, waiting=waiting(kind))
+    return found, threads, factors
 
 
 def kept_fit(

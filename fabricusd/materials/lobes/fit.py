@@ -23,6 +23,7 @@ from fabricusd.materials.lobes.parameters import bounds, pack, unpack, value_and
 from fabricusd.materials.lobes.starts import starts
 from fabricusd.materials.lobes.target import GRAZING, LIGHTS, Pairs, fitted_pairs
 from fabricusd.quality.colors import delta_e_2000
+from fabricusd.run.blas import one_blas_thread
 
 Floats = NDArray[np.float64]
 
@@ -157,6 +158,7 @@ class Problem:
         return np.concatenate([one.ravel() for one in residuals]), np.concatenate(by_number)
 
 
+@one_blas_thread()
 def fit(
     fabric: Fabric, count: int = COUNT, form: str = CYCLES, *, max_error: float | None = None
 ) -> Mixture:
@@ -183,6 +185,7 @@ def fit(
     return bound(found)
 
 
+@one_blas_thread()
 def refit(fabric: Fabric, mixture: Mixture) -> Mixture:
     """Return the mixture nearest to `fabric` that a solver finds from `mixture`, as `fit` does."""
     found = _found(Problem(fitted_pairs(fabric)), [replace(mixture, view=())])

@@ -33,6 +33,7 @@ from fabricusd.materials.lobes.target import GRAZING, LIGHTS, fitted_directions
 from fabricusd.materials.near.mixture import NearMixture, placed
 from fabricusd.materials.near.parts import COUNT, LEAST, SETS, Parts, parts_of
 from fabricusd.materials.near.points import Points, points_of, radiance
+from fabricusd.run.blas import one_blas_thread
 
 Floats = NDArray[np.float64]
 
@@ -192,6 +193,7 @@ def _secant(values: Floats, true: Floats) -> Floats:
     return np.asarray(slope / np.sqrt(np.maximum(np.abs(a - b), LEAST_ERROR)))
 
 
+@one_blas_thread()
 def fit_near(fabric: Fabric, far: Mixture) -> NearMixture:
     """Return the mixture near by whose lobes are those of `far`."""
     parts = parts_of(fabric)

@@ -23,6 +23,7 @@ from fabricusd.measure.cylinder.setup import FIT
 from fabricusd.measure.fit.intervals import at_end
 from fabricusd.measure.fit.result import Estimate, as_numbers
 from fabricusd.quality.colors import delta_e_2000
+from fabricusd.run.cluster import Cluster, cluster_or_threads
 
 Floats = NDArray[np.float64]
 
@@ -85,23 +86,26 @@ class Wrapped:
 
 def fit_cylinders(
     template: Fabric, profiles: list[Profile], *, irradiance: float = 0.0, coverage: bool = False,
-    seed: int = 0, workers: int | None = None,
+    seed: int = 0, workers: int | None = None, scheduler: str | Cluster | None = None,
 ) -> Wrapped:  # fmt: skip
     """The threads with which cloth of the template's weave looks like its wraps.
 
     irradiance : of the light in the photographs' values; 0 frees it
     coverage : whether the share that each set covers is fitted too
     seed : of the starts; equal seeds give equal fits
+    workers, scheduler : threads of this process, or a cluster, see `run.cluster.cluster_or_threads`
     """
     names = numbers(template, coverage=coverage)
     own = [p for p in profiles if p.cylinder.use == FIT]
     problem = Problem(template, names, own, irradiance)
-    known = known_of(problem, search(problem, seed), workers)
+    with cluster_or_threads(scheduler, workers) as cluster:
+        place = workers if cluster is None else cluster
+        known = known_of(problem, search(problem, seed, place), place)
     estimates = estimates_of(problem, known)
     products, notes = products_of(problem, known, estimates)
     colors = {k: tuple(known.linear.albedo[n]) for n, k in enumerate(worn(template))}
     wraps, more = _wraps(problem, profiles, known.best.x, known.linear)
-    notes += more
+    notes += [*more, *(cluster.notes if cluster is not None else ())]
     chi2 = known.best.chi2 / problem.light.size
     if chi2 > BADLY_FITTED:
         notes.append(

@@ -23,6 +23,7 @@ from fabricusd.measure.fit.intervals import (
 from fabricusd.measure.fit.parameters import level_formula, volume_level
 from fabricusd.measure.fit.result import Estimate
 from fabricusd.measure.fit.search import Found, refine
+from fabricusd.run.spread import Place
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ class Known:
     met: tuple[tuple[Floats, Linear], ...]
 
 
-def known_of(problem: Problem, best: Found, workers: int | None) -> Known:
+def known_of(problem: Problem, best: Found, place: Place) -> Known:
     """Profiles of all numbers: the valley in which threads fit is seldom straight, so that the
     curvature at its lowest place tells little of it. A lower place that a profile meets is taken.
     """
@@ -61,7 +62,7 @@ def known_of(problem: Problem, best: Found, workers: int | None) -> Known:
         scale = per_value if per_value > BADLY_FITTED else 1.0
         curve = _curvature(problem, best.x, linear, scale)
         every = list(range(len(best.x)))
-        traced = profiles(problem, best, every, curve, scale, workers, "cylinders")
+        traced = profiles(problem, best, every, curve, scale, place, "cylinders")
         lower = [p.better for p in traced.values() if p.better is not None]
         if not lower or last == ROUNDS - 1:
             break

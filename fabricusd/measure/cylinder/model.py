@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from itertools import product
 from threading import Lock
@@ -160,6 +161,10 @@ class Kept(Generic[Made]):
         self._values: dict[Any, Made] = {}
         self._lock = Lock()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """On its way to another process it is empty."""
+        return Kept, (self.most,)
+
     def get(self, key: Any, make: Callable[[], Made]) -> Made:
         """The value of `key`, made if it is not kept."""
         with self._lock:
@@ -201,10 +206,12 @@ class Model:
         self._means: Kept[NDArray[np.float32]] = Kept(KEPT_SHADOWS)
         self._shapes: Kept[dict[str, Any]] = Kept(KEPT)
 
-    def hold(self, held: bool) -> None:
-        """Whether the template's shadow serves all cloths, whose curves differ little: one of its
-        own takes a third of a second."""
-        self.held = held
+    def holding(self) -> Model:
+        """The same model in which the template's shadow serves all cloths, whose curves differ
+        little: one of its own takes a third of a second."""
+        made = copy(self)
+        made.held = True
+        return made
 
     def columns(
         self, names: Sequence[Number], x: Floats, wi: Floats, wo: Floats

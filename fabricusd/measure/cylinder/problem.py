@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +12,8 @@ from scipy.optimize import nnls
 from fabricusd.fabric import Fabric
 from fabricusd.measure.cylinder.model import Model, Number
 from fabricusd.measure.cylinder.profile import Profile
-from fabricusd.measure.fit.search import Found, refine
-from fabricusd.steps import parts
+from fabricusd.measure.fit.search import Found, misfit, refine
+from fabricusd.run.spread import Place, spread
 
 Floats = NDArray[np.float64]
 
@@ -62,6 +63,12 @@ class Problem:
             np.array([getattr(n, name) for n in names]) for name in ("low", "high", "step")
         )
 
+    def held(self) -> Problem:
+        """The same with the template's shadow for all cloths, see `Model.held`."""
+        made = copy(self)
+        made.model = self.model.holding()
+        return made
+
     def columns(self, x: Floats) -> tuple[Floats, Floats]:
         """((n,) surface, (n, k) volume) that pixels of the fitted wraps show for numbers x."""
         return shown(self.model, self.names, x, self.profiles)
@@ -91,7 +98,7 @@ class Problem:
         return np.asarray(((self.solve(x)[0] - self.light) / self.sigma).ravel())
 
 
-def search(problem: Problem, seed: int) -> Found:
+def search(problem: Problem, seed: int, place: Place) -> Found:
     """The least: many starts are judged with one shadow for all, the best refined."""
     rng = np.random.default_rng(seed & (2**63 - 1))
     names = problem.names
@@ -100,11 +107,9 @@ def search(problem: Problem, seed: int) -> Found:
     drawn = starts[:, 0] + (starts[:, 1] - starts[:, 0]) * (
         (cells + rng.random(cells.shape)) / CANDIDATES
     )
-    problem.model.hold(True)
-    judged = [float((problem.residuals(x) ** 2).sum()) for x in parts("starts", list(drawn))]
+    held = problem.held()
+    judged = spread("starts", misfit, held, list(drawn), place)
     order = np.argsort(judged, kind="stable")[:REFINED]
-    rough = [refine(problem, drawn[k]).x for k in parts("fits", list(order))]
-    problem.model.hold(False)
-    return min(
-        (refine(problem, x) for x in parts("fits with shadows", rough)), key=lambda f: f.chi2
-    )
+    rough = spread("fits", refine, held, list(drawn[order]), place)
+    found = spread("fits with shadows", refine, problem, [each.x for each in rough], place)
+    return min(found, key=lambda each: each.chi2)

@@ -31,6 +31,8 @@ from fabricusd.measure.fit.problem import Linear, Problem
 from fabricusd.measure.fit.result import Estimate, Fitted
 from fabricusd.measure.fit.search import Found, refine, search
 from fabricusd.measure.lobes import Lobes
+from fabricusd.run.cluster import Cluster, cluster_or_threads
+from fabricusd.run.spread import Place
 
 Floats = NDArray[np.float64]
 
@@ -54,6 +56,7 @@ def fit_thread(
     lean: bool = False,
     seed: int = 0,
     workers: int | None = None,
+    scheduler: str | Cluster | None = None,
 ) -> Fitted:
     """The thread of `model` whose scattering is nearest to the lobes.
 
@@ -61,6 +64,7 @@ def fit_thread(
     offset, lean : whether stray light, a constant per channel, and a lean of the thread in the
         light's plane are fitted too
     seed : of the starts; equal seeds give equal fits
+    workers, scheduler : threads of this process, or a cluster, see `run.cluster.cluster_or_threads`
 
     Raises FabricError for too few views, and for a free gain where all views have one incidence:
     the index of refraction then cannot be told from the gain.
@@ -81,7 +85,14 @@ def fit_thread(
         )
     names = parameters(model, gain=free_gain, lean=lean)
     problem = Problem(lobes, model, names, gain=free_gain, offset=offset)
-    best = search(problem, seed=seed, workers=workers)
+    with cluster_or_threads(scheduler, workers) as cluster:
+        found = _sought(problem, seed, workers if cluster is None else cluster)
+    notes = cluster.notes if cluster is not None else ()
+    return replace(found, notes=(*found.notes, *notes))
+
+
+def _sought(problem: Problem, seed: int, place: Place) -> Fitted:
+    best = search(problem, seed=seed, place=place)
     for _ in range(3):
         linear = problem.solve(best.x)[1]
         per_value = best.chi2 / problem.freedom
@@ -89,7 +100,7 @@ def fit_thread(
         scale = per_value if per_value > CALIBRATED[1] else 1.0
         known = curvature(problem, best.x, linear, scale)
         which = to_profile(problem, best.x, known)
-        traced = profiles(problem, best, which, known, scale, workers, model)
+        traced = profiles(problem, best, which, known, scale, place, problem.model)
         lower = [p.better for p in traced.values() if p.better is not None]
         if not lower:
             break

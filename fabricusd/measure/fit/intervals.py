@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from fabricusd.measure.fit.problem import Linear, Problem
-from fabricusd.measure.fit.search import Found, Searched, beside, refine
+from fabricusd.measure.fit.search import Found, Searched, refine
+from fabricusd.run.spread import Place, spread
 
 Floats = NDArray[np.float64]
 
@@ -148,16 +150,15 @@ def to_profile(problem: Searched, x: Floats, known: Curvature) -> list[int]:
 
 def profiles(
     problem: Searched, best: Found, which: list[int], known: Curvature, scale: float,
-    workers: int | None, name: str,
+    place: Place, name: str,
 ) -> dict[int, Profile]:  # fmt: skip
-    """The profiles of parameters, their sides on every core. name : of what is fitted"""
-    sides = [(k, side) for k in which for side in (-1.0, 1.0)]
-    made = beside(
-        f"intervals of {name}",
-        lambda s: _side(problem, best, s[0], s[1], float(known.deviations[s[0]]), RISE * scale),
-        sides,
-        workers,
-    )
+    """The profiles of parameters, their sides spread over `place`. name : of what is fitted"""
+    sides = [
+        _Side(best, k, side, float(known.deviations[k]), RISE * scale)
+        for k in which
+        for side in (-1.0, 1.0)
+    ]
+    made = spread(f"intervals of {name}", _traced, problem, sides, place)
     found = {}
     for n, k in enumerate(which):
         (low, open_low, below, first), (high, open_high, above, second) = made[2 * n : 2 * n + 2]
@@ -170,10 +171,19 @@ def profiles(
     return found
 
 
-def _side(
-    problem: Searched, best: Found, k: int, side: float, deviation: float, rise: float
-) -> tuple[float, bool, list[Floats], Found | None]:
+class _Side(NamedTuple):
+    """A side of a profile: downwards, -1, or upwards, 1. k : the parameter's number"""
+
+    best: Found
+    k: int
+    side: float
+    deviation: float
+    rise: float
+
+
+def _traced(problem: Searched, one: _Side) -> tuple[float, bool, list[Floats], Found | None]:
     """(end of the interval, whether it is the range's, points within, a better minimum or None)."""
+    best, k, side, deviation, rise = one
     end = float(problem.high[k] if side > 0 else problem.low[k])
     at = float(best.x[k])
     inside_at, inside_rise, x = at, 0.0, best.x

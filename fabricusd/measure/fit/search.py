@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +11,9 @@ from scipy.optimize import least_squares
 from fabricusd.appearance.scattering.model import CONSERVING
 from fabricusd.appearance.scattering.models import named
 from fabricusd.measure.fit.problem import Problem
-from fabricusd.run.workers import worker_count
-from fabricusd.steps import parts
+from fabricusd.run.spread import Place, spread
 
 Floats = NDArray[np.float64]
-Item = TypeVar("Item")
-Made = TypeVar("Made")
 
 CANDIDATES, REFINED = 240, 6
 """Starts that are drawn, and the best of them that are refined."""
@@ -55,8 +50,8 @@ class Found(NamedTuple):
     chi2: float
 
 
-def search(problem: Problem, *, seed: int, workers: int | None) -> Found:
-    """The best parameters from many starts; the same for a seed, however many workers."""
+def search(problem: Problem, *, seed: int, place: Place) -> Found:
+    """The best parameters from many starts; the same for a seed, wherever they are sought."""
     rng = np.random.default_rng(seed & (2**63 - 1))
     tables = named(problem.model).law == CONSERVING
     count = CANDIDATES_WITH_TABLES if tables else CANDIDATES
@@ -72,15 +67,15 @@ def search(problem: Problem, *, seed: int, workers: int | None) -> Found:
             problem.lobes.of(kept), problem.model, problem.names, gain=problem.gain,
             offset=problem.offset,
         )  # fmt: skip
-    judged = beside(
-        f"starts of {problem.model}", lambda x: float((few.residuals(x) ** 2).sum()), list(starts),
-        workers,
-    )  # fmt: skip
+    judged = spread(f"starts of {problem.model}", misfit, few, list(starts), place)
     order = np.argsort(judged, kind="stable")[: REFINED_WITH_TABLES if tables else REFINED]
-    found = beside(
-        f"fits of {problem.model}", lambda k: refine(problem, starts[k]), list(order), workers
-    )
+    found = spread(f"fits of {problem.model}", refine, problem, list(starts[order]), place)
     return min(found, key=lambda each: each.chi2)
+
+
+def misfit(problem: Searched, x: Floats) -> float:
+    """chi^2 of parameters."""
+    return float((problem.residuals(x) ** 2).sum())
 
 
 def refine(problem: Searched, start: Floats, fixed: int | None = None) -> Found:
@@ -101,21 +96,3 @@ def refine(problem: Searched, start: Floats, fixed: int | None = None) -> Found:
     )  # fmt: skip
     x[free] = done.x
     return Found(x, 2.0 * float(done.cost))
-
-
-def beside(
-    name: str, work: Callable[[Item], Made], items: Sequence[Item], workers: int | None
-) -> list[Made]:
-    """`work` of each item, on every core, in the order of the items; told as the step `name`.
-
-    NumPy's and numba's loops release Python's lock, so threads are enough.
-    """
-    count = min(worker_count(workers), len(items))
-    if count <= 1:
-        return [work(item) for item in parts(name, items)]
-    pool = ThreadPoolExecutor(count)
-    try:
-        jobs: list[Any] = [pool.submit(work, item) for item in items]
-        return [job.result() for job in parts(name, jobs)]
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)

@@ -68,6 +68,15 @@ def test_columns_add_up_to_the_law(law):
     assert np.abs(found - wanted).max() < 0.01 * wanted.max()
 
 
+@pytest.mark.exhaustive
+def test_on_a_cluster_the_fit_is_the_same_to_the_bit(cluster):
+    template = template_of(law=SURFACE_LAWS[2])
+    seen = wraps(template)
+    here = fit_cylinders(template, seen, irradiance=np.pi)
+    there = fit_cylinders(template, seen, irradiance=np.pi, scheduler=cluster)
+    assert there.as_json() == here.as_json()
+
+
 @pytest.mark.slow
 def test_linen_comes_back_and_its_bias_is_predicted():
     template = template_of()

@@ -17,6 +17,7 @@ as it is interpolated. Source: MODEL sections 2 and 13.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -156,10 +157,20 @@ def surface_albedo(
     row[SURFACE_GAIN] = surface_gain
     row[GAMMA_SURFACE] = gamma_surface
     row[SURFACE_LOBE : SURFACE_LOBE + 2] = lobe_constants(gamma_surface)
-    key = (fingerprint(), ior, gamma_surface, surface_gain, entries)
-    albedo = kept("thread-surface", key, lambda: _surface_albedo(row, entries))
+    albedo = _kept(
+        "thread-surface", (ior, gamma_surface, surface_gain), entries,
+        lambda: _surface_albedo(row, entries),
+    )  # fmt: skip
     albedo.flags.writeable = False
     return albedo
+
+
+def _kept(kind: str, key: tuple[float, ...], entries: int, make: Callable[[], Floats]) -> Floats:
+    """What `make` returns, from the cache on disk if all entries are integrated: a fit asks for
+    thousands of threads with fewer, each once."""
+    if entries < TRANSMISSION_ENTRIES:
+        return make()
+    return kept(kind, (fingerprint(), *key), make)
 
 
 def _surface_albedo(row: Floats, entries: int) -> Floats:
@@ -239,9 +250,8 @@ def lost_energy(
         0, and x with it, where that is below LEAST_NORM
     entries : as in `surface_albedo`
     """
-    key = (fingerprint(), gamma_surface, ior, surface_gain, gamma_volume, isotropic, entries)
-    held = kept(
-        "thread-lost", key,
+    held = _kept(
+        "thread-lost", (gamma_surface, ior, surface_gain, gamma_volume, isotropic), entries,
         lambda: _lost_energy(
             1.0 - surface_albedo(gamma_surface, ior, surface_gain, entries), gamma_volume,
             isotropic, entries,
