@@ -45,6 +45,7 @@ def folder(tmp_path_factory):
         (("--flat", "wide.png", *LIGHT, "-o", "cloth.txt"), "cloth.txt"),
         (("--flat", "wide.png", *LIGHT, "--cloth-width", "0"), "--cloth-width"),
         (("--flat", "wide.png", *LIGHT, "--lean"), "--lean cannot be used with --flat"),
+        (("--flat", "wide.png", *LIGHT, "--scheduler", "local"), "--scheduler cannot be used with"),
         (("--flat", "wide.png", "--cylinder", "wide.png", *LIGHT), "cannot be used with"),
         (("--light", "0", "1", "1"), "--light can only be used with --flat"),
         (("--coverage",), "--coverage can only be used with --cylinder"),

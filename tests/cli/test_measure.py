@@ -71,6 +71,8 @@ def test_lobes_alone_are_not_fitted(tmp_path, capsys):
         (("measure", "{shot}", "--lobes", "l.csv", "--bits", "8"), "--bits can only be used with"),
         (("measure", "nowhere", "-o", "t.usda"), "manifest.json does not exist"),
         (("measure", "{shot}", "--simulate", "s"), "DIR cannot be used with --simulate"),
+        (("measure", "--simulate", "s", "--scheduler", "local"), "--scheduler cannot be used with"),
+        (("measure", "{shot}", "--lobes", "l.csv", "--scheduler", "local"), "needs a fit"),
         (("measure", "--simulate", "s", "--thread", "velvt"), "did you mean 'velvet'?"),
         (("measure", "--simulate", "no/s"), "which is not a directory"),
         (("fit", "nowhere.csv", "-o", "t.usda"), "cannot be read: No such file"),

@@ -155,6 +155,8 @@ def test_variants_are_listed_on_a_sheet(capsys, tmp_path):
         (("denim", "--page", "a.htm"), "a.htm is not a name for the page; it must end in .html"),
         (("denim", "--page", "a.html", "-o", "a.png"), "-o names a picture, 'a.png'"),
         (("denim", "--page", "a.html", "--sheet"), "--page shows one SOURCE"),
+        (("denim", "--scheduler", "local"), "--scheduler draws the tiles of a sheet"),
+        (("denim", "--sheet", "--scheduler", "local:x"), "--scheduler 'local:x' does not answer"),
     ],
 )
 def test_slips_are_refused_in_one_line(arguments, said, capsys, tmp_path, monkeypatch):
