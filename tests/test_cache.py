@@ -88,7 +88,7 @@ def test_what_is_recorded_is_known_where_it_is_kept(folder, tmp_path, monkeypatc
 
 def test_a_fit_does_not_fill_the_cache_with_the_tables_of_its_steps():
     views = np.array([[0.0, 0.0, 1.0]])
-    evaluate(replace(SPUN, model="conserving"), views, views)
+    evaluate(replace(SPUN, model="conserving", gamma_surface=0.1234), views, views)
     kept = len(cache.entries())
     assert kept > 0
     for width in (0.11, 0.12):

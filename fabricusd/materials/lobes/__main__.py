@@ -1,18 +1,19 @@
 """Print how near mixtures of lobes are to the presets, and remake the table of their fits.
 
-python -m fabricusd.materials.lobes [NAME ...] [--lobes K ...] [--law LAW ...] [--write]
+python -m fabricusd.materials.lobes [NAME ...] [--lobes K ...] [--law LAW ...]
+    [--write [--form FORM ...]]
 
 A preset is fitted under the law that it wears, and under each `--law`. Under another law its
 published albedos are scaled, so that it is as bright as it was under `masked`. The table in the
 package is used for what it holds; `--write` fits all again, and replaces the rows of the presets
-and laws that it is given.
+and laws that it is given. `--form materialx` fits that form alone again, from the form of Cycles.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from fabricusd.fabric import SURFACE_LAWS, Fabric
@@ -41,6 +42,10 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--lobes", type=int, nargs="+", default=[4, 6], choices=COUNTS)
     parser.add_argument("--law", nargs="+", default=[], choices=SURFACE_LAWS[:-1])
     parser.add_argument("--write", action="store_true", help="fit again, and write the table")
+    parser.add_argument(
+        "--form", nargs="+", default=list(FORMS), choices=FORMS,
+        help="forms that --write fits again",
+    )  # fmt: skip
     parser.add_argument("--bounds", action="store_true", help="name parameters at their bounds")
     return parser.parse_args()
 
@@ -55,20 +60,19 @@ def _worn(name: str, laws: list[str]) -> Iterator[Fabric]:
 
 
 def _mixtures(
-    name: str, fabric: Fabric, counts: list[int], judge: Judge, *, again: bool
+    name: str, fabric: Fabric, counts: list[int], judge: Judge, again: Sequence[str]
 ) -> Iterator[Mixture]:
     """The mixtures in every form.
 
-    again : fit them, from the usual starts and from what the table holds under that name; the one
-        that is not brighter than the cloth is kept, and of two the nearer
+    again : forms to fit, from the usual starts and from what the table holds under that name; the
+        one that is not brighter than the cloth is kept, and of two the nearer
     """
     for count in counts:
-        if not again:
-            for form in FORMS:
-                yield known.mixture_of(fabric, count, form)
-            continue
-        first = fit(fabric, count)
+        first = fit(fabric, count) if CYCLES in again else known.mixture_of(fabric, count, CYCLES)
         for form in FORMS:
+            if form not in again:
+                yield first if form == CYCLES else known.mixture_of(fabric, count, form)
+                continue
             tried = [first if form == CYCLES else refit(fabric, known.in_form(first, form))]
             tried += [refit(fabric, one) for one in known.held(name, fabric, count, form)]
             yield min(tried, key=lambda one: _rank(judge(one)))
@@ -93,13 +97,13 @@ def _line(name: str, law: str, mixture: Mixture, judged: Judged) -> str:
 def main() -> int:
     """Print the table, row by row."""
     given = _arguments()
-    rows = []
+    rows, again = [], given.form if given.write else ()
     print("| preset | law | lobes | form | mean | 95 % | overcast | window | clear | excess |")
     print("|---|---|---|---|---|---|---|---|---|---|", flush=True)
     for name in given.names or PUBLISHED:
         for fabric in _worn(name, given.law):
             judge, held = Judge(fabric), []
-            for one in _mixtures(name, fabric, given.lobes, judge, again=given.write):
+            for one in _mixtures(name, fabric, given.lobes, judge, again):
                 held.append(one)
                 print(_line(name, fabric.surface_law, one, judge(one)), flush=True)
                 for told in at_bounds(one) if given.bounds else ():

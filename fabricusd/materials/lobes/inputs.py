@@ -17,7 +17,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.materials.lobes.mixture import CYCLES, Lobe, Mixture
+from fabricusd.materials.lobes.mixture import CYCLES, OF_MATERIALX, Lobe, Mixture
 from fabricusd.materials.networks.graph import Value
 
 Floats = NDArray[np.float64]
@@ -55,5 +55,5 @@ def _values(one: Mixture | Lobe, prefix: str) -> dict[str, Value]:
     return {
         prefix + field.name: Value(_KINDS[str(field.type)], getattr(one, field.name))
         for field in fields(one)
-        if str(field.type) in _KINDS
+        if str(field.type) in _KINDS and field.name not in OF_MATERIALX
     }

@@ -5,16 +5,19 @@ tangent `t = cos(tilt) a - sin(tilt) N`,
 
     f cos = V(wo) (sum color W D(h) G(wi, wo) / (4 n.wo)
                    + diffuse max(N.wo, 1e-4)^q N.wi / pi + sheen max(N.wo, 0.05)^u S)
-    W(wo) = max(n.wo, 1e-4)^p max(1 - (t.wo)^2, 0.06)^r max(N.wo, 0.05)^s
+    W = max(n.wo, 1e-4)^p max(1 - (t.wo)^2, 0.06)^r max(N.wo, 0.05)^s
+        (1 + (rise - 1) (1 - h.wo)^e)
 
 A lobe is 0 where either direction is below its plane or below the cloth. `D` is the distribution of
 GGX, and `S` is the sheen of [Zeltner2022]. `V`, `view_factor`, keeps the mixture from being
-brighter than the cloth. `V` and `W` depend on the viewer alone, because that is all that a
-closure's colour may depend on.
+brighter than the cloth. `V` and the powers of `W` depend on the viewer alone, because that is all
+that a closure's colour may depend on.
 
 Renderers differ in the masking `G`. The masking of Cycles uses both widths of a lobe. MaterialX's
 uses their geometric mean, and MaterialX adds the energy that is scattered more than once, which
-depends on the reflectance `color W`.
+depends on the reflectance `color W`. The last factor of `W` is the reflectance of MaterialX's
+`generalized_schlick_bsdf`, by the angle between light and halfway vector; Cycles has no such lobe,
+and its `rise` is 1.
 """
 
 from __future__ import annotations
@@ -58,6 +61,7 @@ class Lobe:
     alpha_along, alpha_across : GGX widths along and across the thread
     color : (3,) factor, not bounded by 1
     facing, crossing, upright : the powers p, r and s of W
+    rise, rise_power : reflectance at grazing light over that face on, and its exponent e
     """
 
     along: int
@@ -69,11 +73,17 @@ class Lobe:
     facing: float
     crossing: float
     upright: float
+    rise: float = 1.0
+    rise_power: float = 1.5
 
     @property
     def tilts(self) -> tuple[float, ...]:
         """The tilt of each lobe."""
         return (self.tilt, -self.tilt) if self.paired else (self.tilt,)
+
+
+OF_MATERIALX = ("rise", "rise_power")
+"""Fields of a lobe that the form of Cycles does not have."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,13 +115,14 @@ class Reflected(NamedTuple):
     """One lobe of reflectance 1, without its weight, for n pairs of directions.
 
     value : (n,) D G / (4 n.wo), 0 below either plane
-    facing, crossing : (n,) bases of the powers p and r
+    facing, crossing, parted : (n,) bases of the powers p, r and e
     spared : (n,) light that a single scattering loses, (1 - E)/E; 0 except for MATERIALX
     """
 
     value: Floats
     facing: Floats
     crossing: Floats
+    parted: Floats
     spared: Floats
 
 
@@ -141,13 +152,17 @@ def reflected(
     unmasked = 0.5 * (np.sqrt(1.0 + tan_i) + np.sqrt(1.0 + tan_o))
     value = np.where(above, d / (4.0 * no * unmasked), 0.0)
     crossing = np.maximum(1.0 - to * to, CROSSING)
-    return Reflected(value, np.maximum(np.where(above, no, 0.0), FACING), crossing, spared)
+    parted = np.clip(1.0 - 0.5 * np.sqrt(square), 0.0, 1.0)
+    return Reflected(value, np.maximum(np.where(above, no, 0.0), FACING), crossing, parted, spared)
 
 
 def weight(lobe: Lobe, one: Reflected, wo: Floats) -> Floats:
     """(n,) the factor W of a lobe."""
     upright = np.maximum(wo[:, 2], UPRIGHT)
-    return np.asarray(one.facing**lobe.facing * one.crossing**lobe.crossing * upright**lobe.upright)
+    seen = one.facing**lobe.facing * one.crossing**lobe.crossing * upright**lobe.upright
+    if lobe.rise != 1.0:
+        seen = seen * (1.0 + (lobe.rise - 1.0) * one.parted**lobe.rise_power)
+    return np.asarray(seen)
 
 
 def view_terms(wo: Floats) -> Floats:

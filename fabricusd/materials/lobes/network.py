@@ -217,6 +217,7 @@ def _placed(
         name, LOBE.category, LOBE.kind, LOBE.identifier,
         color=color, tilt=tilt, roughness=widths,
         facing=one(lobe.facing), crossing=one(lobe.crossing), upright=one(lobe.upright),
+        rise=one(lobe.rise), rise_power=one(lobe.rise_power),
         axis=axis, normal=normal, eye=eye, view=view,
     )  # fmt: skip
 
@@ -273,14 +274,17 @@ def _definition() -> Definition:
         value1=no, value2=one(SMALLEST), in1=weight, in2=one(0.0),
     )  # fmt: skip
     color = b.math("reflectance", "multiply", "color3", Given("color"), seen, short=True)
+    grazing = b.math("reflectance_90", "multiply", "color3", color, Given("rise"), short=True)
     end = b.add(
         "lobe", "generalized_schlick_bsdf", "BSDF", "ND_generalized_schlick_bsdf",
-        color0=color, color90=color, roughness=Given("roughness"), normal=n, tangent=t,
+        color0=color, color90=grazing, exponent=Given("rise_power"),
+        roughness=Given("roughness"), normal=n, tangent=t,
     )  # fmt: skip
     inputs = {
         "color": _color((0.1, 0.1, 0.1)), "tilt": one(0.0),
         "roughness": Value("vector2", (0.3, 0.9)), "facing": one(0.0), "crossing": one(0.0),
-        "upright": one(0.0), "view": one(1.0), "axis": _ACROSS, "normal": _UP, "eye": _UP,
+        "upright": one(0.0), "rise": one(1.0), "rise_power": one(5.0), "view": one(1.0),
+        "axis": _ACROSS, "normal": _UP, "eye": _UP,
     }  # fmt: skip
     return Definition(
         "fabricusd_lobe", "BSDF", "ND_fabricusd_lobe", inputs, tuple(b.nodes.values()), end.node

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from fabricusd.materials.lobes.mixture import POWERS, Lobe, Mixture
+from fabricusd.materials.lobes.mixture import MATERIALX, POWERS, Lobe, Mixture
 
 PAIR = Lobe(
     along=0, tilt=0.6, paired=True, alpha_along=0.2, alpha_across=0.9, color=(0.3, 0.6, 0.2),
@@ -21,8 +23,12 @@ VIEW = tuple(round(0.1 * (-1.0) ** k / (1.0 + k % POWERS), 6) for k in range(5 *
 
 
 def mixture(form: str, *lobes: Lobe) -> Mixture:
+    """Lobes and all else; those of MaterialX rise towards grazing light."""
+    lobes = lobes or (PAIR, LEVEL)
+    if form == MATERIALX:
+        lobes = tuple(replace(one, rise=2.5 + k, rise_power=1.7) for k, one in enumerate(lobes))
     return Mixture(
-        form=form, lobes=lobes or (PAIR, LEVEL), diffuse=(0.05, 0.1, 0.2), diffuse_power=0.4,
+        form=form, lobes=lobes, diffuse=(0.05, 0.1, 0.2), diffuse_power=0.4,
         sheen=(0.1, 0.2, 0.3), sheen_roughness=0.5, sheen_power=0.7, view=VIEW,
     )  # fmt: skip
 

@@ -90,7 +90,9 @@ def closure(node, given, eye, light):
     t = given["tangent"]
     local = (np.array([[w @ t, w @ np.cross(n, t), w @ n]]) for w in (light, eye))
     one = reflected(MATERIALX, 0, 0.0, tuple(given["roughness"]), *local)
-    f = given["color0"]
+    face_on, grazing = given["color0"], given["color90"]
+    half = (light + eye) / np.linalg.norm(light + eye)
+    f = face_on + (grazing - face_on) * (1.0 - half @ eye) ** given["exponent"]
     return one.value[0] * f * (1.0 + f * one.spared[0])
 
 
