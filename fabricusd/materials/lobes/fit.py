@@ -20,7 +20,7 @@ from fabricusd.materials.lobes.bound import Bound
 from fabricusd.materials.lobes.colors import Colors
 from fabricusd.materials.lobes.mixture import CYCLES, Mixture
 from fabricusd.materials.lobes.parameters import bounds, pack, unpack, value_and_slopes
-from fabricusd.materials.lobes.starts import starts
+from fabricusd.materials.lobes.starts import grown, starts
 from fabricusd.materials.lobes.target import GRAZING, LIGHTS, Pairs, fitted_pairs
 from fabricusd.quality.colors import delta_e_2000
 from fabricusd.run.blas import one_blas_thread
@@ -173,16 +173,20 @@ def fit(
     if count not in COUNTS:
         raise FabricError("lobes", f"is {count}; it must be from {COUNTS[0]} to {COUNTS[-1]}")
     problem, bound = Problem(fitted_pairs(fabric)), Bound(fabric)
-    fewer = range(1, count) if max_error is not None else ()
-    for few in fewer:
+    for few in range(1, count) if max_error is not None else ():
         found = _found(problem, starts(fabric, few, form))
         found = bound(found) if found is not None else None
         if found is not None and problem.delta_e(found) <= (max_error or 0.0):
             return found
-    found = _found(problem, starts(fabric, count, form))
-    if found is None:
+    tried = [_found(problem, starts(fabric, count, form))]
+    if count > COUNT:
+        # With more lobes the usual starts may end farther off than with fewer.
+        fewer = _found(problem, starts(fabric, count - 2, form))
+        tried += [_found(problem, grown(fewer))] if fewer is not None else []
+    held = [bound(one) for one in tried if one is not None]
+    if not held:
         raise FabricError(f"fabric '{fabric.name}'", f"has no threads for {count} lobes")
-    return bound(found)
+    return min(held, key=problem.score)
 
 
 @one_blas_thread()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -106,3 +107,16 @@ def flank(along: int) -> Lobe:
         along=along, tilt=0.9, paired=True, alpha_along=0.4, alpha_across=0.4,
         color=(0.05, 0.05, 0.05), facing=0.3, crossing=0.0, upright=0.0,
     )  # fmt: skip
+
+
+FAINT = 0.01
+"""Colour of a lobe that is added to a mixture."""
+
+
+def grown(mixture: Mixture) -> list[Mixture]:
+    """Mixtures with one more pair, faint at first: on the flanks of either set, or nearly level."""
+    pairs = [flank(along) for along in (0, 1)]
+    pairs += [replace(one, tilt=0.2, alpha_along=0.2, alpha_across=0.9) for one in pairs]
+    return [
+        replace(mixture, lobes=(*mixture.lobes, replace(one, color=(FAINT,) * 3))) for one in pairs
+    ]

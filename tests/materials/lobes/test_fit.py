@@ -13,7 +13,7 @@ from fabricusd.materials.lobes.fit import COUNTS, Problem, fit
 from fabricusd.materials.lobes.judge import Judge
 from fabricusd.materials.lobes.mixture import CYCLES, FORMS, evaluate
 from fabricusd.materials.lobes.parameters import pack, unpack
-from fabricusd.materials.lobes.starts import flank, starts
+from fabricusd.materials.lobes.starts import flank, grown, starts
 from fabricusd.materials.lobes.target import GRAZING, VIEWS, Pairs, fitted_directions
 from fabricusd.schema import load
 
@@ -86,6 +86,26 @@ def test_starts_have_lobes_on_the_flanks_as_well():
 def test_a_number_of_lobes_out_of_range_is_refused(count):
     with pytest.raises(FabricError, match="it must be from 1 to 6"):
         fit(load("velvet"), count)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_mixture_grows_by_a_faint_pair(form):
+    one = mixture(form)
+    for more in grown(one):
+        assert (more.form, more.count) == (form, one.count + 2)
+        assert more.lobes[:-1] == one.lobes
+        wi, wo = fitted_directions()
+        added = evaluate(more, wi, wo) - evaluate(one, wi, wo)
+        assert 0.0 < added.mean() < 0.1 * evaluate(one, wi, wo).mean()
+
+
+@pytest.mark.exhaustive
+def test_six_lobes_are_nearer_than_four():
+    linen = load("linen_plain")
+    judge = Judge(linen)
+    four, six = (judge(fit(linen, count)) for count in (4, 6))
+    assert six.delta_e < four.delta_e
+    assert six.excess < 0.01
 
 
 @pytest.mark.exhaustive
