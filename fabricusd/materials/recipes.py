@@ -387,7 +387,7 @@ def _jobs(
                 found[maps.name, number] = Surfaces(texels, lay.fabric, kinds)
             if "lobes" in settings.surfaces:
                 near = settings.near != OFF
-                found[lay.name] = Lobes(lay.fabric, settings.lobes, settings.max_error, near)
+                found[lay.fabric] = Lobes(lay.fabric, settings.lobes, settings.max_error, near)
     return list(found.values())
 
 

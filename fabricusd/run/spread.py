@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
+from fabricusd.run.blas import one_blas_thread
 from fabricusd.run.cluster import Cluster, Kept
 from fabricusd.run.workers import worker_count
 from fabricusd.steps import current, parts
@@ -28,6 +29,8 @@ def spread(
 ) -> list[Made]:
     """`work(shared, item)` of each item, in the order of the items; told as the step `name`.
 
+    Linear algebra has one thread meanwhile, so that results do not depend on the place.
+
     work : a function of a module, which a cluster's workers can import; its loops should release
         Python's lock, as NumPy's and numba's do, since threads share one process
     shared : goes to each worker of a cluster once
@@ -36,6 +39,17 @@ def spread(
     """
     if isinstance(place, Cluster):
         return _on_cluster(name, work, shared, items, place)
+    with one_blas_thread():
+        return _on_threads(name, work, shared, items, place)
+
+
+def _on_threads(
+    name: str,
+    work: Callable[[Shared, Item], Made],
+    shared: Shared,
+    items: Sequence[Item],
+    place: int | None,
+) -> list[Made]:
     count = min(worker_count(place), len(items))
     if count <= 1:
         return [work(shared, item) for item in parts(name, items)]
@@ -76,4 +90,5 @@ def _on_cluster(
 
 def _part(kept: Kept, job: tuple[Callable[[Any, Any], Any], Any]) -> Any:
     work, item = job
-    return work(kept.thing, item)
+    with one_blas_thread():
+        return work(kept.thing, item)
