@@ -20,18 +20,34 @@ from typing import Any
 import numba
 import numpy as np
 from bench_thread import microcylinder_in_numpy
+from numba import njit, prange
 
 from fabricusd.appearance.frame import WARP
 from fabricusd.appearance.law import surface_law
+from fabricusd.appearance.published.levels import POINT_ROWS, point_block
 from fabricusd.appearance.shadow.kinds import Shadow
 from fabricusd.appearance.shadow.methods import compile_shadow
+from fabricusd.appearance.shadow.place_blocks import (
+    ANGLE,
+    INT_ROWS,
+    OF_SET,
+    OF_THREAD,
+    REAL_ROWS,
+    S,
+    look_up_block,
+)
 from fabricusd.appearance.surface import evaluate, points_all, weave_all
 from fabricusd.appearance.weave.compiled import CompiledFabric, compile_fabric
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.lookup import find_all, lookup
+from fabricusd.appearance.weave.place import Places
 from fabricusd.fabric import DEGREE, Fabric, TangentCurve, Thread, ThreadSet, Weave
+from fabricusd.kernels.real import BLOCK, KERNEL
 
 Array = np.ndarray
+
+CHUNK = 32 * BLOCK
+"""Places that a worker takes at a time, as in `surface`."""
 
 
 def satin() -> Fabric:
@@ -165,6 +181,21 @@ def all_in_numpy(
     return out
 
 
+@njit(**KERNEL, parallel=True)
+def weave_in_light(R, cloth, shadow, tables, uv, wi, wo, out):  # type: ignore[no-untyped-def]
+    """`surface.weave_all` without its shadow: every place is looked up, and lit."""
+    n = uv.shape[0]
+    for chunk in prange((n + CHUNK - 1) // (CHUNK)):
+        ints, reals = np.empty(INT_ROWS * BLOCK, np.int32), np.empty(REAL_ROWS * BLOCK, R)
+        block = np.empty(POINT_ROWS * BLOCK, R)
+        first, last = chunk * CHUNK, min(n, (chunk + 1) * CHUNK)
+        for begin in range(first, last, BLOCK):
+            size = min(BLOCK, last - begin)
+            look_up_block(R, cloth, shadow, uv, begin, size, ints, reals)
+            places = Places(ints[OF_SET:], ints[OF_THREAD:], reals[ANGLE:], reals[S:], reals[:0])
+            point_block(R, tables, False, places, 0, wi, wo, out, begin, size, block)
+
+
 def best(function: Callable[[], Any], repeats: int) -> float:
     """Seconds of the fastest of `repeats` calls, after a first one that compiles."""
     function()
@@ -222,6 +253,9 @@ def main() -> None:
         def weave_level(tables=tables, places=places, out=out) -> None:  # type: ignore[no-untyped-def]
             points_all(real, tables, False, places, wi, wo, out)
 
+        def unshadowed(cloth=cloth, shadow=shadow, tables=tables, out=out) -> None:  # type: ignore[no-untyped-def]
+            weave_in_light(real, cloth, shadow, tables, uv, wi, wo, out)
+
         def shadowed(cloth=cloth, shadow=shadow, tables=tables, out=out) -> None:  # type: ignore[no-untyped-def]
             weave_all(real, cloth, shadow, tables, uv, wi, wo, out)
 
@@ -240,14 +274,21 @@ def main() -> None:
         print(f"{'NumPy, lookup + horizon + thread BSDF':52}{slow_all / 1e6:8.1f}{1.0:8.1f}")
         for count in sorted({1, workers}):
             numba.set_num_threads(count)
+            rates: list[float] = []
             for label, function, slow in (
                 ("lookup, one place at a time", find, slow_find),
                 ("level weave at places that are known", weave_level, None),
+                ("lookup + level weave", unshadowed, None),
                 ("lookup + horizon + level weave", shadowed, slow_all),
             ):
-                rate = n / best(function, options.repeats)
-                times = f"{rate / slow:8.1f}" if slow else ""
-                print(f"{f'{label}, {count} worker(s)':52}{rate / 1e6:8.1f}{times}")
+                rates.append(n / best(function, options.repeats))
+                times = f"{rates[-1] / slow:8.1f}" if slow else ""
+                print(f"{f'{label}, {count} worker(s)':52}{rates[-1] / 1e6:8.1f}{times}")
+            known, found_too, all_ = rates[1:]
+            print(
+                f"with horizon over without, {count} worker(s): {all_ / found_too:.2f} with the "
+                f"lookup on both sides, {all_ / known:.2f} of places that are known"
+            )
     errors(fabric, uv)
     cells = np.random.default_rng(1).random((4096, 4096)) < 0.5
     vast = replace(fabric, weave=Weave(cells, "vast"))
