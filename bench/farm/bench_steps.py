@@ -77,8 +77,9 @@ def wardrobe(place: Place) -> Any:
 STEPS: dict[str, tuple[Callable[[Place], Any], bool]] = {
     "thread": (partial(fitted, "microcylinder"), True),
     "conserving thread": (partial(fitted, "conserving"), False),
-     "sheet": (sheet, True), "lobes of four fabrics": (wardrobe, False),
-}  # fmt: skip
+    "sheet": (sheet, True),
+    "lobes of four fabrics": (wardrobe, False),
+}
 """Name -> what is done, and whether it is done first to prepare, and repeated."""
 
 

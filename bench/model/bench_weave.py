@@ -185,7 +185,7 @@ def all_in_numpy(
 def weave_in_light(R, cloth, shadow, tables, uv, wi, wo, out):  # type: ignore[no-untyped-def]
     """`surface.weave_all` without its shadow: every place is looked up, and lit."""
     n = uv.shape[0]
-    for chunk in prange((n + CHUNK - 1) // (CHUNK)):
+    for chunk in prange((n + CHUNK - 1) // CHUNK):
         ints, reals = np.empty(INT_ROWS * BLOCK, np.int32), np.empty(REAL_ROWS * BLOCK, R)
         block = np.empty(POINT_ROWS * BLOCK, R)
         first, last = chunk * CHUNK, min(n, (chunk + 1) * CHUNK)

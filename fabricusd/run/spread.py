@@ -39,26 +39,16 @@ def spread(
     """
     if isinstance(place, Cluster):
         return _on_cluster(name, work, shared, items, place)
-    with one_blas_thread():
-        return _on_threads(name, work, shared, items, place)
-
-
-def _on_threads(
-    name: str,
-    work: Callable[[Shared, Item], Made],
-    shared: Shared,
-    items: Sequence[Item],
-    place: int | None,
-) -> list[Made]:
     count = min(worker_count(place), len(items))
-    if count <= 1:
-        return [work(shared, item) for item in parts(name, items)]
-    pool = ThreadPoolExecutor(count)
-    try:
-        jobs: list[Any] = [pool.submit(work, shared, item) for item in items]
-        return [job.result() for job in parts(name, jobs)]
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+    with one_blas_thread():
+        if count <= 1:
+            return [work(shared, item) for item in parts(name, items)]
+        pool = ThreadPoolExecutor(count)
+        try:
+            jobs: list[Any] = [pool.submit(work, shared, item) for item in items]
+            return [job.result() for job in parts(name, jobs)]
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _on_cluster(

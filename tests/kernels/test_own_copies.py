@@ -20,10 +20,8 @@ import numpy as np
 from fabricusd.appearance.surface import evaluate
 from fabricusd.schema import load
 
-wi, wo = np.random.default_rng(0).normal(size=(2, 4096, 3))
-wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) * [1, 1, np.sign(w[:, 2:3])[0, 0]]
-          for w in (wi, wo))
-values = evaluate(load("gauze"), abs(wi), abs(wo))
+w = abs(np.random.default_rng(0).normal(size=(2, 4096, 3)))
+values = evaluate(load("gauze"), *(w / np.linalg.norm(w, axis=-1, keepdims=True)))
 print(hashlib.sha256(values.tobytes()).hexdigest())
 """
 

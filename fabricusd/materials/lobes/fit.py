@@ -9,6 +9,7 @@ than the fabric, `bound`.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,15 +174,20 @@ def fit(
     if count not in COUNTS:
         raise FabricError("lobes", f"is {count}; it must be from {COUNTS[0]} to {COUNTS[-1]}")
     problem, bound = Problem(fitted_pairs(fabric)), Bound(fabric)
+
+    @cache
+    def of(few: int) -> Mixture | None:
+        return _found(problem, starts(fabric, few, form))
+
     for few in range(1, count) if max_error is not None else ():
-        found = _found(problem, starts(fabric, few, form))
-        found = bound(found) if found is not None else None
-        if found is not None and problem.delta_e(found) <= (max_error or 0.0):
-            return found
-    tried = [_found(problem, starts(fabric, count, form))]
+        less = of(few)
+        less = bound(less) if less is not None else None
+        if less is not None and problem.delta_e(less) <= (max_error or 0.0):
+            return less
+    tried = [of(count)]
     if count > COUNT:
         # With more lobes the usual starts may end farther off than with fewer.
-        fewer = _found(problem, starts(fabric, count - 2, form))
+        fewer = of(count - 2)
         tried += [_found(problem, grown(fewer))] if fewer is not None else []
     held = [bound(one) for one in tried if one is not None]
     if not held:

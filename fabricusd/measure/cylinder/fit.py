@@ -23,6 +23,7 @@ from fabricusd.measure.cylinder.setup import FIT
 from fabricusd.measure.fit.intervals import at_end
 from fabricusd.measure.fit.result import Estimate, as_numbers
 from fabricusd.quality.colors import delta_e_2000
+from fabricusd.run.blas import one_blas_thread
 from fabricusd.run.cluster import Cluster, cluster_or_threads
 
 Floats = NDArray[np.float64]
@@ -84,6 +85,7 @@ class Wrapped:
         }
 
 
+@one_blas_thread()
 def fit_cylinders(
     template: Fabric, profiles: list[Profile], *, irradiance: float = 0.0, coverage: bool = False,
     seed: int = 0, workers: int | None = None, scheduler: str | Cluster | None = None,

@@ -31,6 +31,7 @@ from fabricusd.measure.fit.problem import Linear, Problem
 from fabricusd.measure.fit.result import Estimate, Fitted
 from fabricusd.measure.fit.search import Found, refine, search
 from fabricusd.measure.lobes import Lobes
+from fabricusd.run.blas import one_blas_thread
 from fabricusd.run.cluster import Cluster, cluster_or_threads
 from fabricusd.run.spread import Place
 
@@ -47,6 +48,7 @@ FEWEST = 12
 """Views below which a thread is not fitted."""
 
 
+@one_blas_thread()
 def fit_thread(
     lobes: Lobes,
     model: str,

@@ -27,6 +27,7 @@ from fabricusd.measure.flat.tones import (
     through_color,
 )
 from fabricusd.measure.flat.weave import find_weave, other_face, stated
+from fabricusd.run.blas import one_blas_thread
 from fabricusd.weaves import parse_weave
 
 Floats = NDArray[np.float64]
@@ -101,6 +102,7 @@ class Flat:
         }  # fmt: skip
 
 
+@one_blas_thread()
 def fit_flat(
     front: Photograph,
     behind: Photograph | None,
