@@ -20,7 +20,8 @@ def test_values_intervals_and_sources_lie_beside_the_fabric(tmp_path):
     path = tmp_path / "cloth.usda"
     save_measured(Fabric(name="Cloth"), MEASURED, path, photograph="a.png", notes=("one", "two"))
     assert load(path).name == "Cloth"
-    held = Sdf.Layer.FindOrOpen(str(path)).GetPrimAtPath("/Cloth").customData["fabricusd"]
+    layer = Sdf.Layer.FindOrOpen(str(path))  # held: a spec does not keep its layer alive
+    held = layer.GetPrimAtPath("/Cloth").customData["fabricusd"]
     assert held["photograph"] == "a.png"
     assert held["notes"] == "one\ntwo"
     assert dict(held["measured"]["warpARed"]) == {
