@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.weave.footprint import DEFAULT, Limits
 from fabricusd.errors import FabricError
+from fabricusd.kernels.calls import Calls
 from fabricusd.reference.lights.table import build_lights, share_out
 from fabricusd.reference.rays.camera import Lens, camera_rays
 from fabricusd.reference.rays.embree import (
@@ -162,6 +163,7 @@ class Tracer:
             self.tables.points, self.tables.triangles, self.tables.groups, self.tables.placements
         )
         self.shaders = shaders.result()
+        self._call = Calls()
         for cloth in filter(None, self.shaders):
             cloth.home = self.tables.home
         self.carrier = Carrier(self.tables, self.accelerator.begins)
@@ -248,33 +250,34 @@ class Tracer:
         counts = np.zeros(QUEUES * len(self.shaders), np.int64)
         result = np.zeros(3, np.int64)
         triangles, uv = self.carrier.triangles(wave)
+        call = self._call
         for step in range(self.steps):
             self.accelerator.intersect(wave.lanes.rays, (count + 15) // 16, coherent=step == 0)
             self.carrier.carry(wave, wave.lanes.rays, count)
             counters[0] += count
-            arrive(
-                step, self.settings, count, wave.lanes, wave.paths, self.numbers, self.lights,
-                triangles, self._limits, wave.film, wave.queues, counts, lost,
+            call(
+                arrive, step, self.settings, count, wave.lanes, wave.paths, self.numbers,
+                self.lights, triangles, self._limits, wave.film, wave.queues, counts, lost,
             )  # fmt: skip
             ends = np.cumsum(counts)
             hits = int(ends[-1])
             if hits == 0:
                 break
-            sort_lanes(count, wave.queues, ends - counts)
-            prepare(
-                step, self.settings, ends, wave.lanes, wave.queues, wave.paths, self.numbers,
-                triangles, self.lights, self.epsilon, wave.hits,
+            call(sort_lanes, count, wave.queues, ends - counts)
+            call(
+                prepare, step, self.settings, ends, wave.lanes, wave.queues, wave.paths,
+                self.numbers, triangles, self.lights, self.epsilon, wave.hits,
             )  # fmt: skip
             if self.shines:
-                add_emission(hits, self.surfaces, wave.hits, wave.film)
+                call(add_emission, hits, self.surfaces, wave.hits, wave.film)
             for queue in np.flatnonzero(counts):
                 start, end = int(ends[queue] - counts[queue]), int(ends[queue])
                 self._shade(wave, int(queue), start, end)
             if aovs and step <= MOST_LAYERS:
                 record_first(hits, lens.eye, lens.axis, wave.hits, uv, wave.film)
-            depart(
-                step, self.settings, hits, self.translucent, wave.hits, wave.film, wave.shadows,
-                wave.next_lanes, result,
+            call(
+                depart, step, self.settings, hits, self.translucent, wave.hits, wave.film,
+                wave.shadows, wave.next_lanes, result,
             )  # fmt: skip
             counters[1] += result[0]
             counters[2] += result[2]
@@ -291,7 +294,7 @@ class Tracer:
         shader = self.shaders[queue // QUEUES]
         if shader is None:
             shade = _PLAIN[bool(self.thin[queue // QUEUES]), bool(self.mapped[queue // QUEUES])]
-            shade(self.surfaces, wave.hits.rows, wave.hits.tags, start, end)
+            self._call(shade, self.surfaces, wave.hits.rows, wave.hits.tags, start, end)
         else:
             shader(queue // 2 % 3, queue % 2, wave, start, end)
 
@@ -302,14 +305,14 @@ class Tracer:
         # Most rays meet nothing. To ask only that takes a quarter of the time of finding what a ray
         # meets, which matters for the others alone.
         self.accelerator.occluded(wave.shadows.rays, (count + 15) // 16)
-        count = settle(count, wave.shadows, wave.film, aovs, self.blocked_go_on)
+        count = self._call(settle, count, wave.shadows, wave.film, aovs, self.blocked_go_on)
         triangles, _ = self.carrier.triangles(wave)
         for _ in range(MOST_LAYERS):
             if count == 0:
                 break
             self.accelerator.intersect(wave.shadows.rays, (count + 15) // 16)
             self.carrier.carry(wave, wave.shadows.rays, count)
-            count = thin_out(
-                count, wave.shadows, self.opacity, self.gaps, self.surfaces, triangles,
+            count = self._call(
+                thin_out, count, wave.shadows, self.opacity, self.gaps, self.surfaces, triangles,
                 self.epsilon, aovs, wave.film,
             )  # fmt: skip

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 import fabricusd.kernels  # noqa: F401 - chooses where kernels are cached
 from fabricusd.errors import FabricError
+from fabricusd.kernels.calls import Calls
 from fabricusd.scene.surface.embree_library import PATH, library
 
 LANES = 16
@@ -189,6 +190,7 @@ class Accelerator:
         self._triangles = np.ascontiguousarray(triangles, np.uint32)
         self._device = self._scene = 0
         self._python: Any = None
+        self._call = Calls()
         self.begins = np.zeros((len(groups) + 1, 2), np.int64)
         if _LIBRARY is None:
             self._python = _python_scene(self._points[:-1], self._triangles)
@@ -275,11 +277,11 @@ class Accelerator:
             _python_trace(self._python, rays, count, occlusion=False)
             return
         if self._placements is not None and not coherent:
-            _trace_rays(self._scene, rays, count, False)
+            self._call(_trace_rays, self._scene, rays, count, False)
             return
         together = coherent and self._placements is None
         arguments = ctypes.addressof(_TOGETHER) if together else 0
-        _intersect_packets(self._scene, self._valid.ctypes.data, arguments, rays, count)
+        self._call(_intersect_packets, self._scene, self._valid.ctypes.data, arguments, rays, count)
 
     def occluded(self, rays: NDArray[np.float32], count: int) -> None:
         """Set TFAR to -inf for each blocked ray of the first `count` packets."""
@@ -287,9 +289,9 @@ class Accelerator:
             _python_trace(self._python, rays, count, occlusion=True)
             return
         if self._placements is not None:
-            _trace_rays(self._scene, rays, count, True)
+            self._call(_trace_rays, self._scene, rays, count, True)
             return
-        _occluded_packets(self._scene, self._valid.ctypes.data, 0, rays, count)
+        self._call(_occluded_packets, self._scene, self._valid.ctypes.data, 0, rays, count)
 
     def __del__(self) -> None:
         if _LIBRARY is not None and getattr(self, "_scene", False):

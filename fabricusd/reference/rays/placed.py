@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabricusd.kernels.calls import Calls
 from fabricusd.kernels.real import INLINE, LEAN, whole
 from fabricusd.reference.rays.embree import (
     GEOMETRY,
@@ -64,7 +65,7 @@ class Carrier:
     """Gives the stages of a batch the triangles that its rays hit."""
 
     def __init__(self, tables: TriangleTables, begins: NDArray[np.int64]) -> None:
-        self._tables, self._begins = tables, begins
+        self._tables, self._begins, self._call = tables, begins, Calls()
         self._places = tables.placements.reshape(-1, 12)
         self._every = Triangles(tables.records, tables.material)
 
@@ -80,7 +81,7 @@ class Carrier:
         """Bring the triangles that the first `count` rays hit to where their instances stand."""
         if self._tables.groups:
             source = self._source(wave)
-            to_world(count, rays, self._begins, self._places, source, wave.carried)
+            self._call(to_world, count, rays, self._begins, self._places, source, wave.carried)
 
     def _source(self, wave: Wave) -> Carried:
         tables = self._tables

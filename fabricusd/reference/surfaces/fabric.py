@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -43,6 +43,7 @@ from fabricusd.appearance.weave.yarn.compiled import compile_yarn
 from fabricusd.cache import kept_groups
 from fabricusd.fabric import Fabric, one_side
 from fabricusd.kernels.cache import fingerprint
+from fabricusd.kernels.calls import Calls
 from fabricusd.kernels.real import INLINE, KERNEL, LEAN
 from fabricusd.reference.rays.embree import aligned_empty
 from fabricusd.reference.rays.wave import (
@@ -136,6 +137,7 @@ class _Side:
         self.fabric, self.method, self.make_ready = fabric, shadow, make_ready
         self.yarn = compile_yarn(fabric, back_of=front) if fabric.is_uneven else None
         self.types, self.hairy = len(fabric.threads), optical_depth(fabric) > 0.0
+        self.call = Calls()
         self._law: SurfaceLaw | None = None
         self._fuzz: Fuzz | None = None
         self._near: tuple[CompiledFabric, Shadow] | None = None
@@ -214,23 +216,25 @@ class FabricShader:
         self._shade(level, back, wave, first, last)
         fuzz = side.fuzz
         if fuzz is not None:
-            lay_fuzz(R, fuzz, level == FAR_LEVEL, side.types, wave.hits.rows, first, last)
+            is_far, rows = level == FAR_LEVEL, wave.hits.rows
+            side.call(lay_fuzz, R, fuzz, is_far, side.types, rows, first, last)
 
     def _shade(self, level: int, back: int, wave: Wave, first: int, last: int) -> None:
         side, hits = self.sides[back], wave.hits.rows
         if level == FAR_LEVEL and side.law.kind == PUBLISHED_ONLY:
-            shade_far(R, side.law.published, side.law.lobes, self.is_open, hits, first, last)
+            law = side.law
+            side.call(shade_far, R, law.published, law.lobes, self.is_open, hits, first, last)
             return
         if level == FAR_LEVEL and side.law.kind == CONSERVING_ONLY:
-            shade_far_conserving(
-                R, side.law.conserving, side.law.conserving_lobes, self.sides[0].law.conserving,
-                self.is_open, hits, first, last,
+            side.call(
+                shade_far_conserving, R, side.law.conserving, side.law.conserving_lobes,
+                self.sides[0].law.conserving, self.is_open, hits, first, last,
             )  # fmt: skip
             return
         scratch = wave.scratch or _Scratch(wave.capacity)
         wave.scratch = scratch
         scattering = scratch.scattering(last - first)
-        gather(hits, first, last - first, scattering.wo, scattering.wi)
+        side.call(gather, hits, first, last - first, scattering.wo, scattering.wi)
         passes = scratch.passes[: last - first]
         if level == FAR_LEVEL:
             self._shade_by_law(side, hits, first, scattering, passes)
@@ -251,9 +255,9 @@ class FabricShader:
         count = len(passes)
         none, real = np.zeros(count, np.uint8), np.zeros(count, np.float32)
         points = Points(none, none.astype(np.int32), real, real, real, real, real, real[:0])
-        _by_law(R, side.law, FAR_LEVEL, hits, first, scattering, places_of(points))
-        pass_far(R, self.sides[0].law.conserving, self.is_open, scattering.wo, passes)
-        finish_by_law(R, hits, first, passes, scattering)
+        side.call(_by_law, R, side.law, FAR_LEVEL, hits, first, scattering, places_of(points))
+        side.call(pass_far, R, self.sides[0].law.conserving, self.is_open, scattering.wo, passes)
+        side.call(finish_by_law, R, hits, first, passes, scattering)
 
     def _shade_near(
         self,
@@ -269,49 +273,48 @@ class FabricShader:
     ) -> None:
         wo, wi, go, towards, onwards = scattering
         hits = wave.hits.rows
-        law, (cloth, shadow) = side.law, side.near
+        law, (cloth, shadow), call = side.law, side.near, side.call
         count = wo.shape[1]
         places = places_of(points)
         v_sign = R(-1) if back else R(1)
         if side.yarn is None:
-            look_up(R, cloth, shadow, v_sign, hits, first, points)
+            call(look_up, R, cloth, shadow, v_sign, hits, first, points)
         else:
             home = self.home if wave.carried is None else wave.carried.home
-            look_up_uneven(
-                R, cloth, side.yarn, home, v_sign, wave.hits.tags[PRIMITIVE], hits, first,
-                points,
+            call(
+                look_up_uneven, R, cloth, side.yarn, home, v_sign, wave.hits.tags[PRIMITIVE], hits,
+                first, points,
             )  # fmt: skip
         if law.kind == PUBLISHED_ONLY:
-            sample_points(
-                R, law.published.threads, law.lobes, level == THREAD_LEVEL, places, wo, wi,
-                tuple(hits[CHANCE : CHANCE + 3]), Drawn(go, hits[F_PDF], hits[GO_PDF]), first,
-                count,
+            call(
+                sample_points, R, law.published.threads, law.lobes, level == THREAD_LEVEL, places,
+                wo, wi, tuple(hits[CHANCE : CHANCE + 3]), Drawn(go, hits[F_PDF], hits[GO_PDF]),
+                first, count,
             )  # fmt: skip
-            near = (R, law.published, level == THREAD_LEVEL, places)
-            point_values(*near, wi, wo, towards, 0, count)
-            point_values(*near, go, wo, onwards, 0, count)
-            pass_gaps(R, law.published, self.is_open, wo, passes)
+            near: tuple[Any, ...] = (R, law.published, level == THREAD_LEVEL, places)
+            call(point_values, *near, wi, wo, towards, 0, count)
+            call(point_values, *near, go, wo, onwards, 0, count)
+            call(pass_gaps, R, law.published, self.is_open, wo, passes)
         else:
             if law.kind == CONSERVING_ONLY:
-                table, lobes, across_too = (
-                    law.conserving,
-                    law.conserving_lobes,
-                    level == THREAD_LEVEL,
-                )
-                sample_points_both(
-                    R, table.threads, lobes, across_too, places, wo, wi,
+                table, lobes = law.conserving, law.conserving_lobes
+                across_too = level == THREAD_LEVEL
+                call(
+                    sample_points_both, R, table.threads, lobes, across_too, places, wo, wi,
                     tuple(hits[CHANCE : CHANCE + 3]), Drawn(go, hits[F_PDF], hits[GO_PDF]), first,
                     count,
                 )  # fmt: skip
-                sample_gaps(R, lobes, places.sets, hits, first, scattering)
-                conserving_point_values(R, table, across_too, places, wi, wo, towards, 0, count)
-                conserving_point_values(R, table, across_too, places, go, wo, onwards, 0, count)
+                call(sample_gaps, R, lobes, places.sets, hits, first, scattering)
+                values, near = conserving_point_values, (R, table, across_too, places)
+                call(values, *near, wi, wo, towards, 0, count)
+                call(values, *near, go, wo, onwards, 0, count)
             else:
-                _by_law(R, law, level, hits, first, scattering, places)
-            pass_places(R, law.conserving, self.is_open, points.sets, wo, passes)
-        shadows(cloth, shadow, v_sign, hits, first, (wi, go), points, lit)
-        finish_point(
-            R, law.kind == PUBLISHED_ONLY, side.types, hits, first, scattering, points, passes, lit
+                call(_by_law, R, law, level, hits, first, scattering, places)
+            call(pass_places, R, law.conserving, self.is_open, points.sets, wo, passes)
+        shadows(call, cloth, shadow, v_sign, hits, first, (wi, go), points, lit)
+        call(
+            finish_point, R, law.kind == PUBLISHED_ONLY, side.types, hits, first, scattering,
+            points, passes, lit,
         )  # fmt: skip
 
 

@@ -42,6 +42,7 @@ from fabricusd.appearance.weave.yarn.lay import (
     sound,
     strand,
 )
+from fabricusd.kernels.calls import Calls
 from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, LEAN
 from fabricusd.reference.rays.wave import FOOTPRINT, PLACE
 
@@ -166,6 +167,7 @@ def _look_up_laid(R, cloth, yarn, home, v_sign, u, v, x, reals, ints, hits, h, k
 
 
 def shadows(
+    call: Calls,
     cloth: CompiledFabric,
     shadow: Shadow,
     v_sign: np.float32,
@@ -175,12 +177,15 @@ def shadows(
     points: Points,
     lit: Lit,
 ) -> None:
-    """Compute `lit` of hits from `first` on, for light from `directions`, each (3, n)."""
+    """Compute `lit` of hits from `first` on, for light from `directions`, each (3, n).
+
+    call : what calls the kernels of this cloth
+    """
     if shadow.method == NONE:
         lit.light[:] = lit.bounce[:] = 1.0
         return
     kernel = shadows_by_horizon if shadow.method == HORIZON else shadows_one_by_one
-    kernel(R, cloth, shadow, v_sign, hits, first, directions, points, lit)
+    call(kernel, R, cloth, shadow, v_sign, hits, first, directions, points, lit)
 
 
 @njit(**KERNEL)
