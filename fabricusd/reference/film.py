@@ -58,7 +58,7 @@ of the pixel's mean, see `Film.variance`."""
 
 _ALWAYS = ("beauty", "direct", "indirect", "variance", "samples")
 _FIRST = (DEPTH_Z, UV, UV + 1, THREAD_ID)
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+_LUMINANCE = tuple(np.float32(share) for share in (0.2126, 0.7152, 0.0722))
 
 GROUP = 4
 """Number of samples averaged into one group; the first estimate of the variance is that of the
@@ -72,6 +72,13 @@ _FEWEST = TILE * TILE // 4
 """Number of pixels that must be ready before a tile's share is updated."""
 _LEAST_SHARE, _LARGEST_SHARE = 1.0 / 64.0, 2.0
 _BRIGHTEST = 1e15
+
+
+def _luminance(rows: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The luminance of (3, n) channels. A matrix product would start threads of BLAS, which then
+    spin for a tenth of a second on processors that workers need."""
+    red, green, blue = _LUMINANCE
+    return np.asarray(red * rows[0] + green * rows[1] + blue * rows[2])
 
 
 def require_aovs(names: tuple[str, ...]) -> None:
@@ -173,7 +180,7 @@ class Film:
             self._share[row] = self._shares(part, self._share[row])
             n, m = self.samples[part], self._half_samples[part]
             grown = (n > 0) & (n >= 2 * m)
-            total = _LUMINANCE @ self._total(part)
+            total = _luminance(self._total(part))
             self._half[part] = np.where(grown, total, self._half[part])
             self._half_samples[part] = np.where(grown, n, m)
 
@@ -183,8 +190,8 @@ class Film:
         ready = (halves > 0) & (3 * halves <= 2 * counts) & (self.groups[part] > 1)
         n = np.maximum(counts, 1).astype(np.float32)
         m = np.where(ready, halves, 0).astype(np.float32)
-        mean = _LUMINANCE @ self._total(part) / n
-        deviation = _LUMINANCE @ np.sqrt(self.spread[:, part])
+        mean = _luminance(self._total(part)) / n
+        deviation = _luminance(np.sqrt(self.spread[:, part]))
         # The squares of larger values overflow float32.
         ready &= (np.abs(mean) < _BRIGHTEST) & (deviation < _BRIGHTEST)
         mean, deviation = np.where(ready, mean, 0), np.where(ready, deviation, 0)
@@ -214,8 +221,8 @@ class Film:
         pixel does not stop early. The colour channels are correlated, so their standard deviations
         are added rather than their variances.
         """
-        luminance = _LUMINANCE @ self.beauty()
-        deviation = _LUMINANCE @ np.sqrt(self.variance())
+        luminance = _luminance(self.beauty())
+        deviation = _luminance(np.sqrt(self.variance()))
         floor = max(0.01 * float(luminance.mean()), 1e-12)
         error = (deviation / np.maximum(np.abs(luminance), floor)).reshape(self.height, self.width)
         rows = error.copy()

@@ -44,7 +44,7 @@ from fabricusd.reference.rays.wave import (
     Wave,
 )
 from fabricusd.reference.stages import arrivals
-from fabricusd.reference.stages.arrivals import AUTO_LEVEL, QUEUES, Settings, arrive, sort_lanes
+from fabricusd.reference.stages.arrivals import AUTO_LEVEL, QUEUES, Settings, arrive
 from fabricusd.reference.stages.departures import depart, record_first
 from fabricusd.reference.stages.hits import add_emission, prepare
 from fabricusd.reference.stages.shadow_rays import settle, share_that_goes_on, thin_out
@@ -247,7 +247,7 @@ class Tracer:
         rows[LANE_PDF, :count] = -1.0
         tags[0, :count] = np.arange(count)
         tags[1:, :count] = 0
-        counts = np.zeros(QUEUES * len(self.shaders), np.int64)
+        ends = np.zeros(QUEUES * len(self.shaders), np.int64)
         result = np.zeros(3, np.int64)
         triangles, uv = self.carrier.triangles(wave)
         call = self._call
@@ -257,22 +257,22 @@ class Tracer:
             counters[0] += count
             call(
                 arrive, step, self.settings, count, wave.lanes, wave.paths, self.numbers,
-                self.lights, triangles, self._limits, wave.film, wave.queues, counts, lost,
+                self.lights, triangles, self._limits, wave.film, wave.queues, ends, lost,
             )  # fmt: skip
-            ends = np.cumsum(counts)
             hits = int(ends[-1])
             if hits == 0:
                 break
-            call(sort_lanes, count, wave.queues, ends - counts)
             call(
                 prepare, step, self.settings, ends, wave.lanes, wave.queues, wave.paths,
                 self.numbers, triangles, self.lights, self.epsilon, wave.hits,
             )  # fmt: skip
             if self.shines:
                 call(add_emission, hits, self.surfaces, wave.hits, wave.film)
-            for queue in np.flatnonzero(counts):
-                start, end = int(ends[queue] - counts[queue]), int(ends[queue])
-                self._shade(wave, int(queue), start, end)
+            start = 0
+            for queue, end in enumerate(ends.tolist()):
+                if end > start:
+                    self._shade(wave, queue, start, end)
+                start = end
             if aovs and step <= MOST_LAYERS:
                 record_first(hits, lens.eye, lens.axis, wave.hits, uv, wave.film)
             call(

@@ -69,6 +69,7 @@ class _Arguments(ctypes.Structure):
 _TOGETHER = _Arguments(flags=_COHERENT, feature_mask=_ALL_FEATURES)
 """Arguments that make Embree traverse the hierarchy with all rays of a packet together instead of
 one ray after the other."""
+_TOGETHER_AT = ctypes.addressof(_TOGETHER)
 
 
 _LIBRARY = library()
@@ -211,6 +212,7 @@ class Accelerator:
             raise FabricError("Embree", f"refuses the scene's {len(triangles)} triangles ({error})")
         self._valid = aligned_empty((LANES,), np.int32)
         self._valid[:] = -1
+        self._valid_at = self._valid.ctypes.data
 
     def _new_scene(self) -> int:
         scene: int = _LIBRARY.rtcNewScene(self._device)  # type: ignore[union-attr]
@@ -280,8 +282,8 @@ class Accelerator:
             self._call(_trace_rays, self._scene, rays, count, False)
             return
         together = coherent and self._placements is None
-        arguments = ctypes.addressof(_TOGETHER) if together else 0
-        self._call(_intersect_packets, self._scene, self._valid.ctypes.data, arguments, rays, count)
+        arguments = _TOGETHER_AT if together else 0
+        self._call(_intersect_packets, self._scene, self._valid_at, arguments, rays, count)
 
     def occluded(self, rays: NDArray[np.float32], count: int) -> None:
         """Set TFAR to -inf for each blocked ray of the first `count` packets."""
@@ -291,7 +293,7 @@ class Accelerator:
         if self._placements is not None:
             self._call(_trace_rays, self._scene, rays, count, True)
             return
-        self._call(_occluded_packets, self._scene, self._valid.ctypes.data, 0, rays, count)
+        self._call(_occluded_packets, self._scene, self._valid_at, 0, rays, count)
 
     def __del__(self) -> None:
         if _LIBRARY is not None and getattr(self, "_scene", False):

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.weave.footprint import level_weights, pick_level
-from fabricusd.kernels.real import INLINE, KERNEL, LEAN, PART, whole
+from fabricusd.kernels.real import INLINE, KERNEL, PART, whole
 from fabricusd.reference.lights.hits import meet_lights
 from fabricusd.reference.lights.ray_block import (
     BEFORE,
@@ -93,16 +93,16 @@ _ROWS = LIGHT_ROWS + 16
 
 @njit(**KERNEL)
 def arrive(step, settings, count, lanes, paths, numbers, lights, triangles, limits, film, queues,
-           counts, lost):  # fmt: skip
-    """Add the light that rays hit, and write each lane's queue key; -1 for a lane that ends.
+           ends, lost):  # fmt: skip
+    """Add the light that rays hit, and sort the lanes that hit a surface into queues.
 
     limits : (materials, 4) float32 - `footprint.Limits.row` of a fabric, 0 for a surface without
         levels
-    counts : (QUEUES materials,) int64 - filled with the length of each queue; the key of a queue is
-        `(3 material + level) 2 + back`
+    ends : (QUEUES materials,) int64 - filled with where each queue ends in `queues.order`; the key
+        of a queue is `(3 material + level) 2 + back`, and -1 for a lane that ends
     lost : (1,) float64 - throughput of the lanes that a bound on bounces ends, added to
     """
-    counts[:] = 0
+    ends[:] = 0
     count = whole(count)
     table, dome = lights.table, lights.dome
     block = np.empty(_ROWS * BLOCK, np.float32)
@@ -117,7 +117,8 @@ def arrive(step, settings, count, lanes, paths, numbers, lights, triangles, limi
             _load_levels(start, size, lanes, paths, triangles, limits, counters, block)
             place = np.uint32(2 + NUMBERS_PER_STEP * step + 2)
             _choose_levels(numbers, place, size, counters, block)
-        _give_keys(start, size, settings, lanes, triangles, limits, queues, counts, lost, block)
+        _give_keys(start, size, settings, lanes, triangles, limits, queues, ends, lost, block)
+    _sort_lanes(count, queues, ends)
 
 
 @njit(**PART)
@@ -267,13 +268,18 @@ def _advance(offsets, key):
     return place
 
 
-@njit(**LEAN)
-def sort_lanes(count, queues, offsets):
+@njit(**PART)
+def _sort_lanes(count, queues, ends):
     """Write the numbers of the lanes that go on to `queues.order`, sorted by queue.
 
-    offsets : (queues,) int64 - where each queue starts; on return, where it ends
+    ends : (queues,) int64 - the length of each queue; on return, where it ends
     """
     keys, order = queues.keys, queues.order
-    for k in range(whole(count)):
+    total = np.int64(0)
+    for queue in range(ends.shape[0]):
+        length = ends[queue]
+        ends[queue] = total
+        total += length
+    for k in range(count):
         if keys[k] >= 0:
-            order[_advance(offsets, whole(keys[k]))] = k
+            order[_advance(ends, whole(keys[k]))] = k

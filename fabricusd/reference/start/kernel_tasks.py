@@ -42,7 +42,7 @@ from fabricusd.reference.rays.wave import (
     PRIMITIVE,
     Wave,
 )
-from fabricusd.reference.stages.arrivals import Settings, arrive, sort_lanes
+from fabricusd.reference.stages.arrivals import Settings, arrive
 from fabricusd.reference.stages.departures import depart
 from fabricusd.reference.stages.hits import prepare
 from fabricusd.reference.stages.shadow_rays import settle, thin_out
@@ -126,12 +126,11 @@ def _share_lobes_projected() -> None:
 
 def _arrive() -> None:
     _, wave, triangles, lights, _ = _sample()
-    counts, limits = np.zeros(6, np.int64), np.zeros((1, 4), np.float32)
+    ends, limits = np.zeros(6, np.int64), np.zeros((1, 4), np.float32)
     arrive(
         0, _SETTINGS, 0, wave.lanes, wave.paths, new_numbers(0), lights, triangles, limits,
-        wave.film, wave.queues, counts, np.zeros(1),
+        wave.film, wave.queues, ends, np.zeros(1),
     )  # fmt: skip
-    sort_lanes(0, wave.queues, np.cumsum(counts) - counts)
 
 
 def _shade_preview() -> None:
