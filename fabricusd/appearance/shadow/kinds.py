@@ -25,6 +25,8 @@ class Shadow(NamedTuple):
     texels : the same memory as a one-dimensional array
     mean : (stretches, columns + 1, GROUPS) real, flat - `mean.groups_of`, horizons in softnesses;
         one entry for `none`
+    mean_clear : (stretches,) real - sine of the elevation from which on light reaches all places of
+        a stretch, whatever its azimuth; above 1 where none does, 0 if its shadow is absolute
     mean_columns, groups : int - its azimuths; GROUPS
     mean_first, piece_first, piece_last, piece_scale : see `mean.Stretches`
     absolute : (k,) uint8 - whether threads of the type follow a law with an absolute shadow
@@ -41,6 +43,7 @@ class Shadow(NamedTuple):
     kinds: NDArray[np.int32]
     texels: NDArray[np.uint8]
     mean: NDArray[Any]
+    mean_clear: NDArray[Any]
     mean_columns: int
     groups: int
     mean_first: NDArray[np.int32]

@@ -86,6 +86,13 @@ def stretches(fabric: Fabric, longest: int) -> Stretches:
     )
 
 
+def types_of(cut: Stretches) -> NDArray[np.int64]:
+    """(total,) the type of thread that each stretch is of."""
+    starts = cut.first.reshape(-1)
+    every = np.arange(len(starts)) % cut.first.shape[1]
+    return np.repeat(every, np.diff(starts, append=cut.total))
+
+
 @njit(**INLINE)
 def stretch_of(R, cloth, shadow, which, thread, s):
     """Number of the stretch at position s on a run of `thread` in set `which`; s must be finite."""
@@ -144,6 +151,14 @@ def groups_of(number: NDArray[np.int64], count: int, horizon: Floats) -> Floats:
         found[stretch, :-1] = whole.T
     found[:, -1] = found[:, 0]
     return found
+
+
+def clear_from(groups: Floats, softness: float) -> Floats:
+    """(stretches,) `Shadow.mean_clear`; groups : of `groups_of`, softness : edge's width [rad]."""
+    highest = groups.max(axis=(1, 2))
+    # From half a softness above the highest horizon on, `mean_over` is 1.
+    elevation = (highest + 0.5) * softness
+    return np.where(elevation < 0.5 * math.pi, np.sin(np.minimum(elevation, 0.5 * math.pi)), 2.0)
 
 
 @njit(**INLINE)

@@ -60,6 +60,7 @@ from fabricusd.appearance.shadow.kinds import (
 )
 from fabricusd.appearance.shadow.mean import (
     GROUPS,
+    clear_from,
     groups_of,
     level_of,
     mean_of,
@@ -69,6 +70,7 @@ from fabricusd.appearance.shadow.mean import (
     stretch_in,
     stretch_of,
     stretches,
+    types_of,
 )
 from fabricusd.appearance.shadow.place_blocks import (
     FIRST,
@@ -97,7 +99,7 @@ from fabricusd.appearance.weave.lookup import (
 from fabricusd.appearance.weave.place import Hit
 from fabricusd.errors import FabricError
 from fabricusd.fabric import Fabric
-from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, index
+from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, index, whole
 
 TRACED_SOFTNESS = math.radians(1.0)
 """Width [rad] of the soft edge used for the mean of `traced`; the marched `g` has a hard edge."""
@@ -158,6 +160,7 @@ def compile_shadow(
         kinds=kinds,
         texels=table.reshape(-1),
         mean=np.ones(1),
+        mean_clear=np.zeros(1),
         mean_columns=_COLUMNS[METHODS.index(method)],
         groups=GROUPS,
         mean_first=cut.first,
@@ -168,7 +171,11 @@ def compile_shadow(
         all_absolute=int(_absolute(fabric).all()),
     )
     if double.method != NONE:
-        double = double._replace(mean=_mean(fabric, cloth, double, cut.total))
+        mean = _mean(fabric, cloth, double, cut.total)
+        clear = clear_from(mean, float(double.softness))
+        # Threads whose law takes g itself need no mean.
+        clear[double.absolute[types_of(cut)] != 0] = 0.0
+        double = double._replace(mean=mean.reshape(-1), mean_clear=clear)
     return Shadow(*(_in_precision(value, precision) for value in double))
 
 
@@ -193,13 +200,13 @@ def _in_precision(value: Any, precision: type[np.floating[Any]]) -> Any:
 
 
 def _mean(fabric: Fabric, cloth: CompiledFabric, shadow: Shadow, count: int) -> NDArray[Any]:
-    """`Shadow.mean`; shadow : the other fields, in float64."""
+    """`Shadow.mean`, not flat; shadow : the other fields, in float64."""
     traced = shadow.method == TRACED
     columns = shadow.mean_columns
     each = FEWER_PLACES if traced else MEAN_PLACES
     uv, number = places_on(cloth, shape_repeat(fabric), shadow, count, each)
     sine = horizons_towards(cloth, shadow, uv, diamond_directions(columns))
-    return groups_of(number, count, np.arcsin(sine) / float(shadow.softness)).reshape(-1)
+    return groups_of(number, count, np.arcsin(sine) / float(shadow.softness))
 
 
 @njit(**INLINE)
@@ -291,8 +298,9 @@ def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
 def mean_block(R, cloth, shadow, wi, begin, size, ints, reals):
     """Turn the row LIT from `lit` to `shade`, in loops like those of `horizon_blocks`.
 
-    The rows FIRST and SHARES, which `horizon_block` no longer needs, hold what goes between the
-    loops.
+    Most light comes from so high that it reaches all of a stretch, whose mean is then 1: the sum
+    over groups is for the other places alone. The rows FIRST, SECOND and SHARES, which
+    `horizon_block` no longer needs, hold what goes between the loops.
     """
     if shadow.all_absolute != 0:
         return
@@ -301,21 +309,27 @@ def mean_block(R, cloth, shadow, wi, begin, size, ints, reals):
         # In gaps and for NaN the stretch is arbitrary: the result is not used.
         which, s = np.uintp(min(ints[OF_SET + k], 1)), reals[S + k]
         thread, s = np.uintp(ints[OF_THREAD + k]), s if s >= R(0) else R(0)
-        ints[FIRST + k] = stretch_in(R, cloth, shadow, which, thread, np.uintp(ints[PIECE + k]), s)
-        ints[SECOND + k] = ints[FREE + k] | np.int32(shadow.absolute[thread])
+        stretch = stretch_in(R, cloth, shadow, which, thread, np.uintp(ints[PIECE + k]), s)
+        z = wi[2, index(begin, k)]
+        shaded = (z > R(0)) & (z < shadow.mean_clear[np.uintp(stretch)]) & (ints[FREE + k] == 0)
+        ints[FIRST + k], ints[SECOND + k] = stretch, np.int32(shaded)
     for k in range(size):
         m = index(begin, k)
         column, c = column_of(R, columns, wi[0, m], wi[1, m])
         reals[SHARES + k] = c
         reals[SHARES + BLOCK + k] = level_of(R, wi[2, m], shadow.softness)
         ints[FIRST + k] = (ints[FIRST + k] * (columns + 1) + column) * GROUPS
-        ints[SECOND + k] = ints[SECOND + k] | np.int32(wi[2, m] <= R(0))
+    count = 0
     for k in range(size):
+        shaded = ints[SECOND + k]
+        ints[SECOND + whole(count)] = k
+        count += shaded
+    for n in range(whole(count)):
+        k = np.uintp(ints[SECOND + n])
         first = np.uintp(ints[FIRST + k])
         c, level = reals[SHARES + k], reals[SHARES + BLOCK + k]
         mean = mean_over(R, shadow.mean, shadow.groups, first, first + np.uintp(GROUPS), c, level)
-        g = reals[LIT + k]
-        reals[LIT + k] = g if ints[SECOND + k] != 0 else relative(R, g, mean)
+        reals[LIT + k] = relative(R, reals[LIT + k], mean)
 
 
 @njit(**PART)
