@@ -28,7 +28,7 @@ class Shadow(NamedTuple):
     mean_clear : (stretches,) real - sine of the elevation from which on light reaches all places of
         a stretch, whatever its azimuth; above 1 where none does, 0 if its shadow is absolute
     mean_columns, groups : int - its azimuths; GROUPS
-    mean_first, piece_first, piece_last, piece_scale : see `mean.Stretches`
+    piece_first, piece_last, piece_scale : see `mean.Stretches`
     absolute : (k,) uint8 - whether threads of the type follow a law with an absolute shadow
     all_absolute : int - whether all do
     """
@@ -46,7 +46,6 @@ class Shadow(NamedTuple):
     mean_clear: NDArray[Any]
     mean_columns: int
     groups: int
-    mean_first: NDArray[np.int32]
     piece_first: NDArray[np.int32]
     piece_last: NDArray[np.int32]
     piece_scale: NDArray[Any]

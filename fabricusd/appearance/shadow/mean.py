@@ -52,8 +52,8 @@ class Stretches(NamedTuple):
     """The stretches of a fabric, numbered set by set, type by type and along the curve.
 
     first : (2, k) int32 - number of the first stretch of type k in set j
-    piece_first, piece_last : (k, p) int32 - first stretch of a piece, from that of the type on; the
-        number of stretches in it less 1
+    piece_first : (2, k, p) int32 - first stretch of each piece of type k in set j
+    piece_last : (k, p) int32 - the number of stretches in it less 1
     piece_scale : (k, p) float - stretches per run length
     total : int - number of stretches
     """
@@ -81,9 +81,9 @@ def stretches(fabric: Fabric, longest: int) -> Stretches:
         scale[k, used] = count / p.length
         totals[k] = count.sum()
     starts = np.cumsum(np.concatenate((totals, totals))) - np.concatenate((totals, totals))
-    return Stretches(
-        starts.reshape(2, -1).astype(np.int32), first, last, scale, int(2 * totals.sum())
-    )
+    starts = starts.reshape(2, -1).astype(np.int32)
+    every = starts[:, :, None] + first
+    return Stretches(starts, every, last, scale, int(2 * totals.sum()))
 
 
 def types_of(cut: Stretches) -> NDArray[np.int64]:
@@ -104,7 +104,7 @@ def stretch_in(R, cloth, shadow, which, thread, p, s):
     """`stretch_of` where `s` is on piece `p` of the curve."""
     part = np.int32((s - cloth.curve_start[thread, p]) * shadow.piece_scale[thread, p])
     part = max(min(part, shadow.piece_last[thread, p]), np.int32(0))
-    return shadow.mean_first[which, thread] + shadow.piece_first[thread, p] + part
+    return shadow.piece_first[which, thread, p] + part
 
 
 def places_on(
@@ -239,7 +239,7 @@ def node_means(shadow: Any, nodes: CurveNodes, fabric: Fabric) -> Floats | None:
             if not len(here):
                 continue
             cuts = _cuts(pieces(thread.curve), shadow.piece_last[kind] + 1)
-            first = int(shadow.mean_first[which, kind])
+            first = int(shadow.piece_first[which, kind, 0])
             part = shares(nodes, here, cuts)
             for stretch in np.flatnonzero(part.any(axis=0)):
                 table = np.empty(found.shape[1:])
@@ -265,7 +265,7 @@ def angle_groups(shadow: Any, fabric: Fabric, which: int, kind: int, psi0: Float
     low = np.concatenate([np.minimum(e[:-1], e[1:]) for e in ends])
     high = np.concatenate([np.maximum(e[:-1], e[1:]) for e in ends])
     piece = np.repeat(np.arange(len(counts)), counts)
-    first = int(shadow.mean_first[which, kind])
+    first = int(shadow.piece_first[which, kind, 0])
     rows = _groups(shadow)[first : first + len(length)]
     found = np.empty((rows.shape[1], len(psi0), GROUPS))
     for k, angle in enumerate(psi0):

@@ -163,7 +163,6 @@ def compile_shadow(
         mean_clear=np.zeros(1),
         mean_columns=_COLUMNS[METHODS.index(method)],
         groups=GROUPS,
-        mean_first=cut.first,
         piece_first=cut.piece_first,
         piece_last=cut.piece_last,
         piece_scale=cut.piece_scale,
@@ -328,7 +327,7 @@ def mean_block(R, cloth, shadow, wi, begin, size, ints, reals):
         k = np.uintp(ints[SECOND + n])
         first = np.uintp(ints[FIRST + k])
         c, level = reals[SHARES + k], reals[SHARES + BLOCK + k]
-        mean = mean_over(R, shadow.mean, shadow.groups, first, first + np.uintp(GROUPS), c, level)
+        mean = mean_over(R, shadow.mean, GROUPS, first, first + np.uintp(GROUPS), c, level)
         reals[LIT + k] = relative(R, reals[LIT + k], mean)
 
 

@@ -32,7 +32,7 @@ TABLES: dict[str, tuple[int, str]] = {
     "cloth.curve_start": (2, FLOAT), "cloth.curve_angle": (2, FLOAT),
     "cloth.curve_slope": (2, FLOAT), "cloth.pile": (1, INT),
     "shadow.table": (5, BYTE), "shadow.kinds": (2, INT), "shadow.mean": (1, QUAD),
-    "shadow.mean_first": (2, INT), "shadow.piece_first": (2, INT), "shadow.piece_last": (2, INT),
+    "shadow.piece_first": (3, INT), "shadow.piece_last": (2, INT),
     "shadow.piece_scale": (2, FLOAT), "shadow.absolute": (1, INT),
     "fuzz.phase": (3, FLOAT), "fuzz.lost": (1, FLOAT), "fuzz.up": (2, FLOAT),
     "fuzz.again": (2, FLOAT),
