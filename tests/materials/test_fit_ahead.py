@@ -53,6 +53,7 @@ def test_the_fits_of_the_cluster_are_those_of_this_process(cluster, jobs, elsewh
     assert len(theirs) >= 3
 
 
+@pytest.mark.exhaustive
 def test_what_is_known_is_not_fitted_again(cluster, jobs, elsewhere, monkeypatch):
     for job in jobs:
         job.fit()

@@ -35,7 +35,9 @@ def test_golden_pictures_would_see_a_lamp_five_per_cent_brighter():
     assert not against_golden("satin_far", brightness=1.05)[0]
 
 
-@pytest.mark.parametrize("name", ["silk_ball", "linen_skirt"])
+@pytest.mark.parametrize(
+    "name", ["silk_ball", pytest.param("linen_skirt", marks=pytest.mark.exhaustive)]
+)
 def test_golden_pictures_would_see_facets_where_normals_are_smooth(name):
     # The skirt shows as much of its inside as of its outside: a quarter of the samples miss this.
     assert not against_golden(name, spp=4096, smooth=False)[0]

@@ -112,7 +112,7 @@ PEAK_SOFTNESS = math.radians(5.0)
 """Width [rad] of the edge of a `peak` shadow. The horizon of `peak` is a guess, and a sharper edge
 would only alias."""
 
-MEAN_PLACES, FEWER_PLACES = 1024, 64
+MEAN_PLACES, FEWER_PLACES = 4096, 64
 """Places of each stretch over which the mean of `g` is taken; fewer where each takes a march."""
 
 

@@ -93,19 +93,29 @@ def test_no_pair_of_directions_is_darker_than_black():
     assert np.mean(value == 0.0) < 1e-3
 
 
-def test_level_far_is_the_mean_of_weave_under_a_low_sun():
-    # With the mean of each node's own part of the curve, the first and last are off by .02 to .04.
-    fabric = even(load("thread_polyester_filament"))
-    n = 20000
+# With the mean of each node's own part of the curve, filament is off by .02 to .04; crepe by .015
+# with lines between samples of the mean, and satin's back by .011 with 1024 places of a stretch.
+@pytest.mark.parametrize(
+    ("name", "elevation", "azimuth"),
+    [
+        ("thread_polyester_filament", 5.0, 146.0),
+        ("silk_crepe_de_chine", 5.0, 236.25),
+        ("polyester_satin_charmeuse_back", 10.0, 281.25),
+    ],
+)
+def test_level_far_is_the_mean_of_weave_under_a_low_sun(name, elevation, azimuth):
+    fabric = even(load(name))
+    n = 40000
     uv = np.arange(n)[:, None] * [0.7548776662466927, 0.5698402909980532] % 1.0
     uv *= true_repeat(fabric)
-    wi = np.array([-0.83, 0.56, 0.0872])
-    wi /= np.linalg.norm(wi)
-    for wo in ([0.0, 0.0, 1.0], [-0.5, 0.3, 0.81], [0.33, -0.85, 0.42]):
+    up, turn = np.radians(elevation), np.radians(azimuth)
+    wi = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
+    for wo in ([0.0, 0.0, 1.0], [-0.5, 0.3, 0.81], [0.54, 0.2, 0.82], [-0.31, 0.85, 0.42]):
         wo = np.array(wo) / np.linalg.norm(wo)
         near = evaluate(fabric, np.repeat(wi[None], n, axis=0), wo, uv, "weave", "horizon")
         far = evaluate(fabric, wi, wo, shadow="horizon")[0]
-        assert near.mean(axis=0) == pytest.approx(far, rel=0.01)
+        brightest = far.argmax()
+        assert near.mean(axis=0)[brightest] == pytest.approx(far[brightest], rel=0.01)
 
 
 @pytest.mark.parametrize("name", ["linen_plain", "silk_shot{appearance=published}", "velvet"])

@@ -107,7 +107,7 @@ def test_light_of_a_neighbour_is_named_with_its_side():
     assert "Round and Bias" in said[0]
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_what_flannel_does_not_tell_apart_is_told_as_a_product():
     # Its light is wide: threads from kd .5 and gv 46 degrees to kd .9 and gv 12 are nearly alike.
     template = template_of("wool_flannel", SURFACE_LAWS[1])
