@@ -81,9 +81,9 @@ def stretches(fabric: Fabric, longest: int) -> Stretches:
         scale[k, used] = count / p.length
         totals[k] = count.sum()
     starts = np.cumsum(np.concatenate((totals, totals))) - np.concatenate((totals, totals))
-    starts = starts.reshape(2, -1).astype(np.int32)
-    every = starts[:, :, None] + first
-    return Stretches(starts, every, last, scale, int(2 * totals.sum()))
+    of_sets = starts.reshape(2, -1).astype(np.int32)
+    every = of_sets[:, :, None] + first
+    return Stretches(of_sets, every, last, scale, int(2 * totals.sum()))
 
 
 def types_of(cut: Stretches) -> NDArray[np.int64]:

@@ -324,11 +324,11 @@ def mean_block(R, cloth, shadow, wi, begin, size, ints, reals):
         ints[SECOND + whole(count)] = k
         count += shaded
     for n in range(whole(count)):
-        k = np.uintp(ints[SECOND + n])
-        first = np.uintp(ints[FIRST + k])
-        c, level = reals[SHARES + k], reals[SHARES + BLOCK + k]
+        x = np.uintp(ints[SECOND + n])
+        first = np.uintp(ints[FIRST + x])
+        c, level = reals[SHARES + x], reals[SHARES + BLOCK + x]
         mean = mean_over(R, shadow.mean, GROUPS, first, first + np.uintp(GROUPS), c, level)
-        reals[LIT + k] = relative(R, reals[LIT + k], mean)
+        reals[LIT + x] = relative(R, reals[LIT + x], mean)
 
 
 @njit(**PART)
