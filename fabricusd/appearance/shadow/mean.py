@@ -172,7 +172,7 @@ def mean_over(R, horizons, groups, here, beside, c, level):
     """Mean of g over the groups whose horizons begin at `here`, and at `beside` in the next
     column.
 
-    groups : GROUPS, read from memory: LLVM would unroll a loop of known length, not vectorise it
+    groups : GROUPS; as a constant in `mean_block`, where that is faster, else read from memory
     """
     total = R(0)
     for k in range(groups):
