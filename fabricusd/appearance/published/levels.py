@@ -58,6 +58,10 @@ _THREAD = 26 * BLOCK
 POINT_ROWS = 26 + POINT_COLUMNS
 _NO_MODEL = -1.0
 
+_FEW_TYPES = 6
+"""Up to as many types of thread, it is faster to choose among the numbers of all than to read those
+of each point's own."""
+
 
 @njit(**PART)
 def point_value(R, tables, across_too, place, ix, iy, iz, ox, oy, oz):
@@ -141,15 +145,15 @@ def _has_model(R, tables, model):
 @njit(**INLINE)
 def _copy_threads(R, tables, places, first, size, block):
     """Copy set, tangent angle, place across and the thread's numbers for a block of points."""
+    _copy_numbers(R, tables, places, first, size, block)
     for x in range(size):
         k = index(first, x)
-        which, thread = places.sets[k], np.uintp(places.threads[k])
+        which = places.sets[k]
         block[_IS_WARP + x] = R(1) if which == WARP else R(0)
         block[_ACROSS + x] = places.w[k]
-        for column in range(POINT_COLUMNS):
-            block[_THREAD + column * BLOCK + x] = tables.threads[thread, column]
-        if which != WEFT and which != WARP:
-            block[_THREAD + MODEL * BLOCK + x] = R(_NO_MODEL)
+        model = block[_THREAD + MODEL * BLOCK + x]
+        found = which in (WEFT, WARP)
+        block[_THREAD + MODEL * BLOCK + x] = model if found else R(_NO_MODEL)
     if places.shade.size > 0:
         for x in range(size):
             shade = R(places.shade[index(first, x)])
@@ -158,6 +162,28 @@ def _copy_threads(R, tables, places, first, size, block):
     for x in range(size):
         k = index(first, x)
         block[_COS + x], block[_SIN + x] = cos(R, places.psi0[k]), sin(R, places.psi0[k])
+
+
+@njit(**INLINE)
+def _copy_numbers(R, tables, places, first, size, block):
+    """Copy the columns of each point's thread. The sums give indices that cannot be negative."""
+    types = tables.threads.shape[0]
+    if types > _FEW_TYPES:
+        for x in range(size):
+            own = np.uintp(places.threads[index(first, x)])
+            for column in range(POINT_COLUMNS):
+                row = _THREAD + column * BLOCK
+                block[index(row, x)] = tables.threads[own, np.uintp(column)]
+        return
+    for column in range(POINT_COLUMNS):
+        row, value = _THREAD + column * BLOCK, tables.threads[0, column]
+        for x in range(size):
+            block[index(row, x)] = value
+        for thread in range(1, types):
+            value = tables.threads[thread, column]
+            for x in range(size):
+                mine = places.threads[index(first, x)] == thread
+                block[index(row, x)] = value if mine else block[index(row, x)]
 
 
 _row_at = tuple_reader(POINT_COLUMNS, BLOCK)

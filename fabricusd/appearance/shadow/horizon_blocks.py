@@ -20,6 +20,7 @@ from fabricusd.appearance.shadow.place_blocks import (
     TABLE_I,
     TABLE_J,
     TOP,
+    TURN,
     X,
     Y,
 )
@@ -33,7 +34,8 @@ def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
 
     wi : (3, n), of which the block uses the columns from `begin` on
 
-    The indices for both azimuths go to the rows FIRST and SECOND, the weights to SHARES.
+    The indices for both azimuths go to the rows FIRST and SECOND, the weights to SHARES, and the
+    azimuth itself to TURN.
     """
     rows, azimuths = table.shape[3], table.shape[4]
     picks, slots = table.shape[1], table.shape[2]
@@ -60,16 +62,19 @@ def choose_texels(R, cloth, table, wi, begin, size, ints, reals):
         texel = ((ints[TABLE_I + k] * picks + ints[TABLE_J + k]) * slots + slot) * rows + row
         ints[FIRST + k], ints[SECOND + k] = texel * azimuths + first, texel * azimuths + second
         reals[SHARES + k], reals[SHARES + BLOCK + k] = a, turn - R(first)
+        reals[TURN + k] = turn
 
 
 @njit(**PART)
-def mix_texels(R, texels, azimuths, size, ints, reals):
+def mix_texels(R, texels, size, ints, reals):
     """Interpolate the horizon's sine at a block of places in the flat table, into the row LIT."""
-    step = np.uintp(azimuths)
     for k in range(size):
-        m, n = np.uintp(ints[FIRST + k]), np.uintp(ints[SECOND + k])
+        ints[FIRST + k] = texels[np.uintp(ints[FIRST + k])]
+        ints[SECOND + k] = texels[np.uintp(ints[SECOND + k])]
+    for k in range(size):
+        near, beside = ints[FIRST + k], ints[SECOND + k]
         a, c = reals[SHARES + k], reals[SHARES + BLOCK + k]
-        g0, h0 = R(texels[m]), R(texels[n])
-        g1, h1 = R(texels[m + step]), R(texels[n + step])
+        g0, h0 = R(near & 255), R(beside & 255)
+        g1, h1 = R(near >> 8), R(beside >> 8)
         g, h = g0 + (g1 - g0) * a, h0 + (h1 - h0) * a
         reals[LIT + k] = (g + (h - g) * c) * R(1.0 / 255.0)

@@ -22,13 +22,14 @@ class Shadow(NamedTuple):
         peak; an interval is empty if its last position is less than its first
     crest_height : (k,) real - height there, in run lengths
     table, kinds : of `horizon.Horizon`; a single zero and (0, 0) for the other methods
-    texels : the same memory as a one-dimensional array
+    texels : uint16, flat - each entry of the table, and 256 times that in the next row
     mean : (stretches, columns + 1, GROUPS) real, flat - `mean.groups_of`, horizons in softnesses;
         one entry for `none`
-    mean_clear : (stretches,) real - sine of the elevation from which on light reaches all places of
-        a stretch, whatever its azimuth; above 1 where none does, 0 if its shadow is absolute
+    mean_bounds : (stretches, mean.SECTORS) int32, flat - by sector of the light's azimuth, the
+        elevation below which light reaches no place of a stretch, and 65536 times the one from
+        which on it reaches all, in 1/mean.ELEVATION; of `horizon` alone
     mean_columns, groups : int - its azimuths; GROUPS
-    piece_first, piece_last, piece_scale : see `mean.Stretches`
+    set_stretches, piece_first, piece_last, piece_scale : see `mean.Stretches`
     absolute : (k,) uint8 - whether threads of the type follow a law with an absolute shadow
     all_absolute : int - whether all do
     """
@@ -41,11 +42,12 @@ class Shadow(NamedTuple):
     crest_height: NDArray[Any]
     table: NDArray[np.uint8]
     kinds: NDArray[np.int32]
-    texels: NDArray[np.uint8]
+    texels: NDArray[np.uint16]
     mean: NDArray[Any]
-    mean_clear: NDArray[Any]
+    mean_bounds: NDArray[np.int32]
     mean_columns: int
     groups: int
+    set_stretches: int
     piece_first: NDArray[np.int32]
     piece_last: NDArray[np.int32]
     piece_scale: NDArray[Any]

@@ -48,21 +48,27 @@ LEAST_LIGHT = 0.1
 shade of others lacks is spread over it evenly, not put on its few bright places."""
 
 
+SECTORS = 32
+"""Sectors of the light's azimuth in which highest and lowest horizons of a stretch are known."""
+
+ELEVATION = 16384.0 / (0.5 * math.pi)
+"""Units of those horizons, in one radian of the light's elevation."""
+
+
 class Stretches(NamedTuple):
     """The stretches of a fabric, numbered set by set, type by type and along the curve.
 
-    first : (2, k) int32 - number of the first stretch of type k in set j
-    piece_first : (2, k, p) int32 - first stretch of each piece of type k in set j
+    set_stretches : int - their number in a set
+    piece_first : (k, p) int32 - first stretch of each piece of type k in the first set
     piece_last : (k, p) int32 - the number of stretches in it less 1
-    piece_scale : (k, p) float - stretches per run length
-    total : int - number of stretches
+    piece_scale : (k, p) float - stretches per run length, so little below their number over the
+        piece's length that rounding puts no position beyond the last one
     """
 
-    first: NDArray[np.int32]
+    set_stretches: int
     piece_first: NDArray[np.int32]
     piece_last: NDArray[np.int32]
     piece_scale: Floats
-    total: int
 
 
 def stretches(fabric: Fabric, longest: int) -> Stretches:
@@ -78,33 +84,25 @@ def stretches(fabric: Fabric, longest: int) -> Stretches:
         count = np.clip(count, 1, MOST_STRETCHES)
         used = slice(0, len(count))
         first[k, used], last[k, used] = np.cumsum(count) - count, count - 1
-        scale[k, used] = count / p.length
+        # Ends of pieces are rounded to float32, and what they are multiplied by.
+        scale[k, used] = count / (p.length + 2.5e-7) * (1.0 - 1e-6)
         totals[k] = count.sum()
-    starts = np.cumsum(np.concatenate((totals, totals))) - np.concatenate((totals, totals))
-    of_sets = starts.reshape(2, -1).astype(np.int32)
-    every = of_sets[:, :, None] + first
-    return Stretches(of_sets, every, last, scale, int(2 * totals.sum()))
+    first += (np.cumsum(totals) - totals).astype(np.int32)[:, None]
+    return Stretches(int(totals.sum()), first, last, scale)
 
 
 def types_of(cut: Stretches) -> NDArray[np.int64]:
-    """(total,) the type of thread that each stretch is of."""
-    starts = cut.first.reshape(-1)
-    every = np.arange(len(starts)) % cut.first.shape[1]
-    return np.repeat(every, np.diff(starts, append=cut.total))
+    """(stretches of both sets,) the type of thread that each is of."""
+    starts = cut.piece_first[:, 0]
+    return np.tile(np.repeat(np.arange(len(starts)), np.diff(starts, append=cut.set_stretches)), 2)
 
 
 @njit(**INLINE)
 def stretch_of(R, cloth, shadow, which, thread, s):
     """Number of the stretch at position s on a run of `thread` in set `which`; s must be finite."""
-    return stretch_in(R, cloth, shadow, which, thread, piece_of(R, cloth, thread, s), s)
-
-
-@njit(**INLINE)
-def stretch_in(R, cloth, shadow, which, thread, p, s):
-    """`stretch_of` where `s` is on piece `p` of the curve."""
+    p = piece_of(R, cloth, thread, s)
     part = np.int32((s - cloth.curve_start[thread, p]) * shadow.piece_scale[thread, p])
-    part = max(min(part, shadow.piece_last[thread, p]), np.int32(0))
-    return shadow.piece_first[which, thread, p] + part
+    return which * shadow.set_stretches + shadow.piece_first[thread, p] + part
 
 
 def places_on(
@@ -153,12 +151,23 @@ def groups_of(number: NDArray[np.int64], count: int, horizon: Floats) -> Floats:
     return found
 
 
-def clear_from(groups: Floats, softness: float) -> Floats:
-    """(stretches,) `Shadow.mean_clear`; groups : of `groups_of`, softness : edge's width [rad]."""
-    highest = groups.max(axis=(1, 2))
-    # From half a softness above the highest horizon on, `mean_over` is 1.
-    elevation = (highest + 0.5) * softness
-    return np.where(elevation < 0.5 * math.pi, np.sin(np.minimum(elevation, 0.5 * math.pi)), 2.0)
+def bounds_of(groups: Floats, softness: float) -> NDArray[np.int32]:
+    """`Shadow.mean_bounds`, (stretches, SECTORS); groups : of `groups_of`, softness : edge's width
+    [rad]."""
+    every = (groups.shape[1] - 1) // SECTORS
+    sectors = [groups[:, k * every : (k + 1) * every + 1] for k in range(SECTORS)]
+    lowest = np.stack([one.min(axis=(1, 2)) for one in sectors], axis=1)
+    highest = np.stack([one.max(axis=(1, 2)) for one in sectors], axis=1)
+    # Half a softness away from a horizon its place is dark, or lit. One unit more, for rounding.
+    dark = np.floor((lowest - 0.5) * softness * ELEVATION) - 1.0
+    lit = np.ceil((highest + 0.5) * softness * ELEVATION) + 1.0
+    return packed(np.maximum(dark, 0.0), np.minimum(lit, 32767.0))
+
+
+def packed(dark: Floats, lit: Floats) -> NDArray[np.int32]:
+    """Bounds as `Shadow.mean_bounds` holds them."""
+    found: NDArray[np.int32] = lit.astype(np.int32) << 16 | dark.astype(np.int32)
+    return found
 
 
 @njit(**INLINE)
@@ -239,7 +248,7 @@ def node_means(shadow: Any, nodes: CurveNodes, fabric: Fabric) -> Floats | None:
             if not len(here):
                 continue
             cuts = _cuts(pieces(thread.curve), shadow.piece_last[kind] + 1)
-            first = int(shadow.piece_first[which, kind, 0])
+            first = which * int(shadow.set_stretches) + int(shadow.piece_first[kind, 0])
             part = shares(nodes, here, cuts)
             for stretch in np.flatnonzero(part.any(axis=0)):
                 table = np.empty(found.shape[1:])
@@ -281,7 +290,7 @@ def angle_groups(shadow: Any, fabric: Fabric, which: int, kind: int, psi0: Float
     low = np.concatenate([np.minimum(e[:-1], e[1:]) for e in ends])
     high = np.concatenate([np.maximum(e[:-1], e[1:]) for e in ends])
     piece = np.repeat(np.arange(len(counts)), counts)
-    first = int(shadow.piece_first[which, kind, 0])
+    first = which * int(shadow.set_stretches) + int(shadow.piece_first[kind, 0])
     rows = _groups(shadow)[first : first + len(length)]
     found = np.empty((rows.shape[1], len(psi0), GROUPS))
     for k, angle in enumerate(psi0):

@@ -25,8 +25,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
+from fabricusd.appearance.frame import WARP
 from fabricusd.appearance.laws import law_of
-from fabricusd.appearance.laws.lit import column_of
 from fabricusd.appearance.scattering.model import PUBLISHED
 from fabricusd.appearance.scattering.models import model_of
 from fabricusd.appearance.shadow.crests import to_crest
@@ -59,15 +59,16 @@ from fabricusd.appearance.shadow.kinds import (
     Shadow,
 )
 from fabricusd.appearance.shadow.mean import (
+    ELEVATION,
     GROUPS,
-    clear_from,
+    SECTORS,
+    bounds_of,
     groups_of,
     level_of,
     mean_of,
     mean_over,
     places_on,
     relative,
-    stretch_in,
     stretch_of,
     stretches,
     types_of,
@@ -77,13 +78,14 @@ from fabricusd.appearance.shadow.place_blocks import (
     FREE,
     INT_ROWS,
     LIT,
+    MEAN,
     OF_SET,
-    OF_THREAD,
+    PAST,
     PIECE,
     REAL_ROWS,
     SECOND,
     SHARES,
-    S,
+    TURN,
     X,
     look_up_block,
 )
@@ -104,7 +106,8 @@ from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, index, whole
 TRACED_SOFTNESS = math.radians(1.0)
 """Width [rad] of the soft edge used for the mean of `traced`; the marched `g` has a hard edge."""
 
-_COLUMNS = (1, 4, 128, 64)
+COLUMNS = 128
+_COLUMNS = (1, 4, COLUMNS, 64)
 """Azimuths for the mean of each method: for `horizon` eight to each of the table's, so that places
 keep their order from one to the next."""
 
@@ -158,11 +161,12 @@ def compile_shadow(
         crest_height=np.array([peak(t.curve) for t in fabric.thread_list]),
         table=table,
         kinds=kinds,
-        texels=table.reshape(-1),
+        texels=_with_next_row(table),
         mean=np.ones(1),
-        mean_clear=np.zeros(1),
+        mean_bounds=np.zeros(1, np.int32),
         mean_columns=_COLUMNS[METHODS.index(method)],
         groups=GROUPS,
+        set_stretches=cut.set_stretches,
         piece_first=cut.piece_first,
         piece_last=cut.piece_last,
         piece_scale=cut.piece_scale,
@@ -170,12 +174,21 @@ def compile_shadow(
         all_absolute=int(_absolute(fabric).all()),
     )
     if double.method != NONE:
-        mean = _mean(fabric, cloth, double, cut.total)
-        clear = clear_from(mean, float(double.softness))
-        # Threads whose law takes g itself need no mean.
-        clear[double.absolute[types_of(cut)] != 0] = 0.0
-        double = double._replace(mean=mean.reshape(-1), mean_clear=clear)
+        mean = _mean(fabric, cloth, double, 2 * cut.set_stretches)
+        double = double._replace(mean=mean.reshape(-1))
+        if double.method == HORIZON:
+            bounds = bounds_of(mean, float(double.softness))
+            # Threads whose law takes g itself need no mean.
+            bounds[double.absolute[types_of(cut)] != 0] = 0
+            double = double._replace(mean_bounds=bounds.reshape(-1))
     return Shadow(*(_in_precision(value, precision) for value in double))
+
+
+def _with_next_row(table: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    """`Shadow.texels`."""
+    flat = table.reshape(-1).astype(np.uint16)
+    flat[: -table.shape[-1]] += flat[table.shape[-1] :] << 8
+    return flat
 
 
 def _softness(method: str, asked: float | None) -> float:
@@ -281,7 +294,7 @@ def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
     """
     table = shadow.table
     choose_texels(R, cloth, table, wi, begin, size, ints, reals)
-    mix_texels(R, shadow.texels, table.shape[4], size, ints, reals)
+    mix_texels(R, shadow.texels, size, ints, reals)
     for k in range(size):
         m = index(begin, k)
         x, y, z = wi[0, m], wi[1, m], wi[2, m]
@@ -297,38 +310,57 @@ def horizon_block(R, cloth, shadow, wi, begin, size, ints, reals):
 def mean_block(R, cloth, shadow, wi, begin, size, ints, reals):
     """Turn the row LIT from `lit` to `shade`, in loops like those of `horizon_blocks`.
 
-    Most light comes from so high that it reaches all of a stretch, whose mean is then 1: the sum
-    over groups is for the other places alone. The rows FIRST, SECOND and SHARES, which
-    `horizon_block` no longer needs, hold what goes between the loops.
+    Most light reaches all or no places of a stretch, whose mean is then 1 or 0: the sum over groups
+    is for the others alone. The rows FIRST, SECOND and SHARES, which `horizon_block` no longer
+    needs, hold what goes between the loops.
     """
     if shadow.all_absolute != 0:
         return
-    columns = np.int32(shadow.mean_columns)
+    columns, softness = np.int32(shadow.mean_columns), shadow.softness
+    to_columns = R(columns) / R(shadow.table.shape[4])
+    scales, firsts = shadow.piece_scale.reshape(-1), shadow.piece_first.reshape(-1)
+    of_set = np.int32(shadow.set_stretches)
     for k in range(size):
         # In gaps and for NaN the stretch is arbitrary: the result is not used.
-        which, s = np.uintp(min(ints[OF_SET + k], 1)), reals[S + k]
-        thread, s = np.uintp(ints[OF_THREAD + k]), s if s >= R(0) else R(0)
-        stretch = stretch_in(R, cloth, shadow, which, thread, np.uintp(ints[PIECE + k]), s)
-        z = wi[2, index(begin, k)]
-        shaded = (z > R(0)) & (z < shadow.mean_clear[np.uintp(stretch)]) & (ints[FREE + k] == 0)
-        ints[FIRST + k], ints[SECOND + k] = stretch, np.int32(shaded)
+        piece, past = np.uintp(ints[PIECE + k]), reals[PAST + k]
+        past = past if past >= R(0) else R(0)
+        of_warp = of_set if ints[OF_SET + k] == WARP else np.int32(0)
+        ints[FIRST + k] = of_warp + firsts[piece] + np.int32(past * scales[piece])
     for k in range(size):
-        m = index(begin, k)
-        column, c = column_of(R, columns, wi[0, m], wi[1, m])
-        reals[SHARES + k] = c
-        reals[SHARES + BLOCK + k] = level_of(R, wi[2, m], shadow.softness)
-        ints[FIRST + k] = (ints[FIRST + k] * (columns + 1) + column) * GROUPS
-    count = 0
+        turn = reals[TURN + k] * to_columns
+        column = min(np.int32(turn), columns - np.int32(1))
+        stretch = ints[FIRST + k]
+        ints[FIRST + k] = (stretch * (columns + 1) + column) * GROUPS
+        ints[SECOND + k] = stretch * SECTORS + column // np.int32(COLUMNS // SECTORS)
+        reals[SHARES + k] = turn - R(column)
+        reals[SHARES + BLOCK + k] = level_of(R, wi[2, index(begin, k)], softness)
     for k in range(size):
-        shaded = ints[SECOND + k]
+        ints[SECOND + k] = shadow.mean_bounds[np.uintp(ints[SECOND + k])]
+    for k in range(size):
+        bounds, level = ints[SECOND + k], reals[SHARES + BLOCK + k]
+        elevation = np.int32((level - R(0.5)) * (softness * R(ELEVATION)))
+        bound = (wi[2, index(begin, k)] > R(0)) & (ints[FREE + k] == 0)
+        dark = bound & (elevation < (bounds & 0xFFFF))
+        ints[SECOND + k] = bound & (elevation >= (bounds & 0xFFFF)) & (elevation < (bounds >> 16))
+        reals[MEAN + k] = R(0) if dark else R(1)
+    count = np.int32(0)
+    for k in range(size):
+        needed = ints[SECOND + k]
         ints[SECOND + whole(count)] = k
-        count += shaded
+        count += needed
+    _sum_groups(R, shadow.mean, count, ints, reals)
+    for k in range(size):
+        reals[LIT + k] = relative(R, reals[LIT + k], reals[MEAN + k])
+
+
+@njit(**PART)
+def _sum_groups(R, mean, count, ints, reals):
+    """The row MEAN at the first `count` places of the row SECOND."""
     for n in range(whole(count)):
-        x = np.uintp(ints[SECOND + n])
-        first = np.uintp(ints[FIRST + x])
+        x = whole(ints[SECOND + n])
+        first = np.uintp(whole(ints[FIRST + x]))
         c, level = reals[SHARES + x], reals[SHARES + BLOCK + x]
-        mean = mean_over(R, shadow.mean, GROUPS, first, first + np.uintp(GROUPS), c, level)
-        reals[LIT + x] = relative(R, reals[LIT + x], mean)
+        reals[MEAN + x] = mean_over(R, mean, GROUPS, first, first + np.uintp(GROUPS), c, level)
 
 
 @njit(**PART)

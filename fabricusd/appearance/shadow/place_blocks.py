@@ -15,7 +15,6 @@ from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.shadow.horizon_lookup import entry_at
 from fabricusd.appearance.weave.coverage import GAP
 from fabricusd.appearance.weave.lookup import (
-    angle_of,
     cell_of,
     hidden_run,
     piece_of,
@@ -40,8 +39,12 @@ _WARP_THREAD, _WEFT_THREAD = 12 * BLOCK, 13 * BLOCK
 _NEXT_I, _NEXT_J = 14 * BLOCK, 15 * BLOCK
 """The cell into which the thread underneath goes on."""
 PIECE = 16 * BLOCK
-"""The linear piece of the visible thread's curve."""
+"""The linear piece of the visible thread's curve, as an index of the flat tables of pieces."""
 INT_ROWS = 17
+
+_FEW_PIECES = 32
+"""Up to as many pieces of all types, it is faster to compare all places with each than to read the
+pieces of each place's own type."""
 
 X, Y, S, ANGLE = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
 """Rows of reals: the place in the cell, the position on the thread's run, and the tangent angle
@@ -52,6 +55,9 @@ _UPPER_PLACE, _UPPER_COUNT, _LOWER_PLACE, _LOWER_COUNT, _BEYOND = (
     row * BLOCK for row in range(7, 12)
 )
 """What `CompiledFabric.runs` holds for the cell, and the cells of the run beside it."""
+PAST, TURN, MEAN = _UPPER_PLACE, _UPPER_COUNT, _LOWER_PLACE
+"""The position past the start of the piece, what `horizon_blocks.choose_texels` fills, and what
+`methods.mean_block` does, in rows that the lookup no longer needs."""
 ACROSS, LENGTH = 12 * BLOCK, 13 * BLOCK
 """The position across the thread, and the length of its visible run [m]."""
 REAL_ROWS = 14
@@ -70,21 +76,61 @@ def look_up_block(R, cloth, shadow, uv, begin, size, ints, reals):
     _entries(cloth, shadow.table, shadow.kinds, uv, begin, size, ints)
     _gather(R, cloth, size, ints, reals)
     _place(R, cloth, size, ints, reals)
+    pieces_block(R, cloth, size, ints, reals)
+    angles, slopes = cloth.curve_angle.reshape(-1), cloth.curve_slope.reshape(-1)
     for k in range(size):
-        thread = np.uintp(ints[OF_THREAD + k])
-        ints[PIECE + k] = piece_of(R, cloth, thread, reals[S + k])
-        reals[ANGLE + k] = angle_of(R, cloth, thread, np.uintp(ints[PIECE + k]), reals[S + k])
-        ints[FREE + k] = (ints[OF_SET + k] == GAP) | (cloth.pile[thread] != 0)
+        piece = np.uintp(ints[PIECE + k])
+        reals[ANGLE + k] = angles[piece] + reals[PAST + k] * slopes[piece]
+
+
+@njit(**PART)
+def pieces_block(R, cloth, size, ints, reals):
+    """Fill the rows PIECE, PAST and FREE from OF_SET, OF_THREAD and S."""
+    types, pieces = np.int32(cloth.curve_start.shape[0]), np.int32(cloth.curve_start.shape[1])
+    if types * pieces > _FEW_PIECES:
+        starts = cloth.curve_start.reshape(-1)
+        for k in range(size):
+            own, s = np.uintp(ints[OF_THREAD + k]), reals[S + k]
+            met = np.uintp(piece_of(R, cloth, own, s)) + own * np.uintp(pieces)
+            ints[PIECE + k], reals[PAST + k] = met, s - starts[met]
+    else:
+        for k in range(size):
+            ints[PIECE + k] = ints[OF_THREAD + k] * pieces
+            reals[PAST + k] = reals[S + k]
+        for thread in range(types):
+            for piece in range(1, pieces):
+                start = cloth.curve_start[thread, piece]
+                # Starts beyond 1 pad the table.
+                if start <= R(1):
+                    _count_piece(R, thread, start, size, ints, reals)
+    for k in range(size):
+        ints[FREE + k] = ints[OF_SET + k] == GAP
+    for thread in range(types):
+        if cloth.pile[thread] != 0:
+            for k in range(size):
+                ints[FREE + k] |= ints[OF_THREAD + k] == thread
+
+
+@njit(**INLINE)
+def _count_piece(R, thread, start, size, ints, reals):
+    """Move the places of a type from `start` on to the piece that starts there."""
+    for k in range(size):
+        s = reals[S + k]
+        beyond = (ints[OF_THREAD + k] == thread) & (s >= start)
+        ints[PIECE + k] += beyond
+        reals[PAST + k] = s - start if beyond else reals[PAST + k]
 
 
 @njit(**INLINE)
 def _cells(R, cloth, uv, begin, size, ints, reals):
     """`weave.split` of a block."""
-    for k in range(size):
-        p = index(begin, k)
-        i, j, x, y = cell_of(R, cloth, uv[p, 0], uv[p, 1])
-        ints[CELL_I + k], ints[CELL_J + k] = i, j
-        reals[X + k], reals[Y + k] = x, y
+    # With a known stride, LLVM vectorises the loop.
+    if uv.shape[1] == 2:
+        for k in range(size):
+            p = index(begin, k)
+            i, j, x, y = cell_of(R, cloth, uv[p, 0], uv[p, 1])
+            ints[CELL_I + k], ints[CELL_J + k] = i, j
+            reals[X + k], reals[Y + k] = x, y
     _places_in_sequence(cloth, WARP, uv, begin, size, ints, END, CELL_I)
     _places_in_sequence(cloth, WEFT, uv, begin, size, ints, PICK, CELL_J)
 

@@ -32,8 +32,8 @@ TABLES: dict[str, tuple[int, str]] = {
     "cloth.curve_start": (2, FLOAT), "cloth.curve_angle": (2, FLOAT),
     "cloth.curve_slope": (2, FLOAT), "cloth.pile": (1, INT),
     "shadow.table": (5, BYTE), "shadow.kinds": (2, INT), "shadow.mean": (1, QUAD),
-    "shadow.piece_first": (3, INT), "shadow.piece_last": (2, INT),
-    "shadow.piece_scale": (2, FLOAT), "shadow.absolute": (1, INT),
+    "shadow.piece_first": (2, INT), "shadow.piece_scale": (2, FLOAT),
+    "shadow.absolute": (1, INT),
     "fuzz.phase": (3, FLOAT), "fuzz.lost": (1, FLOAT), "fuzz.up": (2, FLOAT),
     "fuzz.again": (2, FLOAT),
 }  # fmt: skip
@@ -44,8 +44,8 @@ NUMBERS: dict[str, str] = {
     "published.columns": INT, "published.lit_rows": INT, "published.lit_nodes": INT,
     "conserving.warp_start": INT, "conserving.covered": FLOAT,
     "conserving.opaque": INT, "cloth.gap": FLOAT, "cloth.last": FLOAT, "cloth.tiny": FLOAT,
-    "shadow.softness": FLOAT, "shadow.mean_columns": INT, "shadow.groups": INT,
-    "fuzz.depth": FLOAT,
+    "shadow.softness": FLOAT, "shadow.mean_columns": INT, "shadow.set_stretches": INT,
+    "shadow.groups": INT, "fuzz.depth": FLOAT,
 }  # fmt: skip
 """GROUP.FIELD -> kind of each single number."""
 

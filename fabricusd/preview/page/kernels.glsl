@@ -7,8 +7,8 @@ uniform sampler2D floats;
 uniform highp isampler2D ints;
 uniform highp usampler2D bytes;
 uniform sampler2D quads;
-layout(std140) uniform Shapes { ivec4 shapes[72]; };
-layout(std140) uniform Numbers { vec4 numbers[16]; };
+layout(std140) uniform Shapes { ivec4 shapes[70]; };
+layout(std140) uniform Numbers { vec4 numbers[17]; };
 float F(int k) { return texelFetch(floats, ivec2(k & 2047, k >> 11), 0).r; }
 int I(int k) { return texelFetch(ints, ivec2(k & 2047, k >> 11), 0).r; }
 int B(int k) { return int(texelFetch(bytes, ivec2(k & 2047, k >> 11), 0).r); }
@@ -105,27 +105,23 @@ float mean_of_groups(int at, int here, int beside, float c, float level) {
 #define shadow_piece_first_at shapes[56].x
 #define shadow_piece_first_n0 shapes[56].y
 #define shadow_piece_first_n1 shapes[56].z
-#define shadow_piece_first_n2 shapes[56].w
-#define shadow_piece_last_at shapes[58].x
-#define shadow_piece_last_n0 shapes[58].y
-#define shadow_piece_last_n1 shapes[58].z
-#define shadow_piece_scale_at shapes[60].x
-#define shadow_piece_scale_n0 shapes[60].y
-#define shadow_piece_scale_n1 shapes[60].z
-#define shadow_absolute_at shapes[62].x
-#define shadow_absolute_n0 shapes[62].y
-#define fuzz_phase_at shapes[64].x
-#define fuzz_phase_n0 shapes[64].y
-#define fuzz_phase_n1 shapes[64].z
-#define fuzz_phase_n2 shapes[64].w
-#define fuzz_lost_at shapes[66].x
-#define fuzz_lost_n0 shapes[66].y
-#define fuzz_up_at shapes[68].x
-#define fuzz_up_n0 shapes[68].y
-#define fuzz_up_n1 shapes[68].z
-#define fuzz_again_at shapes[70].x
-#define fuzz_again_n0 shapes[70].y
-#define fuzz_again_n1 shapes[70].z
+#define shadow_piece_scale_at shapes[58].x
+#define shadow_piece_scale_n0 shapes[58].y
+#define shadow_piece_scale_n1 shapes[58].z
+#define shadow_absolute_at shapes[60].x
+#define shadow_absolute_n0 shapes[60].y
+#define fuzz_phase_at shapes[62].x
+#define fuzz_phase_n0 shapes[62].y
+#define fuzz_phase_n1 shapes[62].z
+#define fuzz_phase_n2 shapes[62].w
+#define fuzz_lost_at shapes[64].x
+#define fuzz_lost_n0 shapes[64].y
+#define fuzz_up_at shapes[66].x
+#define fuzz_up_n0 shapes[66].y
+#define fuzz_up_n1 shapes[66].z
+#define fuzz_again_at shapes[68].x
+#define fuzz_again_n0 shapes[68].y
+#define fuzz_again_n1 shapes[68].z
 #define published_warp_start int(numbers[0].x)
 #define published_gap numbers[1].x
 #define published_precision numbers[2].x
@@ -140,8 +136,9 @@ float mean_of_groups(int at, int here, int beside, float c, float level) {
 #define cloth_tiny numbers[11].x
 #define shadow_softness numbers[12].x
 #define shadow_mean_columns int(numbers[13].x)
-#define shadow_groups int(numbers[14].x)
-#define fuzz_depth numbers[15].x
+#define shadow_set_stretches int(numbers[14].x)
+#define shadow_groups int(numbers[15].x)
+#define fuzz_depth numbers[16].x
 
 struct Place { int thread_set_; int thread_; float psi0_; float w_; float shade_; };
 
@@ -1721,15 +1718,12 @@ float k_lit(float u, float v, Hit hit, float x, float y, float z) {
   return k_soft_edge(k_above_horizon(sine, flat_, z), shadow_softness);
 }
 
-int k_stretch_in(int which, int thread, int p, float s) {
-  int part;
-  part = int(((s - F(cloth_curve_start_at + (thread) * cloth_curve_start_n1 + p)) * F(shadow_piece_scale_at + (thread) * shadow_piece_scale_n1 + p)));
-  part = max(min(part, I(shadow_piece_last_at + (thread) * shadow_piece_last_n1 + p)), 0);
-  return (I(shadow_piece_first_at + ((which) * shadow_piece_first_n1 + thread) * shadow_piece_first_n2 + p) + part);
-}
-
 int k_stretch_of(int which, int thread, float s) {
-  return k_stretch_in(which, thread, k_piece_of(thread, s), s);
+  int p;
+  int part;
+  p = k_piece_of(thread, s);
+  part = int(((s - F(cloth_curve_start_at + (thread) * cloth_curve_start_n1 + p)) * F(shadow_piece_scale_at + (thread) * shadow_piece_scale_n1 + p)));
+  return (((which * shadow_set_stretches) + I(shadow_piece_first_at + (thread) * shadow_piece_first_n1 + p)) + part);
 }
 
 float k_level_of(float z, float softness) {

@@ -19,18 +19,17 @@ from fabricusd.appearance.shadow.methods import horizon_block, mean_block, shade
 from fabricusd.appearance.shadow.place_blocks import (
     ACROSS,
     ANGLE,
-    FREE,
     LENGTH,
     LIT,
     OF_SET,
     OF_THREAD,
-    PIECE,
     S,
     look_up_block,
+    pieces_block,
 )
 from fabricusd.appearance.weave.compiled import CompiledFabric
 from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
-from fabricusd.appearance.weave.lookup import find, move_along, piece_of
+from fabricusd.appearance.weave.lookup import find, move_along
 from fabricusd.appearance.weave.place import Hit, Places
 from fabricusd.appearance.weave.yarn.lay import (
     DOUBLE_ROWS,
@@ -203,8 +202,7 @@ def shadows_by_horizon(R, cloth, shadow, v_sign, hits, first, directions, points
             which, thread = points.sets[start + x], points.threads[start + x]
             s = points.along[start + x]
             ints[OF_SET + x], ints[OF_THREAD + x], reals[S + x] = which, thread, s
-            ints[PIECE + x] = piece_of(R, cloth, np.uintp(thread), s)
-            ints[FREE + x] = (which == GAP) | (cloth.pile[np.uintp(thread)] != 0)
+        pieces_block(R, cloth, size, ints, reals)
         for turn in range(2):
             _one_direction(R, cloth, shadow, directions[turn], start, size, ints, reals, lit[turn])
 
