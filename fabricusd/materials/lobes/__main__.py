@@ -6,7 +6,9 @@ python -m fabricusd.materials.lobes [NAME ...] [--lobes K ...] [--law LAW ...]
 A preset is fitted under the law that it wears, and under each `--law`. Under another law its
 published albedos are scaled, so that it is as bright as it was under `masked`. The table in the
 package is used for what it holds; `--write` fits all again, and replaces the rows of the presets
-and laws that it is given. `--form materialx` fits that form alone again, from the form of Cycles.
+and laws that it is given. Of several fits, the one is kept whose delta E over the pairs and whose
+mean delta E under the skies have the least sum. `--form materialx` fits that form alone again, from
+the form of Cycles.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from fabricusd.fabric import SURFACE_LAWS, Fabric
 from fabricusd.geometry.nearest import published, scaled
 from fabricusd.geometry.nearest import refit as albedo_factor
 from fabricusd.materials.lobes import known
-from fabricusd.materials.lobes.fit import COUNTS, fit, refit
+from fabricusd.materials.lobes.fit import COUNTS, fits, refit
 from fabricusd.materials.lobes.judge import Judge, Judged
 from fabricusd.materials.lobes.mixture import CYCLES, FORMS, Mixture
 from fabricusd.materials.lobes.parameters import at_bounds
@@ -68,18 +70,24 @@ def _mixtures(
         one that is not brighter than the cloth is kept, and of two the nearer
     """
     for count in counts:
-        first = fit(fabric, count) if CYCLES in again else known.mixture_of(fabric, count, CYCLES)
+        first, start = known.mixture_of(fabric, count, CYCLES), None
+        if CYCLES in again:
+            first, start = fits(fabric, count)
         for form in FORMS:
             if form not in again:
                 yield first if form == CYCLES else known.mixture_of(fabric, count, form)
                 continue
-            tried = [first if form == CYCLES else refit(fabric, known.in_form(first, form))]
-            tried += [refit(fabric, one) for one in known.held(name, fabric, count, form)]
+            tried = [first]
+            if form != CYCLES:
+                tried = [refit(fabric, known.in_form(start or first, form))]
+            before = known.held(name, fabric, count, form)
+            tried += [*before, *(refit(fabric, one) for one in before)]
             yield min(tried, key=lambda one: _rank(judge(one)))
 
 
 def _rank(judged: Judged) -> tuple[bool, float]:
-    return judged.excess > BRIGHTER, judged.delta_e
+    skies = list(judged.sky_delta_e.values())
+    return judged.excess > BRIGHTER, judged.delta_e + sum(skies) / len(skies)
 
 
 def _line(name: str, law: str, mixture: Mixture, judged: Judged) -> str:

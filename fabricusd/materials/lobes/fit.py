@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from fabricusd.materials.lobes.bound import Bound
 from fabricusd.materials.lobes.colors import Colors
 from fabricusd.materials.lobes.mixture import CYCLES, Mixture
 from fabricusd.materials.lobes.parameters import bounds, pack, unpack, value_and_slopes
-from fabricusd.materials.lobes.starts import grown, starts
+from fabricusd.materials.lobes.starts import grown, starts, turned
 from fabricusd.materials.lobes.target import GRAZING, LIGHTS, Pairs, fitted_pairs
 from fabricusd.quality.colors import delta_e_2000
 from fabricusd.run.blas import one_blas_thread
@@ -47,7 +48,7 @@ bright, or dark, in the mean over the views. The less bright a fit, the less doe
 PULL = 0.02
 """Delta E that a number costs that moves by 1, so that numbers without effect stay."""
 
-FIRST, KEPT, MORE, ROUNDS = 8, 3, 25, 4
+FIRST, KEPT, MORE, ROUNDS = 8, 2, 25, 4
 """Steps from each start, starts that are kept, steps in each round, and rounds."""
 
 
@@ -159,7 +160,14 @@ class Problem:
         return np.concatenate([one.ravel() for one in residuals]), np.concatenate(by_number)
 
 
-@one_blas_thread()
+class Fits(NamedTuple):
+    """The nearest mixture, and the nearest whose lobes are all of GGX, without V: from that one a
+    fit in the form of MaterialX starts."""
+
+    best: Mixture
+    ggx: Mixture
+
+
 def fit(
     fabric: Fabric, count: int = COUNT, form: str = CYCLES, *, max_error: float | None = None
 ) -> Mixture:
@@ -171,44 +179,67 @@ def fit(
 
     Raises FabricError for a number of lobes out of COUNTS, and for a fabric without threads.
     """
+    return fits(fabric, count, form, max_error=max_error).best
+
+
+@one_blas_thread()
+def fits(
+    fabric: Fabric, count: int = COUNT, form: str = CYCLES, *, max_error: float | None = None
+) -> Fits:
+    """Return what `fit` does, and where a fit in another form starts."""
     if count not in COUNTS:
         raise FabricError("lobes", f"is {count}; it must be from {COUNTS[0]} to {COUNTS[-1]}")
     problem, bound = Problem(fitted_pairs(fabric)), Bound(fabric)
 
     @cache
-    def of(few: int) -> Mixture | None:
+    def of(few: int) -> list[Mixture]:
         return _found(problem, starts(fabric, few, form))
 
+    def held(found: list[Mixture]) -> Mixture | None:
+        return min((bound(one) for one in found), key=problem.score, default=None)
+
     for few in range(1, count) if max_error is not None else ():
-        less = of(few)
-        less = bound(less) if less is not None else None
+        less = held(of(few))
         if less is not None and problem.delta_e(less) <= (max_error or 0.0):
-            return less
-    tried = [of(count)]
+            return Fits(less, of(few)[0])
+    tried = list(of(count))
     if count > COUNT:
         # With more lobes the usual starts may end farther off than with fewer.
-        fewer = of(count - 2)
-        tried += [_found(problem, grown(fewer))] if fewer is not None else []
-    held = [bound(one) for one in tried if one is not None]
-    if not held:
+        fewer = min(of(count - 2), key=problem.score, default=None)
+        tried += _found(problem, grown(fewer)) if fewer is not None else []
+    best = held(tried)
+    if best is None:
         raise FabricError(f"fabric '{fabric.name}'", f"has no threads for {count} lobes")
-    return min(held, key=problem.score)
+    return Fits(best, tried[0])
 
 
 @one_blas_thread()
 def refit(fabric: Fabric, mixture: Mixture) -> Mixture:
     """Return the mixture nearest to `fabric` that a solver finds from `mixture`, as `fit` does."""
-    found = _found(Problem(fitted_pairs(fabric)), [replace(mixture, view=())])
-    assert found is not None
-    return Bound(fabric)(found)
+    problem, bound = Problem(fitted_pairs(fabric)), Bound(fabric)
+    found = _found(problem, [replace(mixture, view=())])
+    return min((bound(one) for one in found), key=problem.score)
 
 
-def _found(problem: Problem, begun: list[Mixture]) -> Mixture | None:
-    """Return the best of what is found from each of `begun`; None if there is nothing to begin."""
+def _found(problem: Problem, begun: list[Mixture]) -> list[Mixture]:
+    """Return the best of what is found from `begun`, and then those of other distributions."""
+    if not begun:
+        return []
+    found = [_nearest(problem, begun)]
+    if begun[0].form == CYCLES:
+        found.append(_nearest(problem, [turned(one, range(len(one.lobes))) for one in begun]))
+        best = min(found, key=problem.score)
+        # Single lobes may be better off with the other distribution.
+        single = [turned(best, (k,)) for k in range(len(best.lobes))]
+        tried = [problem.solve(one, FIRST, evened=True) for one in single]
+        found.append(_rounds(problem, min(tried, key=problem.score)))
+    return found
+
+
+def _nearest(problem: Problem, begun: list[Mixture]) -> Mixture:
     tried = [problem.solve(one, FIRST, evened=False) for one in begun]
     kept = sorted(tried, key=problem.score)[:KEPT]
-    best = [_rounds(problem, one) for one in kept]
-    return min(best, key=problem.score, default=None)
+    return min((_rounds(problem, one) for one in kept), key=problem.score)
 
 
 def _rounds(problem: Problem, mixture: Mixture) -> Mixture:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from fabricusd.cache import kept
 from fabricusd.fabric import Fabric
 from fabricusd.files import write_json
-from fabricusd.materials.lobes.fit import COUNT, fit, refit
+from fabricusd.materials.lobes.fit import COUNT, Fits, fits, refit
 from fabricusd.materials.lobes.mixture import CYCLES, Lobe, Mixture
 from fabricusd.materials.lobes.target import cloth, fitted_directions
 
@@ -51,18 +51,38 @@ def mixture_of(
             if one["form"] == form and _count(one) == count:
                 return from_dict(one)
 
-    def made() -> NDArray[np.uint8]:
-        if form != CYCLES:
-            first = mixture_of(fabric, count, max_error=max_error, progress=progress)
-            found = refit(fabric, in_form(first, form))
-        else:
-            if progress:
-                progress(f"fitting {count} lobes to {fabric.name}")
-            found = fit(fabric, count, CYCLES, max_error=max_error)
-        return np.frombuffer(json.dumps(asdict(found)).encode(), np.uint8)
+    say = progress or _nothing
+    if form == CYCLES:
+        return _fits(fabric, count, max_error, say).best
 
-    key = (_sources(), count, form, max_error, np.round(probes(fabric), 6))
-    return from_dict(json.loads(kept("lobes", key, made).tobytes()))
+    def made() -> Mapping[str, Any]:
+        first = _fits(fabric, count, max_error, say).ggx
+        return asdict(refit(fabric, in_form(first, form)))
+
+    return from_dict(_kept(fabric, (count, form, max_error), made))
+
+
+def _fits(fabric: Fabric, count: int, max_error: float | None, say: Progress) -> Fits:
+    """The fits of `fabric` in the form of Cycles, from the cache if they are there."""
+
+    def made() -> Mapping[str, Any]:
+        say(f"fitting {count} lobes to {fabric.name}")
+        return {k: asdict(v) for k, v in fits(fabric, count, max_error=max_error)._asdict().items()}
+
+    said = _kept(fabric, (count, CYCLES, max_error), made)
+    return Fits(**{name: from_dict(one) for name, one in said.items()})
+
+
+def _kept(
+    fabric: Fabric, key: tuple[Any, ...], made: Callable[[], Mapping[str, Any]]
+) -> Mapping[str, Any]:
+    key = (_sources(), *key, np.round(probes(fabric), 6))
+    found = kept("lobes", key, lambda: np.frombuffer(json.dumps(made()).encode(), np.uint8))
+    return dict(json.loads(found.tobytes()))
+
+
+def _nothing(_line: str) -> None:
+    """Progress that nobody asked for."""
 
 
 def find(fabric: Fabric) -> Mapping[str, Any] | None:
@@ -92,7 +112,8 @@ def probes(fabric: Fabric) -> Floats:
 
 def in_form(mixture: Mixture, form: str) -> Mixture:
     """Return the same numbers as a mixture in another form."""
-    return from_dict(asdict(mixture) | {"form": form})
+    lobes = [replace(one, gaussian=one.gaussian and form == CYCLES) for one in mixture.lobes]
+    return replace(mixture, form=form, lobes=tuple(lobes))
 
 
 def from_dict(said: Mapping[str, Any]) -> Mixture:

@@ -9,9 +9,9 @@ tangent `t = cos(tilt) a - sin(tilt) N`,
         (1 + (rise - 1) (1 - h.wo)^e)
 
 A lobe is 0 where either direction is below its plane or below the cloth. `D` is the distribution of
-GGX, and `S` is the sheen of [Zeltner2022]. `V`, `view_factor`, keeps the mixture from being
-brighter than the cloth. `V` and the powers of `W` depend on the viewer alone, because that is all
-that a closure's colour may depend on.
+GGX, or that of Beckmann where a lobe is `gaussian`, which Cycles alone has. `S` is the sheen of
+[Zeltner2022]. `V`, `view_factor`, keeps the mixture from being brighter than the cloth. `V` and the
+powers of `W` depend on the viewer alone, because that is all that a closure's colour may depend on.
 
 Renderers differ in the masking `G`. The masking of Cycles uses both widths of a lobe. MaterialX's
 uses their geometric mean, and MaterialX adds the energy that is scattered more than once, which
@@ -44,6 +44,9 @@ SMALLEST = 1e-6
 """Cosine below which a direction is below a plane."""
 
 
+_LEVEL = 0.39
+"""alpha^2 tan^2 below which Beckmann's masking is none: 1/1.6^2."""
+
 SHARP = 0.01
 """Lower bound of N.wo in V."""
 
@@ -58,10 +61,12 @@ class Lobe:
     along : 0 for threads along x, the weft; 1 for threads along y, the warp
     tilt : of the lobe's normal from N towards the thread's axis [rad]
     paired : whether there is another lobe whose tilt is the opposite
-    alpha_along, alpha_across : GGX widths along and across the thread
+    alpha_along, alpha_across : widths along and across the thread; both distributions are alike
+        near their peak, and have slopes of the variance alpha^2/2 where `gaussian`
     color : (3,) factor, not bounded by 1
     facing, crossing, upright : the powers p, r and s of W
     rise, rise_power : reflectance at grazing light over that face on, and its exponent e
+    gaussian : whether D is that of Beckmann; of Cycles alone
     """
 
     along: int
@@ -75,6 +80,7 @@ class Lobe:
     upright: float
     rise: float = 1.0
     rise_power: float = 1.5
+    gaussian: bool = False
 
     @property
     def tilts(self) -> tuple[float, ...]:
@@ -127,10 +133,11 @@ class Reflected(NamedTuple):
 
 
 def reflected(
-    form: str, along: int, tilt: float, alphas: tuple[float, float], wi: Floats, wo: Floats
-) -> Reflected:
-    """Return a lobe for wi, wo (n, 3); `alphas` are its widths along and across the thread."""
-    ax, ay = alphas
+    form: str, lobe: Lobe, tilt: Floats | float, alphas: tuple[Floats | float, Floats | float],
+    wi: Floats, wo: Floats,
+) -> Reflected:  # fmt: skip
+    """Return a lobe for wi, wo (n, 3), with another tilt and widths along and across the thread."""
+    along, (ax, ay) = lobe.along, alphas
     c, s = np.cos(tilt), np.sin(tilt)
     ti, to = c * wi[:, along] - s * wi[:, 2], c * wo[:, along] - s * wo[:, 2]
     ni, no = s * wi[:, along] + c * wi[:, 2], s * wo[:, along] + c * wo[:, 2]
@@ -139,7 +146,12 @@ def reflected(
     ni, no = np.where(above, ni, 1.0), np.where(above, no, 1.0)
     ht, hb, hn = ti + to, bi + bo, ni + no
     square = ht * ht + hb * hb + hn * hn
-    d = square**2 / (np.pi * ax * ay * ((ht / ax) ** 2 + (hb / ay) ** 2 + hn**2) ** 2)
+    slopes = (ht / ax) ** 2 + (hb / ay) ** 2
+    if lobe.gaussian:
+        level = np.maximum(hn**2, SMALLEST)
+        d = np.exp(-slopes / level) * (square / level) ** 2 / (np.pi * ax * ay)
+    else:
+        d = square**2 / (np.pi * ax * ay * (slopes + hn**2) ** 2)
     if form == CYCLES:
         tan_i = ((ax * ti) ** 2 + (ay * bi) ** 2) / ni**2
         tan_o = ((ax * to) ** 2 + (ay * bo) ** 2) / no**2
@@ -148,12 +160,25 @@ def reflected(
         tan_i, tan_o = (ax * ay * (1.0 / cos**2 - 1.0) for cos in (ni, no))
         single = ggx_albedo(np.minimum(no, 1.0), np.sqrt(ax * ay), 1.0, 1.0)
         spared = (1.0 - single) / single
-    # [Heitz2014] eq. 72 and 99: height-correlated masking, 1/(1 + lambda_i + lambda_o).
-    unmasked = 0.5 * (np.sqrt(1.0 + tan_i) + np.sqrt(1.0 + tan_o))
+    # [Heitz2014] eq. 99: height-correlated masking.
+    hidden = _hidden_gaussian if lobe.gaussian else _hidden
+    unmasked = 1.0 + hidden(tan_i) + hidden(tan_o)
     value = np.where(above, d / (4.0 * no * unmasked), 0.0)
     crossing = np.maximum(1.0 - to * to, CROSSING)
     parted = np.clip(1.0 - 0.5 * np.sqrt(square), 0.0, 1.0)
     return Reflected(value, np.maximum(np.where(above, no, 0.0), FACING), crossing, parted, spared)
+
+
+def _hidden(tan: Floats) -> Floats:
+    """Smith's Lambda of GGX by alpha^2 tan^2, [Heitz2014] eq. 72."""
+    return np.asarray(0.5 * (np.sqrt(1.0 + tan) - 1.0))
+
+
+def _hidden_gaussian(tan: Floats) -> Floats:
+    """Smith's Lambda of Beckmann by alpha^2 tan^2: the rational approximation of [Walter2007] that
+    Cycles evaluates too."""
+    a = 1.0 / np.sqrt(np.maximum(tan, _LEVEL))
+    return np.where(tan < _LEVEL, 0.0, (1.0 - a * (1.259 - 0.396 * a)) / (a * (3.535 + 2.181 * a)))
 
 
 def weight(lobe: Lobe, one: Reflected, wo: Floats) -> Floats:
@@ -201,7 +226,7 @@ def evaluate(mixture: Mixture, wi: Floats, wo: Floats) -> Floats:
     for lobe in mixture.lobes:
         alphas = lobe.alpha_along, lobe.alpha_across
         for tilt in lobe.tilts:
-            one = reflected(mixture.form, lobe.along, tilt, alphas, wi, wo)
+            one = reflected(mixture.form, lobe, tilt, alphas, wi, wo)
             f = (seen * weight(lobe, one, wo))[:, None] * np.array(lobe.color)
             out += one.value[:, None] * f * (1.0 + f * one.spared[:, None])
     above = (wi[:, 2] > 0) & (wo[:, 2] > 0)

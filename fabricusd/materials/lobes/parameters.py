@@ -188,7 +188,7 @@ def _add_lobe(
     """(n, 3) value of one lobe, `seen` being V; its derivatives are added to d (m, n, 3)."""
 
     def lobed(psi: float, ax: float, ay: float) -> tuple[Reflected, Floats]:
-        one = reflected(form, lobe.along, psi, (ax, ay), wi, wo)
+        one = reflected(form, lobe, psi, (ax, ay), wi, wo)
         f = (seen * weight(lobe, one, wo))[:, None] * np.array(lobe.color)
         return one, f
 

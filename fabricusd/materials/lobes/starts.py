@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import product
 
@@ -107,6 +107,15 @@ def flank(along: int) -> Lobe:
         along=along, tilt=0.9, paired=True, alpha_along=0.4, alpha_across=0.4,
         color=(0.05, 0.05, 0.05), facing=0.3, crossing=0.0, upright=0.0,
     )  # fmt: skip
+
+
+def turned(mixture: Mixture, numbers: Iterable[int]) -> Mixture:
+    """The mixture with the other distribution in the lobes of these numbers."""
+    chosen = set(numbers)
+    lobes = [
+        replace(one, gaussian=one.gaussian != (k in chosen)) for k, one in enumerate(mixture.lobes)
+    ]
+    return replace(mixture, lobes=tuple(lobes))
 
 
 FAINT = 0.01

@@ -113,7 +113,7 @@ class Problem:
         for number, (lobe, _) in enumerate(near.lobes):
             mine = placed(near, number, texels)
             for p, (tilt, alpha) in enumerate(zip(mine.tilt, mine.alpha, strict=True)):
-                one = reflected(far.form, lobe.along, tilt, (alpha, lobe.alpha_across), wi, wo)
+                one = reflected(far.form, lobe, tilt, (alpha, lobe.alpha_across), wi, wo)
                 unit = (seen * weight(lobe, one, wo))[:, None]
                 more = 1.0 + unit * mine.color[p] * one.spared[:, None]
                 out[p, number] = one.value[:, None] * unit * np.array(lobe.color) * more

@@ -170,7 +170,7 @@ def evaluate(near: NearMixture, texels: Texels, wi: Floats, wo: Floats) -> Float
         mine = placed(near, number, texels)
         alphas: Any = mine.alpha, lobe.alpha_across
         tilt: Any = mine.tilt
-        one = reflected(far.form, lobe.along, tilt, alphas, wi, wo)
+        one = reflected(far.form, lobe, tilt, alphas, wi, wo)
         f = (seen * weight(lobe, one, wo))[:, None] * mine.color
         out = out + one.value[:, None] * f * (1.0 + f * one.spared[:, None])
     above = (wi[:, 2] > 0) & (wo[:, 2] > 0)

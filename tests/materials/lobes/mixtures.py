@@ -16,6 +16,8 @@ LEVEL = Lobe(
     along=1, tilt=0.0, paired=False, alpha_along=0.15, alpha_across=0.8, color=(0.9, 0.1, 1.4),
     facing=0.4, crossing=0.8, upright=0.5,
 )  # fmt: skip
+GAUSSIAN = replace(PAIR, alpha_along=0.35, alpha_across=0.7, gaussian=True)
+"""A pair with Beckmann's distribution, which Cycles alone has."""
 
 
 VIEW = tuple(round(0.1 * (-1.0) ** k / (1.0 + k % POWERS), 6) for k in range(5 * POWERS))

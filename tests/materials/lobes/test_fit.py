@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from materials.lobes.mixtures import LEVEL, PAIR, mixture
+from materials.lobes.mixtures import GAUSSIAN, LEVEL, PAIR, mixture
 
 from fabricusd.errors import FabricError
-from fabricusd.materials.lobes.fit import COUNTS, Problem, fit
+from fabricusd.materials.lobes.fit import COUNTS, Problem, _found, fit
 from fabricusd.materials.lobes.judge import Judge
 from fabricusd.materials.lobes.mixture import CYCLES, FORMS, evaluate
 from fabricusd.materials.lobes.parameters import pack, unpack
-from fabricusd.materials.lobes.starts import flank, grown, starts
+from fabricusd.materials.lobes.starts import flank, grown, starts, turned
 from fabricusd.materials.lobes.target import GRAZING, VIEWS, Pairs, fitted_directions
 from fabricusd.schema import load
 
@@ -80,6 +80,18 @@ def test_starts_have_lobes_on_the_flanks_as_well():
     of_one = [one for one in found if sum(flank(a) in one.lobes for a in (0, 1)) == 1]
     assert len(of_one) >= 2
     assert all(len(one.lobes) > 1 for one in of_one)
+
+
+def test_a_fit_for_cycles_finds_which_lobes_are_gaussian():
+    dim = {"color": (0.05, 0.1, 0.03)}
+    wanted = mixture(CYCLES, replace(GAUSSIAN, **dim), replace(LEVEL, **dim))
+    problem = problem_of(replace(wanted, view=()))
+    begun = replace(turned(wanted, (0,)), view=())
+    assert not any(one.gaussian for one in begun.lobes)
+    assert problem.delta_e(begun) > 1.0
+    found = min(_found(problem, [begun]), key=problem.score)
+    assert [one.gaussian for one in found.lobes] == [True, False]
+    assert problem.delta_e(found) < 0.1
 
 
 @pytest.mark.parametrize("count", [0, 7])

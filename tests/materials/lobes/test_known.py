@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from materials.lobes.mixtures import mixture
+from materials.lobes.mixtures import GAUSSIAN, mixture
 
 from fabricusd.fabric import Fabric
 from fabricusd.geometry.nearest import scaled
 from fabricusd.materials.lobes import known
 from fabricusd.materials.lobes.__main__ import PUBLISHED
+from fabricusd.materials.lobes.fit import Fits
 from fabricusd.materials.lobes.judge import Judge
-from fabricusd.materials.lobes.mixture import CYCLES, FORMS, MATERIALX
+from fabricusd.materials.lobes.mixture import CYCLES, FORMS, MATERIALX, Mixture
 from fabricusd.schema import load
 
 
@@ -54,17 +55,28 @@ def test_a_fabric_that_is_not_in_the_table_is_fitted_once(tmp_path, monkeypatch)
     monkeypatch.setenv("FABRICUSD_CACHE_DIR", str(tmp_path))
     calls = []
 
-    def fake(fabric: Fabric, count: int, form: str, *, max_error: float | None):
+    def fake(fabric: Fabric, count: int, *, max_error: float | None):
         calls.append(count)
-        return mixture(form)
+        return Fits(mixture(CYCLES, GAUSSIAN), mixture(CYCLES))
 
-    monkeypatch.setattr(known, "fit", fake)
+    begun = []
+
+    def fake_refit(fabric: Fabric, first: Mixture):
+        begun.append(first)
+        return first
+
+    monkeypatch.setattr(known, "fits", fake)
+    monkeypatch.setattr(known, "refit", fake_refit)
     fabric = scaled(load("linen_plain"), 1.3)
     said: list[str] = []
     for _ in range(2):
         found = known.mixture_of(fabric, 3, progress=said.append)
-        assert found == mixture(CYCLES)
+        assert found == mixture(CYCLES, GAUSSIAN)
+        # The form of MaterialX, which has GGX alone, starts from GGX.
+        other = known.mixture_of(fabric, 3, MATERIALX, progress=said.append)
+        assert other == known.in_form(mixture(CYCLES), MATERIALX)
     assert calls == [3]
+    assert begun == [known.in_form(mixture(CYCLES), MATERIALX)]
     assert said == ["fitting 3 lobes to linen_plain"]
 
 

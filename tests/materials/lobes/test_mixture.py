@@ -12,6 +12,7 @@ from fabricusd.materials.fit.judge import hemisphere
 from fabricusd.materials.lobes.mixture import (
     CYCLES,
     FORMS,
+    MATERIALX,
     POWERS,
     Mixture,
     evaluate,
@@ -23,12 +24,16 @@ from fabricusd.materials.lobes.mixture import (
 PLAIN = replace(LEVEL, color=(1.0, 1.0, 1.0), facing=0.0, crossing=0.0, upright=0.0)
 
 
-@pytest.mark.parametrize("form", FORMS)
+DISTRIBUTIONS = [(CYCLES, False), (CYCLES, True), (MATERIALX, False)]
+"""Forms, and whether a lobe is Gaussian."""
+
+
+@pytest.mark.parametrize(("form", "gaussian"), DISTRIBUTIONS)
 @pytest.mark.parametrize("tilt", [0.0, 0.4])
-def test_a_narrow_lobe_of_reflectance_one_reflects_all_light(form, tilt):
+def test_a_narrow_lobe_of_reflectance_one_reflects_all_light(form, gaussian, tilt):
     lights = hemisphere(40000)
     wo = np.tile([0.0, np.sin(0.2), np.cos(0.2)], (len(lights), 1))
-    narrow = replace(PLAIN, tilt=tilt, alpha_along=0.05, alpha_across=0.08)
+    narrow = replace(PLAIN, tilt=tilt, alpha_along=0.05, alpha_across=0.08, gaussian=gaussian)
     got = evaluate(bare(form, narrow), lights, wo)
     assert got.mean(axis=0) * 2.0 * np.pi == pytest.approx([1.0] * 3, abs=0.02)
 
@@ -69,12 +74,33 @@ def test_a_lobe_is_dark_below_its_own_plane(form):
     assert evaluate(one, up, up).all()
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_without_its_cosine_a_lobe_is_reciprocal(form):
+@pytest.mark.parametrize(("form", "gaussian"), DISTRIBUTIONS)
+def test_without_its_cosine_a_lobe_is_reciprocal(form, gaussian):
     wi, wo = directions(300)
-    there, back = (reflected(form, 1, 0.3, (0.12, 0.2), *w) for w in ((wi, wo), (wo, wi)))
+    one = replace(LEVEL, gaussian=gaussian)
+    there, back = (reflected(form, one, 0.3, (0.12, 0.2), *w) for w in ((wi, wo), (wo, wi)))
     assert there.value * there.facing == pytest.approx(back.value * back.facing)
     assert np.count_nonzero(there.value) > 200
+
+
+def test_slopes_of_a_gaussian_lobe_have_the_variance_of_its_width():
+    """Over halfway vectors, D h.n is a density whose slopes are normally distributed."""
+    ax, ay = 0.3, 0.5
+    one = replace(PLAIN, along=0, gaussian=True)
+    h = hemisphere(100000)
+    up = np.tile([0.0, 0.0, 1.0], (len(h), 1))
+    wi = 2.0 * h[:, 2:] * h - up
+    above = wi[:, 2] > 0.05
+    h, wi, up = h[above], wi[above], up[above]
+    got = reflected(CYCLES, one, 0.0, (ax, ay), wi, up)
+    # No light is masked towards the normal, and none that is steep enough; just beyond, the
+    # approximation of the masking is 1.0005.
+    steep = (ax * wi[:, 0]) ** 2 + (ay * wi[:, 1]) ** 2 < 0.39 * wi[:, 2] ** 2
+    x, y = h[:, 0] / h[:, 2], h[:, 1] / h[:, 2]
+    density = np.exp(-((x / ax) ** 2) - (y / ay) ** 2) / (np.pi * ax * ay)
+    assert 4.0 * got.value[steep] * h[steep, 2] ** 4 == pytest.approx(density[steep])
+    assert (4.0 * got.value * h[:, 2] ** 4 < 1.001 * density)[~steep].all()
+    assert min(np.count_nonzero(~steep), np.count_nonzero(steep)) > 1000
 
 
 def test_the_forms_differ_where_a_lobe_is_anisotropic():

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from materials.lobes.mixtures import directions, mixture
+from materials.lobes.mixtures import LEVEL, directions, mixture
 
 from fabricusd.materials.fit.models import sheen_value
 from fabricusd.materials.lobes.known import from_dict
@@ -89,7 +89,8 @@ def closure(node, given, eye, light):
         return np.zeros(3)
     t = given["tangent"]
     local = (np.array([[w @ t, w @ np.cross(n, t), w @ n]]) for w in (light, eye))
-    one = reflected(MATERIALX, 0, 0.0, tuple(given["roughness"]), *local)
+    along_x = replace(LEVEL, along=0)
+    one = reflected(MATERIALX, along_x, 0.0, tuple(given["roughness"]), *local)
     face_on, grazing = given["color0"], given["color90"]
     half = (light + eye) / np.linalg.norm(light + eye)
     f = face_on + (grazing - face_on) * (1.0 - half @ eye) ** given["exponent"]

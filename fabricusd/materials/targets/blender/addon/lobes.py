@@ -1,4 +1,4 @@
-"""A sum of tilted anisotropic GGX lobes, a diffuse part and sheen, as nodes: `Mixture` in `looks`.
+"""A sum of tilted anisotropic lobes, a diffuse part and sheen, as nodes: `Mixture` in `looks`.
 
     f cos = V(wo) (sum color W D(h) G / (4 n.wo) + diffuse max(N.wo, 1e-4)^q N.wi / pi
                    + sheen max(N.wo, .05)^u S)
@@ -37,7 +37,8 @@ FAINT = 1e-4
 """Largest channel of sheen that does not show."""
 
 ONE_LOBE, FORM = "fabricusd lobe", "fabricusd_form"
-"""Name of the group of one lobe, and of the property that says which of its forms it is."""
+"""Name of the group of one lobe, and of the property that says which of its forms it is: 1 for the
+distribution of GGX, 2 for that of Beckmann."""
 
 
 def lobes(
@@ -79,7 +80,7 @@ def lobes(
         _given(group, number, lobe, axes[lobe.along], view)
         for number, lobe in enumerate(mixture.lobes)
     ]
-    one = _one_lobe()
+    ones = [_one_lobe(lobe.gaussian) for lobe in mixture.lobes]
 
     def summed(texel: Texel | None) -> Any:
         parts = []
@@ -97,7 +98,7 @@ def lobes(
                 continue
             parts.append(node.outputs[0])
         before = 0
-        for lobe, inputs in zip(mixture.lobes, given, strict=True):
+        for lobe, one, inputs in zip(mixture.lobes, ones, given, strict=True):
             parts += _placed(group, one, lobe, inputs, (texel, before) if texel else None)
             before += 2 if lobe.paired else 1
         return group.sum(parts)
@@ -217,14 +218,15 @@ def _placed(
     return found
 
 
-def _one_lobe() -> Any:
-    """Return the tree of one lobe, which all fabrics share."""
-    known = (one for one in bpy.data.node_groups if one.get(FORM) == 1)
+def _one_lobe(gaussian: bool) -> Any:
+    """Return the tree of one lobe of a distribution, which all fabrics share."""
+    form = 2 if gaussian else 1
+    known = (one for one in bpy.data.node_groups if one.get(FORM) == form)
     found = next(known, None)
     if found is not None:
         return found
     group = Group(ONE_LOBE)
-    group.tree[FORM] = 1
+    group.tree[FORM] = form
     color = group.input("Color", (0.1, 0.1, 0.1), color=True)
     tilt = group.input("Tilt", 0.0)
     along, across = (group.input(f"Width {name}", 0.5) for name in ("Along", "Across"))
@@ -249,7 +251,7 @@ def _one_lobe() -> Any:
         "ShaderNodeBsdfAnisotropic", Color=group.scaled(color, weight), Roughness=roughness,
         Anisotropy=anisotropy, Normal=n, Tangent=t,
     )  # fmt: skip
-    node.distribution = "GGX"
+    node.distribution = "BECKMANN" if gaussian else "GGX"
     return group.end(node.outputs[0])
 
 

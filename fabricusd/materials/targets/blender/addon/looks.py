@@ -46,9 +46,10 @@ CONSTANTS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Lobe:
-    """A GGX lobe about a tilted normal, or a pair of opposite tilt; see docs/lobes.md.
+    """A lobe about a tilted normal, or a pair of opposite tilt; see docs/lobes.md.
 
     along : "weft" or "warp"
+    gaussian : whether its distribution is Beckmann's; else it is that of GGX
     """
 
     along: str
@@ -60,6 +61,7 @@ class Lobe:
     facing: float
     crossing: float
     upright: float
+    gaussian: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,11 +243,14 @@ class _Material:
         lobes: list[Lobe] = []
         while self._input(f"cycles:lobe{len(lobes)}:tilt"):
             at = f"lobe{len(lobes)}:"
-            lobes.append(Lobe(**{name: value(at + name) for name in Lobe.__dataclass_fields__}))
-        names = ("diffuse", "diffuse_power", "sheen", "sheen_roughness", "sheen_power")
+            # Looks from before there was a choice have GGX.
+            gaussian = bool(self._value(f"cycles:{at}gaussian"))
+            names = (name for name in Lobe.__dataclass_fields__ if name != "gaussian")
+            lobes.append(Lobe(**{name: value(at + name) for name in names}, gaussian=gaussian))
+        others = ("diffuse", "diffuse_power", "sheen", "sheen_roughness", "sheen_power")
         return Mixture(
             lobes=tuple(lobes), view=_plain(self._value("cycles:view") or ()),
-            **{name: value(name) for name in names},
+            **{name: value(name) for name in others},
         )  # fmt: skip
 
 

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from materials.lobes.mixtures import LEVEL, PAIR, bare, mixture
+from materials.lobes.mixtures import GAUSSIAN, LEVEL, PAIR, bare, mixture
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from fabricusd.images.files import read_exr_layers
 from fabricusd.materials.lobes.inputs import inputs
+from fabricusd.materials.lobes.known import in_form
 from fabricusd.materials.lobes.mixture import CYCLES, MATERIALX, evaluate, of_covered
 from fabricusd.materials.lobes.network import lobes
 from fabricusd.materials.networks.graph import Value, unrolled
@@ -42,6 +43,11 @@ CASES = {
     "pair": bare(CYCLES, PAIR),
     "wide along": bare(CYCLES, replace(LEVEL, alpha_along=0.8, alpha_across=0.15)),
     "leaning": bare(CYCLES, LEANING),
+    "gaussian": bare(CYCLES, GAUSSIAN),
+    "of both": replace(mixture(CYCLES, GAUSSIAN, LEVEL), sheen=DARK),
+    "wide gaussian": bare(
+        CYCLES, replace(LEVEL, alpha_along=0.8, alpha_across=0.25, gaussian=True)
+    ),
     "open": replace(mixture(CYCLES), sheen=DARK),
     "sheen": replace(
         mixture(CYCLES, replace(LEVEL, color=(1e-9,) * 3)), diffuse=DARK, sheen_roughness=0.9
@@ -93,7 +99,7 @@ def write_sheet(path, one, along, cover):
     st.Set([tuple(0.5 + 0.35 * c) for _ in along for c in corners.astype(float)])
     maps = {**NEUTRAL, "opacity": Value("float", cover)}
     opaque = cover == 1.0
-    surface = lobes(maps, opaque, replace(one, form=MATERIALX), MATRIX)
+    surface = lobes(maps, opaque, in_form(one, MATERIALX), MATRIX)
     graphs = [("", preview(maps, Look(), opaque)), ("", unrolled(surface))]
     material = write_material(
         stage, Sdf.Path("/Sheet/Cloth"), graphs,
