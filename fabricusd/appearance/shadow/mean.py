@@ -161,13 +161,8 @@ def bounds_of(groups: Floats, softness: float) -> NDArray[np.int32]:
     # Half a softness away from a horizon its place is dark, or lit. One unit more, for rounding.
     dark = np.floor((lowest - 0.5) * softness * ELEVATION) - 1.0
     lit = np.ceil((highest + 0.5) * softness * ELEVATION) + 1.0
-    return packed(np.maximum(dark, 0.0), np.minimum(lit, 32767.0))
-
-
-def packed(dark: Floats, lit: Floats) -> NDArray[np.int32]:
-    """Bounds as `Shadow.mean_bounds` holds them."""
-    found: NDArray[np.int32] = lit.astype(np.int32) << 16 | dark.astype(np.int32)
-    return found
+    high, low = np.minimum(lit, 32767.0).astype(np.int32), np.maximum(dark, 0.0).astype(np.int32)
+    return np.asarray(high << 16 | low)
 
 
 @njit(**INLINE)
