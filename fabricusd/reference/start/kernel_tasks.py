@@ -199,7 +199,7 @@ def _look_up() -> None:
 def _look_up_uneven() -> None:
     wave = _sample().wave
     look_up_uneven(
-        R, _woven()[0], compile_yarn(Fabric()), NOWHERE_ELSE, R(1), wave.hits.tags[PRIMITIVE],
+        R, *_woven(), compile_yarn(Fabric()), NOWHERE_ELSE, R(1), wave.hits.tags[PRIMITIVE],
         wave.hits.rows, 0, _points(),
     )  # fmt: skip
 

@@ -282,8 +282,8 @@ class FabricShader:
         else:
             home = self.home if wave.carried is None else wave.carried.home
             call(
-                look_up_uneven, R, cloth, side.yarn, home, v_sign, wave.hits.tags[PRIMITIVE], hits,
-                first, points,
+                look_up_uneven, R, cloth, shadow, side.yarn, home, v_sign,
+                wave.hits.tags[PRIMITIVE], hits, first, points,
             )  # fmt: skip
         if law.kind == PUBLISHED_ONLY:
             call(

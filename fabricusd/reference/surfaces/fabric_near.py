@@ -29,7 +29,7 @@ from fabricusd.appearance.shadow.place_blocks import (
 )
 from fabricusd.appearance.weave.compiled import CompiledFabric
 from fabricusd.appearance.weave.coverage import GAP, WARP, WEFT
-from fabricusd.appearance.weave.lookup import find, move_along
+from fabricusd.appearance.weave.lookup import move_along
 from fabricusd.appearance.weave.place import Hit, Places
 from fabricusd.appearance.weave.yarn.lay import (
     DOUBLE_ROWS,
@@ -94,23 +94,30 @@ def look_up(R, cloth, shadow, v_sign, hits, first, points):
     """Look up the even thread under each hit."""
     ints = np.empty(place_blocks.INT_ROWS * BLOCK, np.int32)
     reals, uv = np.empty(place_blocks.REAL_ROWS * BLOCK, R), np.empty((BLOCK, 2))
-    sets, threads, along, across, psi0, length, _, _ = points
-    none, count = R(0), sets.shape[0]
+    count = points.sets.shape[0]
     for start in range(0, count, BLOCK):
         size = min(BLOCK, count - start)
         _places_of_block(hits, v_sign, first + start, size, uv)
         look_up_block(R, cloth, shadow, uv, 0, size, ints, reals)
-        for x in range(size):
-            k, gap = start + x, ints[OF_SET + x] == GAP
-            sets[k], threads[k] = ints[OF_SET + x], ints[OF_THREAD + x]
-            along[k] = none if gap else reals[S + x]
-            across[k] = none if gap else reals[ACROSS + x]
-            psi0[k] = none if gap else reals[ANGLE + x]
-            length[k] = none if gap else reals[LENGTH + x]
+        _even_points(R, start, size, ints, reals, points)
+
+
+@njit(**INLINE)
+def _even_points(R, start, size, ints, reals, points):
+    """Copy what `look_up_block` found to the points from `start` on."""
+    sets, threads, along, across, psi0, length, _, _ = points
+    none = R(0)
+    for x in range(size):
+        k, gap = start + x, ints[OF_SET + x] == GAP
+        sets[k], threads[k] = ints[OF_SET + x], ints[OF_THREAD + x]
+        along[k] = none if gap else reals[S + x]
+        across[k] = none if gap else reals[ACROSS + x]
+        psi0[k] = none if gap else reals[ANGLE + x]
+        length[k] = none if gap else reals[LENGTH + x]
 
 
 @njit(**KERNEL)
-def look_up_uneven(R, cloth, yarn, home, v_sign, triangles, hits, first, points):
+def look_up_uneven(R, cloth, shadow, yarn, home, v_sign, triangles, hits, first, points):
     """Look up the uneven thread under each hit; PLACE becomes the place of the even cloth at which
     that thread lies, for the shadows.
 
@@ -118,7 +125,9 @@ def look_up_uneven(R, cloth, yarn, home, v_sign, triangles, hits, first, points)
     """
     u, v, blur = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, R)
     doubles, reals = np.empty(DOUBLE_ROWS * BLOCK), np.empty(REAL_ROWS * BLOCK, R)
-    ints = np.empty(INT_ROWS * BLOCK, np.int32)
+    ints, near = np.empty(INT_ROWS * BLOCK, np.int32), np.empty((BLOCK, 2))
+    even_ints = np.empty(place_blocks.INT_ROWS * BLOCK, np.int32)
+    even_reals = np.empty(place_blocks.REAL_ROWS * BLOCK, R)
     count, metres = points.sets.shape[0], R(yarn.cell[WEFT])
     for start in range(0, count, BLOCK):
         size = min(BLOCK, count - start)
@@ -129,36 +138,50 @@ def look_up_uneven(R, cloth, yarn, home, v_sign, triangles, hits, first, points)
             blur[x] = hits[FOOTPRINT, h] * metres
         lay_block(R, yarn, u, v, blur, size, doubles, reals, ints)
         for x in range(size):
-            _look_up_laid(
-                R, cloth, yarn, home[triangles[first + start + x]], v_sign, u[x], v[x], x, reals,
-                ints, hits, first + start + x, start + x, points,
+            at = home[triangles[first + start + x]]
+            place_u, place_v = _laid(u[x], v[x], x, ints, reals)
+            near[x, 0], near[x, 1] = place_u - at[0], v_sign * (place_v - at[1])
+        look_up_block(R, cloth, shadow, near, 0, size, even_ints, even_reals)
+        _even_points(R, start, size, even_ints, even_reals, points)
+        for x in range(size):
+            h = first + start + x
+            _move(
+                R, cloth, yarn, home[triangles[h]], v_sign, u[x], v[x], x, reals, ints, near, hits,
+                h, start + x, points,
             )  # fmt: skip
 
 
 @njit(**INLINE)
-def _look_up_laid(R, cloth, yarn, home, v_sign, u, v, x, reals, ints, hits, h, k, points):
-    """Look up hit `h`, entry x of what `lay_block` found at (u, v), into entry k of `points`."""
+def _laid(u, v, x, ints, reals):
+    """Entry x of what `lay_block` found at (u, v): the place of the even cloth [threads]."""
+    if not sound(u, v):
+        return u, v
+    return (
+        float(ints[WARP * BLOCK + x]) + float(reals[IN_CELL + WARP * BLOCK + x]),
+        float(ints[WEFT * BLOCK + x]) + float(reals[IN_CELL + WEFT * BLOCK + x]),
+    )
+
+
+@njit(**INLINE)
+def _move(R, cloth, yarn, home, v_sign, u, v, x, reals, ints, near, hits, h, k, points):
+    """Turn entry k of `points` from the even thread at `near` into the uneven one that `lay_block`
+    found at (u, v), and write hit `h`'s PLACE; x : entry of the block."""
     sets, threads, along, across, psi0, length, strands, shades = points
-    place_u, place_v = u, v
-    laid = sound(u, v)
-    if laid:
-        place_u = float(ints[WARP * BLOCK + x]) + float(reals[IN_CELL + WARP * BLOCK + x])
-        place_v = float(ints[WEFT * BLOCK + x]) + float(reals[IN_CELL + WEFT * BLOCK + x])
-    near_u, near_v = place_u - home[0], place_v - home[1]
-    which, thread, s, w, angle, run = find(R, cloth, near_u, v_sign * near_v)
-    sets[k], threads[k], along[k], across[k] = which, thread, s, w
-    psi0[k], length[k], strands[k], shades[k] = angle, run, w, R(1)
-    if which != GAP and laid:
+    which, thread = np.int64(sets[k]), threads[k]
+    near_u, near_v = near[x, 0], v_sign * near[x, 1]
+    strands[k], shades[k] = across[k], R(1)
+    if which != GAP and sound(u, v):
         number = ints[which * BLOCK + x]
         shades[k] = reals[TONE + which * BLOCK + x]
         if yarn.plies != 0:
             at = v_sign * v if which == WARP else u
-            strands[k] = strand(R, yarn, which, thread, number, w, at * yarn.cell[which])
-        if run > R(0):
+            strands[k] = strand(R, yarn, which, thread, number, across[k], at * yarn.cell[which])
+        if length[k] > R(0):
+            place_u, place_v = _laid(u, v, x, ints, reals)
             # Along the thread as this side counts it: from the back, V runs the other way.
             place = v_sign * place_v if which == WARP else place_u
             moved, along[k], psi0[k] = move_along(
-                R, cloth, yarn, which, thread, number, s, run, place
+                R, cloth, yarn, which, thread, number, along[k], length[k], place
             )
             near_u = near_u if which == WARP else moved - home[0]
             near_v = v_sign * moved - home[1] if which == WARP else near_v
