@@ -12,6 +12,12 @@ from fabricusd.files import whole_file
 
 COLUMNS = 3
 
+WIDE, NARROW = 40.0, 6.0
+"""Ratios of an axis's ends beyond which only powers of ten are written, and up to which all numbers
+between them are; else PLAIN are."""
+
+PLAIN = (2, 3, 5)
+
 
 def pyplot() -> Any:
     """matplotlib's pyplot, without a display; raises FabricError if it is not installed."""
@@ -93,17 +99,22 @@ def _scatter(
             where="post", lw=0.8,
         )  # fmt: skip
         axes.set(xscale="log", yscale="log", xlabel=panel.cost, ylabel=panel.error)
-        # Numbers between powers of ten are plain and small: in scientific notation they overlap.
-        axes.xaxis.set_minor_formatter("{x:g}")
-        if axes.get_xlim()[1] > 20 * axes.get_xlim()[0]:
-            axes.xaxis.set_minor_formatter("")
-        axes.tick_params(axis="x", which="minor", labelsize=6)
-        axes.set_title(group, fontsize=8)
         axes.margins(x=0.25)
+        _small_numbers(axes)
+        axes.set_title(group, fontsize=8)
         axes.grid(alpha=0.3)
     for axes in plots[len(groups) :]:
         axes.set_axis_off()
     _part(figure, names)
+
+
+def _small_numbers(axes: Any) -> None:
+    """Write numbers between powers of ten plainly, small, and no more than there is room for."""
+    low, high = axes.get_xlim()
+    axes.xaxis.set_minor_formatter("{x:g}" if high <= WIDE * low else "")
+    if high > NARROW * low:
+        axes.xaxis.set_minor_locator(pyplot().LogLocator(subs=PLAIN))
+    axes.tick_params(axis="x", which="minor", labelsize=6)
 
 
 def _part(figure: Any, names: Sequence[tuple[Any, list[Any]]]) -> None:
