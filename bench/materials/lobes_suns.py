@@ -21,6 +21,7 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "samples"))
+from blender_compare import GARMENT
 from make_samples import make_drape
 
 from fabricusd.materials.lobes.__main__ import PUBLISHED
@@ -30,7 +31,7 @@ from fabricusd.materials.lobes.target import cloth
 from fabricusd.quality.colors import delta_e_2000
 from fabricusd.schema import load
 
-EYE, AT = np.array([0.55, 0.95, 1.75]), np.array([0.0, 0.24, 0.0])
+EYE, AT = np.array(GARMENT.eye), np.array(GARMENT.at)
 SUNS = 24
 LEVEL = 0.98
 """Upward part of the normal from which on a triangle is of the table's top."""
@@ -66,7 +67,7 @@ class Drape:
         towards = EYE - points[corners].mean(axis=1)
         towards /= np.linalg.norm(towards, axis=1, keepdims=True)
         seen = np.einsum("nij,nj->ni", self.frames, towards)
-        # The back of the cloth looks as its front, mirrored in the weft.
+        # The back of the cloth is its front, turned over about the weft.
         self.side = np.where(seen[:, 2] < 0.0, -1.0, 1.0)
         self.wo = self._turned(seen)
         self.share = area * self.wo[:, 2]

@@ -70,16 +70,17 @@ def _mixtures(
         one that is not brighter than the cloth is kept, and of two the nearer
     """
     for count in counts:
-        first, start = known.mixture_of(fabric, count, CYCLES), None
         if CYCLES in again:
             first, start = fits(fabric, count)
+        else:
+            first = start = known.mixture_of(fabric, count, CYCLES)
         for form in FORMS:
             if form not in again:
                 yield first if form == CYCLES else known.mixture_of(fabric, count, form)
                 continue
             tried = [first]
             if form != CYCLES:
-                tried = [refit(fabric, known.in_form(start or first, form))]
+                tried = [refit(fabric, known.in_form(start, form))]
             before = known.held(name, fabric, count, form)
             tried += [*before, *(refit(fabric, one) for one in before)]
             yield min(tried, key=lambda one: _rank(judge(one)))

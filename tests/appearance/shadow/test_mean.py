@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from fabricusd.appearance.laws.lit import AZIMUTHS, ROWS
-from fabricusd.appearance.shadow.mean import node_means, relative
-from fabricusd.appearance.shadow.methods import compile_shadow, lit_all, mean_lit
+from fabricusd.appearance.shadow.mean import node_means
+from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.surface import evaluate
-from fabricusd.appearance.weave.compiled import compile_fabric, true_repeat
-from fabricusd.appearance.weave.coverage import GAP
-from fabricusd.appearance.weave.lookup import lookup
-from fabricusd.appearance.weave.place import Hit
+from fabricusd.appearance.weave.compiled import true_repeat
 from fabricusd.appearance.weave.quadrature import CELLS, POINTS, Rule, curve_nodes, shares
 from fabricusd.fabric import even
 from fabricusd.schema import load
@@ -95,15 +90,16 @@ def test_no_pair_of_directions_is_darker_than_black():
 
 # With the mean of each node's own part of the curve, filament is off by .02 to .04; crepe by .015
 # with lines between samples of the mean, and satin's back by .011 with 1024 places of a stretch.
+# Crepe's blue, an eighth of its red, is .02 off in one of these views (docs/shadowing.md).
 @pytest.mark.parametrize(
-    ("name", "elevation", "azimuth"),
+    ("name", "elevation", "azimuth", "channels"),
     [
-        ("thread_polyester_filament", 5.0, 146.0),
-        ("silk_crepe_de_chine", 5.0, 236.25),
-        ("polyester_satin_charmeuse_back", 10.0, 281.25),
+        ("thread_polyester_filament", 5.0, 146.0, 3),
+        ("silk_crepe_de_chine", 5.0, 236.25, 2),
+        ("polyester_satin_charmeuse_back", 10.0, 281.25, 3),
     ],
 )
-def test_level_far_is_the_mean_of_weave_under_a_low_sun(name, elevation, azimuth):
+def test_level_far_is_the_mean_of_weave_under_a_low_sun(name, elevation, azimuth, channels):
     fabric = even(load(name))
     n = 40000
     uv = np.arange(n)[:, None] * [0.7548776662466927, 0.5698402909980532] % 1.0
@@ -114,31 +110,6 @@ def test_level_far_is_the_mean_of_weave_under_a_low_sun(name, elevation, azimuth
         wo = np.array(wo) / np.linalg.norm(wo)
         near = evaluate(fabric, np.repeat(wi[None], n, axis=0), wo, uv, "weave", "horizon")
         far = evaluate(fabric, wi, wo, shadow="horizon")[0]
-        brightest = far.argmax()
-        assert near.mean(axis=0)[brightest] == pytest.approx(far[brightest], rel=0.01)
-
-
-@pytest.mark.parametrize("name", ["linen_plain", "silk_shot{appearance=published}", "velvet"])
-def test_blocks_skip_only_places_whose_mean_is_one(name):
-    fabric = replace(even(load(name)), surface_law="masked")
-    cloth = compile_fabric(fabric, precision=np.float64)
-    shadow = compile_shadow(fabric, "horizon", precision=np.float64)
-    rng = np.random.default_rng(7)
-    n = 4000
-    uv = rng.random((n, 2)) * true_repeat(fabric)
-    z, turn = np.linspace(-0.1, 1.0, n), 2.0 * np.pi * rng.random(n)
-    flat = np.sqrt(1.0 - z * z)
-    wi = np.stack((flat * np.cos(turn), flat * np.sin(turn), z))
-    shaded, g = np.empty(n), np.empty(n)
-    lit_all(np.float64, cloth, shadow, True, uv, wi, shaded)
-    lit_all(np.float64, cloth, shadow, False, uv, wi, g)
-    at = lookup(cloth, uv)
-    below = 0
-    for k in np.flatnonzero((at.set != GAP) & (z > 0)):
-        if cloth.pile[at.thread[k]]:
-            continue
-        hit = Hit(at.set[k], at.thread[k], at.position[k], at.across[k], 0.0)
-        mean = mean_lit(np.float64, cloth, shadow, hit, *wi[:, k])
-        below += mean < 1.0
-        assert shaded[k] == pytest.approx(relative(np.float64, g[k], mean), abs=1e-12)
-    assert below > n // 20 or cloth.pile.all()
+        mean = near.mean(axis=0)
+        assert mean[:channels] == pytest.approx(far[:channels], rel=0.01)
+        assert mean == pytest.approx(far, rel=0.025)
