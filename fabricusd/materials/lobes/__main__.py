@@ -71,16 +71,17 @@ def _mixtures(
     """
     for count in counts:
         if CYCLES in again:
-            first, start = fits(fabric, count)
+            begun: Sequence[Mixture] = fits(fabric, count)
         else:
-            first = start = known.mixture_of(fabric, count, CYCLES)
+            begun = [known.mixture_of(fabric, count, CYCLES)]
+        first = begun[0]
         for form in FORMS:
             if form not in again:
                 yield first if form == CYCLES else known.mixture_of(fabric, count, form)
                 continue
             tried = [first]
             if form != CYCLES:
-                tried = [refit(fabric, known.in_form(start, form))]
+                tried = [refit(fabric, *(known.in_form(one, form) for one in begun))]
             before = known.held(name, fabric, count, form)
             tried += [*before, *(refit(fabric, one) for one in before)]
             yield min(tried, key=lambda one: _rank(judge(one)))

@@ -161,8 +161,8 @@ class Problem:
 
 
 class Fits(NamedTuple):
-    """The nearest mixture, and the nearest whose lobes are all of GGX, without V: from that one a
-    fit in the form of MaterialX starts."""
+    """The nearest mixture, and the nearest whose lobes are all of GGX, without V. A fit in the form
+    of MaterialX starts from both: either may end nearer."""
 
     best: Mixture
     ggx: Mixture
@@ -210,14 +210,16 @@ def fits(
     best = held(tried)
     if best is None:
         raise FabricError(f"fabric '{fabric.name}'", f"has no threads for {count} lobes")
-    return Fits(best, tried[0])
+    alike = [one for one in tried if not any(lobe.gaussian for lobe in one.lobes)]
+    return Fits(best, min(alike, key=problem.score))
 
 
 @one_blas_thread()
-def refit(fabric: Fabric, mixture: Mixture) -> Mixture:
-    """Return the mixture nearest to `fabric` that a solver finds from `mixture`, as `fit` does."""
+def refit(fabric: Fabric, *mixtures: Mixture) -> Mixture:
+    """Return the mixture nearest to `fabric` that a solver finds from `mixtures`, as `fit` does."""
     problem, bound = Problem(fitted_pairs(fabric)), Bound(fabric)
-    found = _found(problem, [replace(mixture, view=())])
+    begun = dict.fromkeys(replace(one, view=()) for one in mixtures)
+    found = _found(problem, list(begun))
     return min((bound(one) for one in found), key=problem.score)
 
 

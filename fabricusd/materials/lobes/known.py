@@ -56,8 +56,8 @@ def mixture_of(
         return _fits(fabric, count, max_error, say).best
 
     def made() -> Mapping[str, Any]:
-        first = _fits(fabric, count, max_error, say).ggx
-        return asdict(refit(fabric, in_form(first, form)))
+        begun = _fits(fabric, count, max_error, say)
+        return asdict(refit(fabric, *(in_form(one, form) for one in begun)))
 
     return from_dict(_kept(fabric, (count, form, max_error), made))
 
