@@ -26,7 +26,7 @@ MODELS = ("thesis", "microcylinder", "conserving")
 token of the schema. A model's number is its index here, so new models are appended."""
 
 FACETS = "facets"
-SURFACE_LAWS = ("masked", "unmasked", "projected", FACETS)
+SURFACE_LAWS = ("masked", "unmasked", "projected", "visible", FACETS)
 """Laws by which light on threads becomes light on cloth. The first is the default. Those of
 published threads are modules of that name in `appearance/laws`; FACETS is the law of
 `conserving` threads."""

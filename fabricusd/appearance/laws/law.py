@@ -18,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from numba import njit
 
 from fabricusd.fabric import Fabric
@@ -46,12 +47,17 @@ class Law:
 
     summary : a phrase for the documentation of the schema
     tables : the class of its tables, see `tables_class`
-    make : (fabric, shadow as `lit.light_fields` takes it, precision) -> the fields that are its own
+    make : (fabric, nodes, means as `lit.light_fields` takes them, precision) -> the fields that are
+        its own; nodes : `quadrature.CurveNodes`, None where no light is held back
     absolute : whether light that neighbouring threads hold back is lost. Otherwise the mask already
         contains the mean shadow, and `g` only says where in the repeat it falls
     shared : (R, tables, thread_set, across_o, cos_half) -> a number that `weight` may need, which
         is the same for all threads of a set; across_o : wo's component across the set; cos_half :
         cos(d/2), d the difference of the longitudes of wi and wo
+    hides : (R, tables) -> a constant: whether `weight` reads what `visible_shares` returns
+    view_place : (R, tables, ox, oy, oz) -> (entry, c, r), where the table of shares has a view
+    visible_shares : (R, tables, thread_set, entry, c, r) -> four coefficients of the share of the
+        places of a set that are seen, see `laws.visible`
     weight : (R, tables, c, s, pair) -> the weight of thread at the tangent angle with cosine c and
         sine s; pair : a `segment.SetPair`
     mask : (R, tables, cos_phi_i, cos_phi_o, cos_half) -> the factor of `f_s`, from azimuths
@@ -69,6 +75,9 @@ class Law:
     make: Callable[[Fabric, Any, Any], dict[str, Any]]
     absolute: bool
     shared: Kernel
+    hides: Kernel
+    view_place: Kernel
+    visible_shares: Kernel
     weight: Kernel
     mask: Kernel
     total: Kernel
@@ -86,6 +95,30 @@ class Law:
 def nothing_shared(R, tables, thread_set, across_o, cos_half):
     """`Law.shared` of a law that needs none."""
     return R(0)
+
+
+@njit(**INLINE)
+def yes(R, tables):
+    """`Law.hides` of a law whose threads hide one another."""
+    return True
+
+
+@njit(**INLINE)
+def no(R, tables):
+    """`Law.hides` of a law whose threads do not."""
+    return False
+
+
+@njit(**INLINE)
+def no_place(R, tables, ox, oy, oz):
+    """`Law.view_place` of a law whose threads do not hide one another."""
+    return np.int32(0), R(0), R(0)
+
+
+@njit(**INLINE)
+def all_visible(R, tables, thread_set, entry, c, r):
+    """`Law.visible_shares` of a law whose threads do not hide one another."""
+    return R(1), R(0), R(0), R(0)
 
 
 @njit(**INLINE)

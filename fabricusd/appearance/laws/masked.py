@@ -13,9 +13,12 @@ from numba import njit
 
 from fabricusd.appearance.laws.law import (
     Law,
+    all_visible,
     always_lit,
     lit_alone,
+    no,
     no_nodes,
+    no_place,
     no_room,
     same_gap,
     tables_class,
@@ -32,7 +35,7 @@ Masked = tables_class(__name__, "Masked", "precision")
 """precision : real - 2/masking_width^2 [1/rad^2]"""
 
 
-def _make(fabric: Fabric, shadow: Any, precision: Any) -> dict[str, Any]:
+def _make(fabric: Fabric, nodes: Any, means: Any, precision: Any) -> dict[str, Any]:
     width = max(fabric.masking_width, NARROWEST_MASKING)
     return {"precision": precision(2.0 / width**2)}
 
@@ -101,6 +104,9 @@ LAW = Law(
     make=_make,
     absolute=False,
     shared=_shared,
+    hides=no,
+    view_place=no_place,
+    visible_shares=all_visible,
     weight=_weight,
     mask=_mask,
     total=_total,

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.laws.excess import EXCESS_FIELDS, excess_at, no_excess
-from fabricusd.appearance.laws.law import Law, no_mask, tables_class
+from fabricusd.appearance.laws.law import Law, all_visible, no, no_mask, no_place, tables_class
 from fabricusd.appearance.laws.lit import (
     LIGHT_FIELDS,
     light_fields,
@@ -65,12 +65,12 @@ def _shape(fabric: Fabric) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return coverage(fabric).width, np.zeros(2) if fabric.opaque else tall
 
 
-def _make(fabric: Fabric, shadow: Any, precision: Any) -> dict[str, Any]:
+def _make(fabric: Fabric, nodes: Any, means: Any, precision: Any) -> dict[str, Any]:
     wide, tall = _shape(fabric)
     return {
         "wide_2": (wide**2).astype(precision),
         "tall_2": (tall**2).astype(precision),
-        **light_fields(shadow, precision),
+        **light_fields(means, precision),
         **no_excess(precision),
     }
 
@@ -83,7 +83,8 @@ def _shared(R, tables, thread_set, across_o, cos_half):
 
 
 @njit(**INLINE)
-def _weight(R, tables, c, s, pair):
+def weight(R, tables, c, s, pair):
+    """What is seen of the upper half of a section, over the thread's projected width."""
     n = s * pair.along_o + c * pair.up_o
     # Not below 0 by rounding.
     seen = max(n + math.sqrt(n * n + pair.shared), R(0))
@@ -133,7 +134,10 @@ LAW = Law(
     make=_make,
     absolute=True,
     shared=_shared,
-    weight=_weight,
+    hides=no,
+    view_place=no_place,
+    visible_shares=all_visible,
+    weight=weight,
     mask=no_mask,
     total=_total,
     openness=_openness,

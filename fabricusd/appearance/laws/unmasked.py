@@ -13,7 +13,16 @@ import numpy as np
 from numba import njit
 
 from fabricusd.appearance.laws.excess import EXCESS_FIELDS, excess_at, no_excess
-from fabricusd.appearance.laws.law import Law, no_mask, nothing_shared, same_gap, tables_class
+from fabricusd.appearance.laws.law import (
+    Law,
+    all_visible,
+    no,
+    no_mask,
+    no_place,
+    nothing_shared,
+    same_gap,
+    tables_class,
+)
 from fabricusd.appearance.laws.lit import (
     LIGHT_FIELDS,
     light_fields,
@@ -29,8 +38,8 @@ from fabricusd.kernels.real import INLINE
 Unmasked = tables_class(__name__, "Unmasked", *LIGHT_FIELDS, *EXCESS_FIELDS)
 
 
-def _make(fabric: Fabric, shadow: Any, precision: Any) -> dict[str, Any]:
-    return {**light_fields(shadow, precision), **no_excess(precision)}
+def _make(fabric: Fabric, nodes: Any, means: Any, precision: Any) -> dict[str, Any]:
+    return {**light_fields(means, precision), **no_excess(precision)}
 
 
 @njit(**INLINE)
@@ -62,6 +71,9 @@ LAW = Law(
     make=_make,
     absolute=True,
     shared=nothing_shared,
+    hides=no,
+    view_place=no_place,
+    visible_shares=all_visible,
     weight=_weight,
     mask=no_mask,
     total=_total,

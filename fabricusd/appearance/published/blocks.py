@@ -6,6 +6,7 @@ check every pair of pointers for overlap before it vectorises a loop, and there 
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from fabricusd.appearance import laws
@@ -17,13 +18,15 @@ from fabricusd.kernels.real import BLOCK, INLINE, index
 ALONG_I, ACROSS_I, UP_I, SCALE_I = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
 ALONG_O, ACROSS_O, UP_O, SCALE_O = 4 * BLOCK, 5 * BLOCK, 6 * BLOCK, 7 * BLOCK
 SHARED = 8 * BLOCK
-NORMALIZATION, RED, GREEN, BLUE = 9 * BLOCK, 10 * BLOCK, 11 * BLOCK, 12 * BLOCK
-"""Offsets of the rows: the fields of `segment.SetPair`, then the sums."""
+SEEN_0, SEEN_1, SEEN_2, SEEN_4 = 9 * BLOCK, 10 * BLOCK, 11 * BLOCK, 12 * BLOCK
+NORMALIZATION, RED, GREEN, BLUE = 13 * BLOCK, 14 * BLOCK, 15 * BLOCK, 16 * BLOCK
+"""Offsets of the rows: the fields of `segment.SetPair`, then the sums. Laws that hide nothing leave
+the rows SEEN as they are."""
 
-NODE_LIT = 13 * BLOCK
+NODE_LIT = 17 * BLOCK
 """Offset of a row that level `far` alone has: the mean of g at a node."""
 
-ROWS = 14
+ROWS = 18
 
 NOTHING = 1e-12
 """The value is 0 where `Q` is at or below this. On velvet this loses a tenth of random pairs."""
@@ -49,6 +52,23 @@ def prepare(R, tables, thread_set, wi, wo, start, size, block, at=0):
         block[ALONG_O + x], block[ACROSS_O + x] = pair.along_o, pair.across_o
         block[UP_O + x], block[SCALE_O + x] = pair.up_o, pair.scale_o
         block[SHARED + x] = pair.shared
+    if laws.hides(R, tables):
+        _see(R, tables, thread_set, wo, start, size, block, at)
+
+
+@njit(**INLINE)
+def _see(R, tables, thread_set, wo, start, size, block, at):
+    """Fill the rows SEEN. Entries of the table are small enough to be whole in float32."""
+    for y in range(size):
+        x, k = at + y, index(start, y)
+        entry, c, r = laws.view_place(R, tables, wo[0, k], wo[1, k], wo[2, k])
+        block[SEEN_0 + x], block[SEEN_1 + x], block[SEEN_2 + x] = R(entry), c, r
+    for y in range(size):
+        x = at + y
+        entry, c, r = np.int32(block[SEEN_0 + x]), block[SEEN_1 + x], block[SEEN_2 + x]
+        v0, v1, v2, v4 = laws.visible_shares(R, tables, thread_set, entry, c, r)
+        block[SEEN_0 + x], block[SEEN_1 + x] = v0, v1
+        block[SEEN_2 + x], block[SEEN_4 + x] = v2, v4
 
 
 @njit(**INLINE)
@@ -58,6 +78,7 @@ def pair_at(block, x):
         block[ALONG_I + x], block[ACROSS_I + x], block[UP_I + x], block[SCALE_I + x],
         block[ALONG_O + x], block[ACROSS_O + x], block[UP_O + x], block[SCALE_O + x],
         block[SHARED + x],
+        block[SEEN_0 + x], block[SEEN_1 + x], block[SEEN_2 + x], block[SEEN_4 + x],
     )  # fmt: skip
 
 

@@ -26,6 +26,10 @@ from fabricusd.appearance.published.blocks import (
     RED,
     SCALE_I,
     SCALE_O,
+    SEEN_0,
+    SEEN_1,
+    SEEN_2,
+    SEEN_4,
     SHARED,
     UP_I,
     UP_O,
@@ -50,12 +54,12 @@ from fabricusd.kernels.choice import for_each
 from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, cos, index, sin
 from fabricusd.kernels.unrolled import tuple_reader
 
-_WARP = 13 * BLOCK
-"""Offset of the nine rows of the warp; the weft uses the first nine rows of the block."""
-_IS_WARP, _COS, _SIN, _ACROSS = 22 * BLOCK, 23 * BLOCK, 24 * BLOCK, 25 * BLOCK
-_THREAD = 26 * BLOCK
+_WARP = 17 * BLOCK
+"""Offset of the thirteen rows of the warp; the weft uses the first thirteen rows of the block."""
+_IS_WARP, _COS, _SIN, _ACROSS = 30 * BLOCK, 31 * BLOCK, 32 * BLOCK, 33 * BLOCK
+_THREAD = 34 * BLOCK
 """Offset of the columns of each point's own thread."""
-POINT_ROWS = 26 + POINT_COLUMNS
+POINT_ROWS = 34 + POINT_COLUMNS
 _NO_MODEL = -1.0
 
 _FEW_TYPES = 6
@@ -209,7 +213,9 @@ def _of_model(R, model, tables, across_too, size, block):
             _own(block, ALONG_I + x, warp), _own(block, ACROSS_I + x, warp), block[UP_I + x],
             _own(block, SCALE_I + x, warp), _own(block, ALONG_O + x, warp),
             _own(block, ACROSS_O + x, warp), block[UP_O + x], _own(block, SCALE_O + x, warp),
-            _own(block, SHARED + x, warp),
+            _own(block, SHARED + x, warp), _own(block, SEEN_0 + x, warp),
+            _own(block, SEEN_1 + x, warp), _own(block, SEEN_2 + x, warp),
+            _own(block, SEEN_4 + x, warp),
         )  # fmt: skip
         p = laws.weight(R, tables, c, s, pair)
         surface, volume = _segment_at(

@@ -33,6 +33,7 @@ class SetPair(NamedTuple):
     up : real - N.w
     scale : real - 1/|w without across|, so that cos psi = n_t.w scale at any tangent angle
     shared : real - the law's `shared`
+    seen_0, seen_1, seen_2, seen_4 : real - the law's `visible_shares`
     """
 
     along_i: Any
@@ -44,6 +45,10 @@ class SetPair(NamedTuple):
     up_o: Any
     scale_o: Any
     shared: Any
+    seen_0: Any
+    seen_1: Any
+    seen_2: Any
+    seen_4: Any
 
 
 @njit(**INLINE)
@@ -56,7 +61,9 @@ def along_set(R, tables, thread_set, ix, iy, iz, ox, oy, oz):
     scale_o = R(1) / math.sqrt(a_o * a_o + oz * oz)
     cos_half = cos_half_difference(R, a_i * scale_i, iz * scale_i, a_o * scale_o, oz * scale_o)
     u = laws.shared(R, tables, thread_set, b_o, cos_half)
-    return SetPair(a_i, b_i, iz, scale_i, a_o, b_o, oz, scale_o, u)
+    entry, c, r = laws.view_place(R, tables, ox, oy, oz)
+    v0, v1, v2, v4 = laws.visible_shares(R, tables, thread_set, entry, c, r)
+    return SetPair(a_i, b_i, iz, scale_i, a_o, b_o, oz, scale_o, u, v0, v1, v2, v4)
 
 
 @njit(**INLINE)

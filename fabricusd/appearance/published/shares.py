@@ -51,7 +51,7 @@ def _in_single_precision(fabric: Fabric, tables: SurfaceTables) -> SurfaceTables
         threads=tables.threads.astype(np.float32),
         nodes=tables.nodes.astype(np.float32),
         gap=np.float32(tables.gap),
-        **law_of(fabric).make(fabric, None, np.float32),
+        **law_of(fabric).make(fabric, None, None, np.float32),
     )
 
 

@@ -82,7 +82,7 @@ def surface_tables(
         published=(threads[q.thread, LAW] == PUBLISHED).astype(np.uint8),
         warp_start=q.warp_start,
         gap=precision(coverage(fabric).gap),
-        **law.make(fabric, held, precision),
+        **law.make(fabric, q, held, precision),
     )
     if not law.absolute:
         return made

@@ -247,7 +247,7 @@ class Model:
         threads = pack_threads(fabric, precision)
 
         def shape() -> dict[str, Any]:
-            return dict(self.law.make(fabric, self._light(names, x), precision))
+            return dict(self.law.make(fabric, q, self._light(names, x), precision))
 
         # What a law makes of the shape does not depend on the threads' lobes.
         made = self._shapes.get((_shape(fabric), self.held), shape)

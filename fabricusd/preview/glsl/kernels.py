@@ -30,7 +30,16 @@ LAWS = tuple(laws.REGISTRY)
 FACES = ("exp", "log", "sin", "cos", "atan2", "asin", "acos", "erf", "i0e")
 """Elementary functions of kernels, which are translated as their float32 versions."""
 
-LAW_PARTS = ("shared", "weight", "mask", "total", "openness", "lit_alone")
+LAW_PARTS = (
+    "shared",
+    "view_place",
+    "visible_shares",
+    "weight",
+    "mask",
+    "total",
+    "openness",
+    "lit_alone",
+)
 
 SPLIT = ("i", "j", "end", "pick", "x", "y")
 """What `lookup.split` finds; the page holds it in variables, since GLSL has no doubles."""

@@ -23,6 +23,7 @@ TABLES: dict[str, tuple[int, str]] = {
     "published.node_thread": (1, INT), "published.published": (1, INT),
     "published.wide_2": (1, FLOAT), "published.tall_2": (1, FLOAT),
     "published.means": (1, FLOAT), "published.excess": (1, FLOAT),
+    "published.shares": (1, FLOAT),
     "conserving.threads": (2, FLOAT), "conserving.nodes": (2, FLOAT),
     "conserving.node_thread": (1, INT), "conserving.scatters": (1, INT),
     "conserving.sides": (4, FLOAT), "conserving.gap": (2, FLOAT),
@@ -42,6 +43,7 @@ TABLES: dict[str, tuple[int, str]] = {
 NUMBERS: dict[str, str] = {
     "published.warp_start": INT, "published.gap": FLOAT, "published.precision": FLOAT,
     "published.columns": INT, "published.lit_rows": INT, "published.lit_nodes": INT,
+    "published.share_columns": INT,
     "conserving.warp_start": INT, "conserving.covered": FLOAT,
     "conserving.opaque": INT, "cloth.gap": FLOAT, "cloth.last": FLOAT, "cloth.tiny": FLOAT,
     "shadow.softness": FLOAT, "shadow.mean_columns": INT, "shadow.set_stretches": INT,

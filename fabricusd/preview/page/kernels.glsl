@@ -2,13 +2,14 @@
 #define MASKED 0
 #define UNMASKED 1
 #define PROJECTED 2
+#define VISIBLE 3
 ivec4 split_cell; vec2 split_place; ivec2 split_entry;
 uniform sampler2D floats;
 uniform highp isampler2D ints;
 uniform highp usampler2D bytes;
 uniform sampler2D quads;
-layout(std140) uniform Shapes { ivec4 shapes[70]; };
-layout(std140) uniform Numbers { vec4 numbers[17]; };
+layout(std140) uniform Shapes { ivec4 shapes[72]; };
+layout(std140) uniform Numbers { vec4 numbers[18]; };
 float F(int k) { return texelFetch(floats, ivec2(k & 2047, k >> 11), 0).r; }
 int I(int k) { return texelFetch(ints, ivec2(k & 2047, k >> 11), 0).r; }
 int B(int k) { return int(texelFetch(bytes, ivec2(k & 2047, k >> 11), 0).r); }
@@ -42,103 +43,106 @@ float mean_of_groups(int at, int here, int beside, float c, float level) {
 #define published_means_n0 shapes[12].y
 #define published_excess_at shapes[14].x
 #define published_excess_n0 shapes[14].y
-#define conserving_threads_at shapes[16].x
-#define conserving_threads_n0 shapes[16].y
-#define conserving_threads_n1 shapes[16].z
-#define conserving_nodes_at shapes[18].x
-#define conserving_nodes_n0 shapes[18].y
-#define conserving_nodes_n1 shapes[18].z
-#define conserving_node_thread_at shapes[20].x
-#define conserving_node_thread_n0 shapes[20].y
-#define conserving_scatters_at shapes[22].x
-#define conserving_scatters_n0 shapes[22].y
-#define conserving_sides_at shapes[24].x
-#define conserving_sides_n0 shapes[24].y
-#define conserving_sides_n1 shapes[24].z
-#define conserving_sides_n2 shapes[24].w
-#define conserving_sides_n3 shapes[25].x
-#define conserving_gap_at shapes[26].x
-#define conserving_gap_n0 shapes[26].y
-#define conserving_gap_n1 shapes[26].z
-#define conserving_strength_at shapes[28].x
-#define conserving_strength_n0 shapes[28].y
-#define conserving_strength_n1 shapes[28].z
-#define cloth_grid_at shapes[30].x
-#define cloth_grid_n0 shapes[30].y
-#define cloth_grid_n1 shapes[30].z
-#define cloth_runs_at shapes[32].x
-#define cloth_runs_n0 shapes[32].y
-#define cloth_runs_n1 shapes[32].z
-#define cloth_runs_n2 shapes[32].w
-#define cloth_runs_n3 shapes[33].x
-#define cloth_sequence_at shapes[34].x
-#define cloth_sequence_n0 shapes[34].y
-#define cloth_sequence_n1 shapes[34].z
-#define cloth_width_at shapes[36].x
-#define cloth_width_n0 shapes[36].y
-#define cloth_rim_at shapes[38].x
-#define cloth_rim_n0 shapes[38].y
-#define cloth_pitch_at shapes[40].x
-#define cloth_pitch_n0 shapes[40].y
-#define cloth_curve_start_at shapes[42].x
-#define cloth_curve_start_n0 shapes[42].y
-#define cloth_curve_start_n1 shapes[42].z
-#define cloth_curve_angle_at shapes[44].x
-#define cloth_curve_angle_n0 shapes[44].y
-#define cloth_curve_angle_n1 shapes[44].z
-#define cloth_curve_slope_at shapes[46].x
-#define cloth_curve_slope_n0 shapes[46].y
-#define cloth_curve_slope_n1 shapes[46].z
-#define cloth_pile_at shapes[48].x
-#define cloth_pile_n0 shapes[48].y
-#define shadow_table_at shapes[50].x
-#define shadow_table_n0 shapes[50].y
-#define shadow_table_n1 shapes[50].z
-#define shadow_table_n2 shapes[50].w
-#define shadow_table_n3 shapes[51].x
-#define shadow_table_n4 shapes[51].y
-#define shadow_kinds_at shapes[52].x
-#define shadow_kinds_n0 shapes[52].y
-#define shadow_kinds_n1 shapes[52].z
-#define shadow_mean_at shapes[54].x
-#define shadow_mean_n0 shapes[54].y
-#define shadow_piece_first_at shapes[56].x
-#define shadow_piece_first_n0 shapes[56].y
-#define shadow_piece_first_n1 shapes[56].z
-#define shadow_piece_scale_at shapes[58].x
-#define shadow_piece_scale_n0 shapes[58].y
-#define shadow_piece_scale_n1 shapes[58].z
-#define shadow_absolute_at shapes[60].x
-#define shadow_absolute_n0 shapes[60].y
-#define fuzz_phase_at shapes[62].x
-#define fuzz_phase_n0 shapes[62].y
-#define fuzz_phase_n1 shapes[62].z
-#define fuzz_phase_n2 shapes[62].w
-#define fuzz_lost_at shapes[64].x
-#define fuzz_lost_n0 shapes[64].y
-#define fuzz_up_at shapes[66].x
-#define fuzz_up_n0 shapes[66].y
-#define fuzz_up_n1 shapes[66].z
-#define fuzz_again_at shapes[68].x
-#define fuzz_again_n0 shapes[68].y
-#define fuzz_again_n1 shapes[68].z
+#define published_shares_at shapes[16].x
+#define published_shares_n0 shapes[16].y
+#define conserving_threads_at shapes[18].x
+#define conserving_threads_n0 shapes[18].y
+#define conserving_threads_n1 shapes[18].z
+#define conserving_nodes_at shapes[20].x
+#define conserving_nodes_n0 shapes[20].y
+#define conserving_nodes_n1 shapes[20].z
+#define conserving_node_thread_at shapes[22].x
+#define conserving_node_thread_n0 shapes[22].y
+#define conserving_scatters_at shapes[24].x
+#define conserving_scatters_n0 shapes[24].y
+#define conserving_sides_at shapes[26].x
+#define conserving_sides_n0 shapes[26].y
+#define conserving_sides_n1 shapes[26].z
+#define conserving_sides_n2 shapes[26].w
+#define conserving_sides_n3 shapes[27].x
+#define conserving_gap_at shapes[28].x
+#define conserving_gap_n0 shapes[28].y
+#define conserving_gap_n1 shapes[28].z
+#define conserving_strength_at shapes[30].x
+#define conserving_strength_n0 shapes[30].y
+#define conserving_strength_n1 shapes[30].z
+#define cloth_grid_at shapes[32].x
+#define cloth_grid_n0 shapes[32].y
+#define cloth_grid_n1 shapes[32].z
+#define cloth_runs_at shapes[34].x
+#define cloth_runs_n0 shapes[34].y
+#define cloth_runs_n1 shapes[34].z
+#define cloth_runs_n2 shapes[34].w
+#define cloth_runs_n3 shapes[35].x
+#define cloth_sequence_at shapes[36].x
+#define cloth_sequence_n0 shapes[36].y
+#define cloth_sequence_n1 shapes[36].z
+#define cloth_width_at shapes[38].x
+#define cloth_width_n0 shapes[38].y
+#define cloth_rim_at shapes[40].x
+#define cloth_rim_n0 shapes[40].y
+#define cloth_pitch_at shapes[42].x
+#define cloth_pitch_n0 shapes[42].y
+#define cloth_curve_start_at shapes[44].x
+#define cloth_curve_start_n0 shapes[44].y
+#define cloth_curve_start_n1 shapes[44].z
+#define cloth_curve_angle_at shapes[46].x
+#define cloth_curve_angle_n0 shapes[46].y
+#define cloth_curve_angle_n1 shapes[46].z
+#define cloth_curve_slope_at shapes[48].x
+#define cloth_curve_slope_n0 shapes[48].y
+#define cloth_curve_slope_n1 shapes[48].z
+#define cloth_pile_at shapes[50].x
+#define cloth_pile_n0 shapes[50].y
+#define shadow_table_at shapes[52].x
+#define shadow_table_n0 shapes[52].y
+#define shadow_table_n1 shapes[52].z
+#define shadow_table_n2 shapes[52].w
+#define shadow_table_n3 shapes[53].x
+#define shadow_table_n4 shapes[53].y
+#define shadow_kinds_at shapes[54].x
+#define shadow_kinds_n0 shapes[54].y
+#define shadow_kinds_n1 shapes[54].z
+#define shadow_mean_at shapes[56].x
+#define shadow_mean_n0 shapes[56].y
+#define shadow_piece_first_at shapes[58].x
+#define shadow_piece_first_n0 shapes[58].y
+#define shadow_piece_first_n1 shapes[58].z
+#define shadow_piece_scale_at shapes[60].x
+#define shadow_piece_scale_n0 shapes[60].y
+#define shadow_piece_scale_n1 shapes[60].z
+#define shadow_absolute_at shapes[62].x
+#define shadow_absolute_n0 shapes[62].y
+#define fuzz_phase_at shapes[64].x
+#define fuzz_phase_n0 shapes[64].y
+#define fuzz_phase_n1 shapes[64].z
+#define fuzz_phase_n2 shapes[64].w
+#define fuzz_lost_at shapes[66].x
+#define fuzz_lost_n0 shapes[66].y
+#define fuzz_up_at shapes[68].x
+#define fuzz_up_n0 shapes[68].y
+#define fuzz_up_n1 shapes[68].z
+#define fuzz_again_at shapes[70].x
+#define fuzz_again_n0 shapes[70].y
+#define fuzz_again_n1 shapes[70].z
 #define published_warp_start int(numbers[0].x)
 #define published_gap numbers[1].x
 #define published_precision numbers[2].x
 #define published_columns int(numbers[3].x)
 #define published_lit_rows int(numbers[4].x)
 #define published_lit_nodes int(numbers[5].x)
-#define conserving_warp_start int(numbers[6].x)
-#define conserving_covered numbers[7].x
-#define conserving_opaque int(numbers[8].x)
-#define cloth_gap numbers[9].x
-#define cloth_last numbers[10].x
-#define cloth_tiny numbers[11].x
-#define shadow_softness numbers[12].x
-#define shadow_mean_columns int(numbers[13].x)
-#define shadow_set_stretches int(numbers[14].x)
-#define shadow_groups int(numbers[15].x)
-#define fuzz_depth numbers[16].x
+#define published_share_columns int(numbers[6].x)
+#define conserving_warp_start int(numbers[7].x)
+#define conserving_covered numbers[8].x
+#define conserving_opaque int(numbers[9].x)
+#define cloth_gap numbers[10].x
+#define cloth_last numbers[11].x
+#define cloth_tiny numbers[12].x
+#define shadow_softness numbers[13].x
+#define shadow_mean_columns int(numbers[14].x)
+#define shadow_set_stretches int(numbers[15].x)
+#define shadow_groups int(numbers[16].x)
+#define fuzz_depth numbers[17].x
 
 struct Place { int thread_set_; int thread_; float psi0_; float w_; float shade_; };
 
@@ -240,10 +244,109 @@ float k_law_shared(int a2, float a3, float a4) {
   return k_nothing_shared(a2, a3, a4);
 #elif LAW == PROJECTED
   return k_shared_1(a2, a3, a4);
+#elif LAW == VISIBLE
+  return k_shared_1(a2, a3, a4);
 #endif
 }
 
-struct SetPair { float along_i_; float across_i_; float up_i_; float scale_i_; float along_o_; float across_o_; float up_o_; float scale_o_; float shared_; };
+struct T_iff { int m0_; float m1_; float m2_; };
+
+T_iff k_no_place(float ox, float oy, float oz) {
+  return T_iff(0, 0.0, 0.0);
+}
+
+float k_diamond(float x, float y) {
+  float part;
+  part = (x / max((abs(x) + abs(y)), 1e-30));
+  return mix((3.0 + part), (1.0 - part), (y >= 0.0));
+}
+
+struct T_if { int m0_; float m1_; };
+
+T_if k_column_of(int columns, float x, float y) {
+  float turn;
+  int column;
+  turn = ((k_diamond(x, y) * 0.25) * float(columns));
+  column = max(min(int(turn), (columns - 1)), 0);
+  return T_if(column, (turn - float(column)));
+}
+
+T_if k_row_of(int rows, float z) {
+  float across;
+  int row;
+  across = (sqrt(max(z, 0.0)) * float((rows - 1)));
+  row = max(min(int(across), (rows - 2)), 0);
+  return T_if(row, min((across - float(row)), 1.0));
+}
+
+T_iff k_view_place(float ox, float oy, float oz) {
+  T_if t1;
+  int column;
+  float c;
+  T_if t2;
+  int row;
+  float r;
+  t1 = k_column_of(published_share_columns, ox, oy);
+  column = t1.m0_;
+  c = t1.m1_;
+  t2 = k_row_of(33, oz);
+  row = t2.m0_;
+  r = t2.m1_;
+  return T_iff((((column * 33) + row) * 8), c, r);
+}
+
+T_iff k_law_view_place(float a2, float a3, float a4) {
+#if LAW == MASKED
+  return k_no_place(a2, a3, a4);
+#elif LAW == UNMASKED
+  return k_no_place(a2, a3, a4);
+#elif LAW == PROJECTED
+  return k_no_place(a2, a3, a4);
+#elif LAW == VISIBLE
+  return k_view_place(a2, a3, a4);
+#endif
+}
+
+struct T_ffff { float m0_; float m1_; float m2_; float m3_; };
+
+T_ffff k_all_visible(int thread_set, int entry, float c, float r) {
+  return T_ffff(1.0, 0.0, 0.0, 0.0);
+}
+
+float k_between(int here, int beside, float c, float r) {
+  float low;
+  float high;
+  low = F(published_shares_at + (here + 0));
+  low = (low + ((F(published_shares_at + (beside + 0)) - low) * c));
+  high = F(published_shares_at + (here + 8));
+  high = (high + ((F(published_shares_at + (beside + 8)) - high) * c));
+  return (low + ((high - low) * r));
+}
+
+T_ffff k_visible_shares(int thread_set, int entry, float c, float r) {
+  int here;
+  int beside;
+  if ((published_share_columns == 0)) {
+    return T_ffff(1.0, 0.0, 0.0, 0.0);
+  }
+  here = (entry + (thread_set * 4));
+  beside = (here + 264);
+  return T_ffff(k_between(here, beside, c, r), k_between((here + 1), (beside + 1), c, r), k_between((here + 2), (beside + 2), c, r), k_between((here + 3), (beside + 3), c, r));
+}
+
+T_ffff k_law_visible_shares(int a2, int a3, float a4, float a5) {
+#if LAW == MASKED
+  return k_all_visible(a2, a3, a4, a5);
+#elif LAW == UNMASKED
+  return k_all_visible(a2, a3, a4, a5);
+#elif LAW == PROJECTED
+  return k_all_visible(a2, a3, a4, a5);
+#elif LAW == VISIBLE
+  return k_visible_shares(a2, a3, a4, a5);
+#endif
+}
+
+struct SetPair { float along_i_; float across_i_; float up_i_; float scale_i_; float along_o_; float across_o_; float up_o_; float scale_o_; float shared_; float seen_0_; float seen_1_; float seen_2_; float seen_4_; };
 
 SetPair k_along_set(int thread_set, float ix, float iy, float iz, float ox, float oy, float oz) {
   bool warp;
@@ -255,6 +358,15 @@ SetPair k_along_set(int thread_set, float ix, float iy, float iz, float ox, floa
   float scale_o;
   float cos_half;
   float u;
+  T_iff t1;
+  int entry;
+  float c;
+  float r;
+  T_ffff t2;
+  float v0;
+  float v1;
+  float v2;
+  float v4;
   warp = (thread_set == 1);
   a_i = mix(ix, iy, warp);
   b_i = mix(iy, (-ix), warp);
@@ -264,7 +376,16 @@ SetPair k_along_set(int thread_set, float ix, float iy, float iz, float ox, floa
   scale_o = (1.0 / sqrt(((a_o * a_o) + (oz * oz))));
   cos_half = k_cos_half_difference((a_i * scale_i), (iz * scale_i), (a_o * scale_o), (oz * scale_o));
   u = k_law_shared(thread_set, b_o, cos_half);
-  return SetPair(a_i, b_i, iz, scale_i, a_o, b_o, oz, scale_o, u);
+  t1 = k_law_view_place(ox, oy, oz);
+  entry = t1.m0_;
+  c = t1.m1_;
+  r = t1.m2_;
+  t2 = k_law_visible_shares(thread_set, entry, c, r);
+  v0 = t2.m0_;
+  v1 = t2.m1_;
+  v2 = t2.m2_;
+  v4 = t2.m3_;
+  return SetPair(a_i, b_i, iz, scale_i, a_o, b_o, oz, scale_o, u, v0, v1, v2, v4);
 }
 
 float k_masked(float x, float y, float u) {
@@ -291,6 +412,14 @@ float k_weight_2(float c, float s, SetPair pair) {
   return ((0.5 * seen) / max(c, 0.08715574274765814));
 }
 
+float k_weight_3(float c, float s, SetPair pair) {
+  float square;
+  float share;
+  square = (s * s);
+  share = ((pair.seen_0_ + (s * pair.seen_1_)) + (square * (pair.seen_2_ + (square * pair.seen_4_))));
+  return (k_weight_2(c, s, pair) * max(share, 0.01));
+}
+
 float k_law_weight(float a2, float a3, SetPair a4) {
 #if LAW == MASKED
   return k_weight(a2, a3, a4);
@@ -298,6 +427,8 @@ float k_law_weight(float a2, float a3, SetPair a4) {
   return k_weight_1(a2, a3, a4);
 #elif LAW == PROJECTED
   return k_weight_2(a2, a3, a4);
+#elif LAW == VISIBLE
+  return k_weight_3(a2, a3, a4);
 #endif
 }
 
@@ -329,6 +460,8 @@ float k_law_mask(float a2, float a3, float a4) {
 #elif LAW == UNMASKED
   return k_no_mask(a2, a3, a4);
 #elif LAW == PROJECTED
+  return k_no_mask(a2, a3, a4);
+#elif LAW == VISIBLE
   return k_no_mask(a2, a3, a4);
 #endif
 }
@@ -555,30 +688,6 @@ float k_lit_alone(int node, float x, float y, float z) {
   return 1.0;
 }
 
-float k_diamond(float x, float y) {
-  float part;
-  part = (x / max((abs(x) + abs(y)), 1e-30));
-  return mix((3.0 + part), (1.0 - part), (y >= 0.0));
-}
-
-struct T_if { int m0_; float m1_; };
-
-T_if k_column_of(int columns, float x, float y) {
-  float turn;
-  int column;
-  turn = ((k_diamond(x, y) * 0.25) * float(columns));
-  column = max(min(int(turn), (columns - 1)), 0);
-  return T_if(column, (turn - float(column)));
-}
-
-T_if k_row_of(int rows, float z) {
-  float across;
-  int row;
-  across = (sqrt(max(z, 0.0)) * float((rows - 1)));
-  row = max(min(int(across), (rows - 2)), 0);
-  return T_if(row, min((across - float(row)), 1.0));
-}
-
 float k_mean_at(int here, int beside, int step_, float c, float r) {
   float low;
   float high;
@@ -618,6 +727,8 @@ float k_law_lit_alone(int a2, float a3, float a4, float a5) {
 #elif LAW == UNMASKED
   return k_lit_alone_1(a2, a3, a4, a5);
 #elif LAW == PROJECTED
+  return k_lit_alone_1(a2, a3, a4, a5);
+#elif LAW == VISIBLE
   return k_lit_alone_1(a2, a3, a4, a5);
 #endif
 }
@@ -681,6 +792,8 @@ float k_law_total(float a2, float a3, float a4, float a5) {
 #elif LAW == UNMASKED
   return k_total_1(a2, a3, a4, a5);
 #elif LAW == PROJECTED
+  return k_total_2(a2, a3, a4, a5);
+#elif LAW == VISIBLE
   return k_total_2(a2, a3, a4, a5);
 #endif
 }
@@ -1626,7 +1739,7 @@ T_if k_rows_of_texels(bool on_top, float along, float over, float width, int cou
   return T_if((k + ((behind && !(on_top)) ? half_ : 0)), (x - float(k)));
 }
 
-float k_between(int i, int j, int slot, int row, int first, int second, float c) {
+float k_between_1(int i, int j, int slot, int row, int first, int second, float c) {
   float low;
   low = float(B(shadow_table_at + ((((i) * shadow_table_n1 + j) * shadow_table_n2 + slot) * shadow_table_n3 + row) * shadow_table_n4 + first));
   return (low + ((float(B(shadow_table_at + ((((i) * shadow_table_n1 + j) * shadow_table_n2 + slot) * shadow_table_n3 + row) * shadow_table_n4 + second)) - low) * c));
@@ -1679,8 +1792,8 @@ float k_horizon_at(float u, float v, int which, float x, float y) {
   first = min(int(turn), (azimuths - 1));
   c = (turn - float(first));
   second = (((first + 1) < azimuths) ? (first + 1) : 0);
-  near_ = k_between(in_u, in_v, slot, row, first, second, c);
-  far_ = k_between(in_u, in_v, slot, (row + 1), first, second, c);
+  near_ = k_between_1(in_u, in_v, slot, row, first, second, c);
+  far_ = k_between_1(in_u, in_v, slot, (row + 1), first, second, c);
   return ((near_ + ((far_ - near_) * a)) * 0.00392156862745098);
 }
 

@@ -1,0 +1,153 @@
+"""Surface law `visible`: `projected`, less what neighbouring threads hide from the viewer.
+
+The weight of `projected` is multiplied by the share of the places with a tangent angle that the
+viewer sees. Places are hidden from a viewer as they are from a light, so the share is the mean of
+`g` for light from wo over those places. For each set it is kept, by view, as
+
+    v = v0 + v1 s + v2 s^2 + v4 s^4,   s the sine of the tangent angle,
+
+which is smooth along a thread, so that means over the curve stay exact. On explicit threads more
+terms gain nothing (`python bench/model/hidden_from_view.py`). Places that are both lit and seen are
+taken to be independent: a dependence that grows as light and viewer come together changes nothing
+there. Without a shadow the law is `projected`. Source: ours, docs/decisions/017.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fabricusd.appearance.frame import WARP, WEFT
+from fabricusd.appearance.laws import projected
+from fabricusd.appearance.laws.excess import EXCESS_FIELDS
+from fabricusd.appearance.laws.law import Law, no_mask, tables_class, yes
+from fabricusd.appearance.laws.lit import (
+    AZIMUTHS,
+    LIGHT_FIELDS,
+    ROWS,
+    column_of,
+    light_nodes,
+    lit_alone,
+    lit_node,
+    node_room,
+    row_of,
+)
+from fabricusd.appearance.weave.quadrature import CurveNodes
+from fabricusd.fabric import Fabric
+from fabricusd.kernels.real import INLINE, index
+
+Floats = NDArray[np.float64]
+
+COLUMNS, HEIGHTS = 64, 33
+"""Azimuths and elevations of the table of shares: what is seen changes more slowly than what is
+lit, since it only weighs."""
+
+TERMS = 4
+"""Coefficients of a share: those of 1, s, s^2 and s^4."""
+
+LEAST = 0.01
+"""Least share that thread counts with, for views from which the polynomial is below."""
+
+SEEN_FIELDS = ("shares", "share_columns")
+"""shares : (COLUMNS + 1, HEIGHTS, 2 sets, TERMS) real, flat; one entry without a shadow
+share_columns : int - COLUMNS, or 0 without a shadow"""
+
+Visible = tables_class(
+    __name__, "Visible", "wide_2", "tall_2", *LIGHT_FIELDS, *EXCESS_FIELDS, *SEEN_FIELDS
+)
+
+
+def _make(fabric: Fabric, nodes: CurveNodes, means: Any, precision: Any) -> dict[str, Any]:
+    shares = np.ones(1) if means is None else _shares(nodes, means).reshape(-1)
+    return {
+        **projected.LAW.make(fabric, nodes, means, precision),
+        "shares": np.ascontiguousarray(shares, dtype=precision),
+        "share_columns": 0 if means is None else COLUMNS,
+    }
+
+
+def _shares(nodes: CurveNodes, means: Floats) -> Floats:
+    """(COLUMNS + 1, HEIGHTS, 2, TERMS) `shares` from the means of g at the nodes, nearest by area.
+
+    means : (AZIMUTHS + 1, ROWS, nodes)
+    """
+    few = np.clip(means[:: AZIMUTHS // COLUMNS, :: (ROWS - 1) // (HEIGHTS - 1)], 0.0, 1.0)
+    found = np.zeros((*few.shape[:2], 2, TERMS))
+    for which, mine in (
+        (WEFT, slice(0, nodes.warp_start)), (WARP, slice(nodes.warp_start, None))
+    ):  # fmt: skip
+        s, area = np.sin(nodes.psi0[mine]), np.sqrt(nodes.weight[mine])
+        if not len(s):
+            continue
+        terms = np.stack((np.ones_like(s), s, s**2, s**4), axis=1) * area[:, None]
+        # Curves of few angles leave some terms open: those are the smallest that fit.
+        found[:, :, which] = few[..., mine] @ (np.linalg.pinv(terms, rcond=1e-6) * area).T
+    return found
+
+
+@njit(**INLINE)
+def _view_place(R, tables, ox, oy, oz):
+    """(entry of the table, weights of the next column and row) for a view."""
+    column, c = column_of(R, tables.share_columns, ox, oy)
+    row, r = row_of(R, HEIGHTS, oz)
+    return (column * np.int32(HEIGHTS) + row) * np.int32(2 * TERMS), c, r
+
+
+@njit(**INLINE)
+def _visible_shares(R, tables, thread_set, entry, c, r):
+    """(v0, v1, v2, v4) of a set for a view."""
+    if tables.share_columns == 0:
+        return R(1), R(0), R(0), R(0)
+    here = np.int32(entry) + np.int32(thread_set * TERMS)
+    beside = here + np.int32(2 * TERMS * HEIGHTS)
+    return (
+        _between(R, tables.shares, here, beside, c, r),
+        _between(R, tables.shares, here + 1, beside + 1, c, r),
+        _between(R, tables.shares, here + 2, beside + 2, c, r),
+        _between(R, tables.shares, here + 3, beside + 3, c, r),
+    )
+
+
+@njit(**INLINE)
+def _between(R, shares, here, beside, c, r):
+    """A coefficient between the entry `here`, that in the next column, and those of the next
+    row."""
+    step = 2 * TERMS
+    low = shares[index(here, 0)]
+    low += (shares[index(beside, 0)] - low) * c
+    high = shares[index(here, step)]
+    high += (shares[index(beside, step)] - high) * c
+    return low + (high - low) * r
+
+
+@njit(**INLINE)
+def _weight(R, tables, c, s, pair):
+    square = s * s
+    share = pair.seen_0 + s * pair.seen_1 + square * (pair.seen_2 + square * pair.seen_4)
+    return projected.weight(R, tables, c, s, pair) * max(share, R(LEAST))
+
+
+LAW = Law(
+    summary="as `projected`, less what neighbours hide from the viewer, nearest to traced threads",
+    tables=Visible,
+    make=_make,
+    absolute=True,
+    shared=projected.LAW.shared,
+    hides=yes,
+    view_place=_view_place,
+    visible_shares=_visible_shares,
+    weight=_weight,
+    mask=no_mask,
+    total=projected.LAW.total,
+    openness=projected.LAW.openness,
+    node_room=node_room,
+    light_nodes=light_nodes,
+    lit_node=lit_node,
+    lit_alone=lit_alone,
+    plain_weight=projected.LAW.plain_weight,
+    plain_mask=projected.LAW.plain_mask,
+    plain_total=projected.LAW.plain_total,
+)
