@@ -1,4 +1,4 @@
-"""What level `far` would gain if a view took no light from places that neighbours hide from it.
+"""What level `far` gains if a view takes no light from places that neighbours hide from it.
 
     python bench/model/hidden_from_view.py [--presets NAME ...]
 
@@ -12,7 +12,8 @@ difference over the mean), delta E, error under grazing light, and reflected of 
 that of the tubes at 60, 75 and 80 degrees, brightest channel, mean over azimuths; no view of the
 cloth is brighter than white. A star is the law that the preset wears.
 `correlated` has places that are lit and seen together, min(g(wi), g(wo)), where the azimuths of
-light and view are less than some 25 degrees apart. No law of the package does this yet.
+light and view are less than some 25 degrees apart. The law `visible` is `seen` with the means of a
+set as a polynomial; its own row is the last.
 """
 
 from __future__ import annotations
@@ -93,6 +94,7 @@ def main() -> None:
         if load(name).surface_law == "unmasked":
             _rows(name, "unmasked", FORMS[:1])
         _rows(name, "projected", FORMS)
+        _rows(name, "visible", FORMS[:1])
 
 
 def _rows(name: str, law: str, forms: tuple[str, ...]) -> None:

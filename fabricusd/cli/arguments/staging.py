@@ -64,7 +64,7 @@ def add_staging(parser: argparse.ArgumentParser) -> None:
 
     group.add_argument(
         "--surface-law",
-        choices=["masked", "unmasked", "projected", "facets"],
+        choices=["masked", "unmasked", "projected", "visible", "facets"],
         help="how light on threads becomes light on cloth, in all fabrics; their albedos are kept "
         "(default: each fabric's own law)",
     )

@@ -11,6 +11,7 @@ import numpy as np
 from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.laws.excess import COLUMNS as AROUND
 from fabricusd.appearance.laws.excess import ROWS
+from fabricusd.appearance.laws.visible import HEIGHTS, TERMS
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.weave.coverage import coverage
@@ -22,11 +23,12 @@ from fabricusd.materials.targets import Job
 
 SOURCE = Path(__file__).resolve().parent / "blender" / "fabric_thread.osl"
 
-LAWS = ("masked", "unmasked", "projected")
+LAWS = ("masked", "unmasked", "projected", "visible")
 """Surface laws of the shader, by its parameter `law`."""
 
 AZIMUTHS, ELEVATIONS = 16, 17
-"""Azimuths and elevations of the shader's mean shadows: a part of those of `laws.lit`."""
+"""Azimuths and elevations of the shader's mean shadows, and of what is seen: a part of those of
+`laws.lit` and `laws.visible`."""
 
 
 def check(where: None, clobber: bool) -> None:
@@ -101,6 +103,10 @@ def _unmasked(law: Any, nodes: int) -> list[str]:
         whole = law.means.reshape(law.columns + 1, law.lit_rows, nodes)
         means = whole[:: law.columns // AZIMUTHS, :: (law.lit_rows - 1) // (ELEVATIONS - 1)]
         columns = AZIMUTHS
+    shares = np.zeros(1)
+    if getattr(law, "share_columns", 0):
+        table = law.shares.reshape(law.share_columns + 1, HEIGHTS, 2 * TERMS)
+        shares = table[:: law.share_columns // AZIMUTHS, :: (HEIGHTS - 1) // (ELEVATIONS - 1)]
     shape = {name: getattr(law, name, np.zeros(2)) for name in ("wide_2", "tall_2")}
     excess = np.asarray(getattr(law, "excess", np.ones(1)))
     return [
@@ -108,6 +114,7 @@ def _unmasked(law: Any, nodes: int) -> list[str]:
         f"    int elevations = {ELEVATIONS},\n",
         *(_array("float", name, values) for name, values in shape.items()),
         _array("float", "means", means.ravel(), digits=4),
+        _array("float", "shares", shares.ravel(), digits=5),
         f"    int excess_rows = {ROWS},\n",
         f"    int excess_columns = {AROUND},\n",
         _array("float", "excess", excess if excess.size > 1 else np.ones(ROWS * (AROUND + 1))),

@@ -11,6 +11,8 @@ import numpy as np
 from fabricusd import __version__
 from fabricusd.appearance.laws import law_of
 from fabricusd.appearance.laws.excess import COLUMNS, ROWS
+from fabricusd.appearance.laws.visible import COLUMNS as SHARE_COLUMNS
+from fabricusd.appearance.laws.visible import HEIGHTS
 from fabricusd.appearance.published.columns import NODE_COS, NODE_SIN, NODE_WEIGHT
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.scattering.columns import (
@@ -30,7 +32,7 @@ from fabricusd.materials.targets import Job
 
 PLUGIN = Path(__file__).resolve().parent / "fabricusd_cloth.py"
 
-LAWS = ("masked", "unmasked", "projected")
+LAWS = ("masked", "unmasked", "projected", "visible")
 """Surface laws that the plugin has."""
 
 VERSION = 3
@@ -96,13 +98,15 @@ def fabric_content(fabric: Fabric) -> dict[str, Any]:
     for name in ("precision", "columns"):
         if hasattr(tables, name):
             own[name] = float(getattr(tables, name))
-    for name in ("means", "excess", "wide_2", "tall_2"):
+    for name in ("means", "excess", "wide_2", "tall_2", "shares"):
         if hasattr(tables, name):
             own[name] = _numbers(getattr(tables, name))
     if "means" in own:
         own["elevations"] = tables.lit_rows
     if "excess" in own:
         own["excess_shape"] = [ROWS, COLUMNS]
+    if "shares" in own:
+        own["share_shape"] = [HEIGHTS, SHARE_COLUMNS]
     return {
         "fabricusd_cloth": VERSION,
         "made_by": f"fabricusd {__version__}",

@@ -29,6 +29,14 @@ LEAST_COSINE = 0.08715574274765817
 
 COS2_D_MINIMUM, COS_SUM_MINIMUM, NOTHING = 1e-6, 1e-3, 1e-12
 LEAST_WIDTH_2 = 1e-12
+LEAST_SEEN = 0.01
+"""Least share of its places that thread counts with under `visible`."""
+
+PROJECTED = ("projected", "visible")
+"""Laws that weigh threads by the area that is seen."""
+
+
+TABLES = ("means", "excess", "shares")
 
 
 class Cloth:
@@ -39,7 +47,7 @@ class Cloth:
             raise ValueError(f"is no fabric of version {VERSION}; write it with --mitsuba")
         self.said = said
         self.law, self.nodes, self.threads = said["law"], said["nodes"], said["threads"]
-        self.tables = {name: mi.Float(said[name]) for name in ("means", "excess") if name in said}
+        self.tables = {name: mi.Float(said[name]) for name in TABLES if name in said}
         self.columns = int(said.get("columns", 0))
 
     def value(self, wi: Any, wo: Any) -> Any:
@@ -48,11 +56,16 @@ class Cloth:
         for warp in (False, True):
             i, o = (self._along(warp, w) for w in (wi, wo))
             shared = self._shared(warp, i, o)
+            share = self._share(warp, wo)
             for k, node in enumerate(self.nodes):
                 if node["warp"] != warp:
                     continue
                 c, s, thread = node["cosine"], node["sine"], self.threads[node["thread"]]
                 p = node["weight"] * self._weight(c, s, i, o, shared)
+                if share:
+                    first, second, third, fourth = share
+                    part = first + s * (second + s * (third + s * s * fourth))
+                    p = p * dr.maximum(part, LEAST_SEEN)
                 seen += p
                 surface, volume = self._segment(thread, c, s, i, o)
                 p *= self._lit(k, wi)
@@ -68,7 +81,7 @@ class Cloth:
         return self._gap(wo)
 
     def _gap(self, wo: Any) -> Any:
-        if self.law != "projected":
+        if self.law not in PROJECTED:
             return mi.Float(self.said["gap"])
         wide, tall, up_2 = self.said["wide_2"], self.said["tall_2"], dr.maximum(wo.z**2, 1e-12)
         weft = wide[0] + tall[0] * wo.y**2 / up_2
@@ -90,7 +103,7 @@ class Cloth:
 
     def _shared(self, warp: bool, i: Any, o: Any) -> Any:
         """Return what the law's weights need and all threads of a set have in common."""
-        if self.law == "projected":
+        if self.law in PROJECTED:
             wide, tall = self.said["wide_2"][int(warp)], self.said["tall_2"][int(warp)]
             return tall / max(wide, LEAST_WIDTH_2) * o[1] ** 2
         return self._overlap(i[0] * i[3] + o[0] * o[3], i[2] * i[3] + o[2] * o[3])
@@ -100,7 +113,7 @@ class Cloth:
         if self.law == "unmasked":
             return mi.Float(1)
         facing = s * o[0] + c * o[2]
-        if self.law == "projected":
+        if self.law in PROJECTED:
             seen = dr.maximum(facing + dr.sqrt(facing**2 + shared), 0)
             return 0.5 * seen / max(c, LEAST_COSINE)
         lit, seen = dr.maximum(s * i[0] + c * i[2], 0), dr.maximum(facing, 0)
@@ -148,6 +161,25 @@ class Cloth:
             return dr.lerp(low, high, turn - mi.Float(column))
 
         return dr.lerp(at(here), at(here + nodes), across - mi.Float(row))
+
+    def _share(self, warp: bool, wo: Any) -> list[Any]:
+        """Return coefficients of 1, s, s^2 and s^4 of what is seen of a set's places, under
+        `visible`."""
+        if self.law != "visible" or dr.width(self.tables["shares"]) == 1:
+            return []
+        rows, columns = self.said["share_shape"]
+        turn = _diamond(wo.x, wo.y) * (0.25 * columns)
+        across = dr.sqrt(dr.clip(wo.z, 0, 1)) * (rows - 1)
+        column = dr.clip(mi.Int32(turn), 0, columns - 1)
+        row = dr.clip(mi.Int32(across), 0, rows - 2)
+        here = mi.UInt32(column * rows + row) * 8 + 4 * int(warp)
+
+        def at(index: Any) -> Any:
+            low = dr.gather(mi.Float, self.tables["shares"], index)
+            high = dr.gather(mi.Float, self.tables["shares"], index + 8 * rows)
+            return dr.lerp(low, high, turn - mi.Float(column))
+
+        return [dr.lerp(at(here + k), at(here + k + 8), across - mi.Float(row)) for k in range(4)]
 
     def _total(self, seen: Any, wo: Any) -> Any:
         if self.law == "masked":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ from fabricusd.materials.fit.judge import hemisphere
 from fabricusd.materials.targets.mitsuba.export import fabric_content
 from fabricusd.schema import load
 
-PRESETS = ("linen_plain", "silk_shot", "polyester_satin_charmeuse", "velvet")
-"""The laws `projected`, twice, `unmasked` and `masked`."""
+PRESETS = (
+    ("linen_plain", "projected"), ("silk_shot", "projected"),
+    ("polyester_satin_charmeuse", "unmasked"), ("velvet", "masked"), ("silk_shot", "visible"),
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +42,8 @@ def mi():
 @pytest.fixture(scope="module", params=PRESETS)
 def cloth(request, mi, tmp_path_factory):
     """A fabric, and its file."""
-    fabric = load(request.param)
+    name, law = request.param
+    fabric = replace(load(name), surface_law=law)
     path = tmp_path_factory.mktemp("mitsuba") / "cloth.json"
     path.write_text(json.dumps(fabric_content(fabric)))
     return fabric, path
