@@ -40,6 +40,7 @@ def entries_of(jobs):
     return {(kind, name): array.tobytes() for kind, name, array in found}
 
 
+@pytest.mark.exhaustive
 def test_the_fits_of_the_cluster_are_those_of_this_process(cluster, jobs, elsewhere, monkeypatch):
     said: list[str] = []
     fit_ahead(jobs, cluster, said.append)

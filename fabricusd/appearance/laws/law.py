@@ -63,8 +63,10 @@ class Law:
     mask : (R, tables, cos_phi_i, cos_phi_o, cos_half) -> the factor of `f_s`, from azimuths
     total : (R, tables, seen, ox, oy, oz) -> the divisor; seen : sum of a weight
     openness : (R, tables, ox, oy, oz) -> the share of a view that passes between the threads
-    light_cell : (R, tables, x, y, z) -> (base, a, b), what `lit` needs of a direction to the light
-    lit : (R, tables, node, base, a, b) -> mean of g at a node
+    node_room : (R, tables, size) -> entries that `light_nodes` fills for `size` lights
+    light_nodes : (R, tables, x, y, z, lit, first) fills `lit` from `first` on, for one light
+    lit_node : (R, tables, lit, first, node) -> mean of g at a node, from what that filled in
+    lit_alone : (R, tables, node, x, y, z) -> mean of g at one node
     plain_weight, plain_mask, plain_total : the same in plain NumPy, sharing no code with the
         kernels: (fabric, is_warp, psi0, angles of wi, angles of wo), (fabric, angles, angles)
         and (fabric, seen, gap, wo)
@@ -72,7 +74,7 @@ class Law:
 
     summary: str
     tables: type
-    make: Callable[[Fabric, Any, Any], dict[str, Any]]
+    make: Callable[[Fabric, Any, Any, Any], dict[str, Any]]
     absolute: bool
     shared: Kernel
     hides: Kernel
