@@ -1,6 +1,6 @@
 """Speed of level `far` with and without the mean shadow, in one run.
 
-    python bench/model/bench_far.py [--presets NAME ...] [--pairs N] [--repeats N]
+    python bench/model/bench_far.py [--presets NAME ...] [--law LAW ...] [--pairs N] [--repeats N]
 
 Pairs of directions above the cloth, in float32, on one worker: millions a second, the medians of
 alternating runs, and the share that is left with the shadow.
@@ -9,13 +9,16 @@ alternating runs, and the share that is left with the shadow.
 from __future__ import annotations
 
 import argparse
+import itertools
 import statistics
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fabricusd.appearance import laws
 from fabricusd.appearance.published.far import far_values
 from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.shadow.methods import compile_shadow
@@ -38,13 +41,17 @@ def main() -> None:
     parser.add_argument("--presets", nargs="+", default=PRESETS)
     parser.add_argument("--pairs", type=int, default=1 << 15)
     parser.add_argument("--repeats", type=int, default=9)
+    parser.add_argument(
+        "--law", nargs="+", choices=tuple(laws.REGISTRY), help="in place of each preset's own"
+    )
     options = parser.parse_args()
     rng = np.random.default_rng(0)
     wi, wo = directions(options.pairs, rng), directions(options.pairs, rng)
     out = np.zeros((3, options.pairs), REAL)
-    print("| preset | nodes | without shadow | with it | ratio |\n|---|---|---|---|---|")
-    for name in options.presets:
+    print("| preset | law | nodes | without shadow | with it | ratio |\n|---|---|---|---|---|---|")
+    for name, law in itertools.product(options.presets, options.law or [""]):
         fabric = load(name)
+        fabric = replace(fabric, surface_law=law or fabric.surface_law)
         shadow = compile_shadow(fabric, "horizon", precision=np.float64)
         tables: list[Any] = [
             surface_tables(fabric, precision=REAL, shadow=s) for s in (None, shadow)
@@ -58,7 +65,8 @@ def main() -> None:
         # The first of each compiles.
         open_, held = (options.pairs / statistics.median(t[1:]) / 1e6 for t in times)
         nodes = len(tables[0].nodes)
-        print(f"| {name} | {nodes} | {open_:.1f} | {held:.1f} | {held / open_:.2f} |")
+        first = f"| {name} | {fabric.surface_law} | {nodes}"
+        print(f"{first} | {open_:.1f} | {held:.1f} | {held / open_:.2f} |")
 
 
 if __name__ == "__main__":

@@ -238,7 +238,7 @@ def main() -> None:
     few, m = max(2, options.repeats // 5), n // 4
     real: Any = np.float32
     print(f"{n} places, float32, best of {options.repeats}; M places/s, and times plain NumPy")
-    for law in ("masked", "projected"):
+    for law in ("masked", "projected", "visible"):
         fabric = replace(satin(), surface_law=law)
         cloth, shadow = compile_fabric(fabric), compile_shadow(fabric)
         tables = surface_law(fabric, precision=np.float32, shadow=shadow).published

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,9 +69,11 @@ def test_the_package_has_the_translation_of_its_kernels():
     assert SHADER.read_text() == shader()
 
 
-@pytest.mark.parametrize("name", ["linen_plain", "denim"])
-def test_the_page_s_values_are_those_of_the_surface_laws(browser, tmp_path, name):
-    fabric = even(fabric_of(name)[0])
+@pytest.mark.parametrize(
+    ("name", "law"), [("linen_plain", "projected"), ("denim", "masked"), ("silk_shot", "visible")]
+)
+def test_the_page_s_values_are_those_of_the_surface_laws(browser, tmp_path, name, law):
+    fabric = replace(even(fabric_of(name)[0]), surface_law=law)
     shown = opened(browser, tmp_path, fabric)
     kernels = (FOLDER / "kernels.glsl").read_text() + (FOLDER / "cloth.glsl").read_text()
     shown.tab.evaluate("t => { fabricusd.viewer.shaders.pairs = t; }", kernels + PAIRS)
