@@ -177,11 +177,20 @@ def test_the_law_of_a_preset_is_near_to_explicit_threads(name: str) -> None:
     assert error[fabric.surface_law] < 0.5 * error["masked"]
 
 
-@pytest.mark.parametrize("name", NEAREST)
+WHITE = {
+    "linen_plain": 0.06,
+    "silk_crepe_de_chine": 0.09,
+    "silk_shot": 0.11,
+    "polyester_satin_charmeuse": 0.12,
+}
+"""Largest difference from the tubes in a white sky, down to 75 degrees."""
+
+
+@pytest.mark.parametrize("name", WHITE)
 def test_cloth_of_which_the_viewer_sees_the_lit_places_is_as_bright_as_tubes_in_a_white_sky(
     name: str,
 ) -> None:
-    """To 75 degrees, where tubes of satin are above white in one azimuth, and the law is not."""
+    """At 75 degrees tubes of shot silk and satin are above white in one azimuth; the law is not."""
     found, fabric = table(name), replace(load(name), surface_law="visible")
     sky, weight = white_sky()
     truth = found.sky.reshape(len(POLAR), len(AZIMUTHS), 3)
@@ -194,7 +203,7 @@ def test_cloth_of_which_the_viewer_sees_the_lit_places_is_as_bright_as_tubes_in_
             for a in AZIMUTHS
         ]
         ratio = np.mean(shares, axis=0)[channel] / truth[row, :, channel].mean()
-        assert abs(ratio - 1.0) < 0.12
+        assert abs(ratio - 1.0) < WHITE[name]
 
 
 def test_without_a_shadow_all_places_are_visible() -> None:
@@ -214,19 +223,25 @@ def test_what_is_seen_of_a_place_is_the_mean_of_g_for_light_from_the_viewer() ->
     shadow = compile_shadow(fabric, precision=np.float64)
     tables: Any = surface_tables(fabric, shadow=shadow)
     nodes = curve_nodes(fabric, default_rule(fabric))
-    for k, wo in enumerate(directions(40, 6, 0.15)):
+    left = spread_out = 0.0
+    for wo in directions(40, 6, 0.15):
         place = visible.LAW.view_place.py_func(np.float64, tables, *wo)
         for thread_set, mine in ((0, slice(nodes.warp_start)), (1, slice(nodes.warp_start, None))):
             v = visible.LAW.visible_shares.py_func(np.float64, tables, thread_set, *place)
             s = np.sin(nodes.psi0[mine])
             share = v[0] + v[1] * s + v[2] * s**2 + v[3] * s**4
-            seen = [
-                visible.LAW.lit_alone.py_func(np.float64, tables, n, *wo)
-                for n in range(len(nodes.psi0))[mine]
-            ]
-            assert np.average(share, weights=nodes.weight[mine]) == pytest.approx(
-                np.average(np.clip(seen, 0, 1), weights=nodes.weight[mine]), abs=0.05
-            ), k
+            seen = np.array(
+                [
+                    visible.LAW.lit_alone.py_func(np.float64, tables, n, *wo)
+                    for n in range(len(nodes.psi0))[mine]
+                ]
+            ).clip(0, 1)
+            area = nodes.weight[mine] / nodes.weight[mine].sum()
+            assert area @ share == pytest.approx(area @ seen, abs=0.05)
+            left += area @ (share - seen) ** 2
+            spread_out += area @ (seen - area @ seen) ** 2
+    # One share for the whole set would leave all of it.
+    assert left < 0.15 * spread_out
 
 
 def test_light_along_the_cloth_is_lost_where_shadows_are_absolute() -> None:

@@ -12,6 +12,7 @@ import OpenImageIO as oiio
 import pytest
 from pxr import Usd, UsdGeom, UsdShade, UsdUtils
 
+from fabricusd.appearance.published.tables import surface_tables
 from fabricusd.appearance.shadow.mean import node_means
 from fabricusd.appearance.shadow.methods import compile_shadow
 from fabricusd.appearance.weave.quadrature import curve_nodes
@@ -104,6 +105,19 @@ def test_osl_has_the_law_s_mean_shadow_at_directions_that_it_keeps():
     assert "int columns = 16," in said
     assert "int elevations = 17," in said
     assert np.allclose(kept, whole[::16, ::6], rtol=1e-3, atol=1e-5)
+
+
+def test_osl_has_what_is_seen_at_the_views_that_it_keeps():
+    fabric = replace(load("silk_shot"), surface_law="visible")
+    said = osl_source(fabric)
+    shadow = compile_shadow(fabric, "horizon", precision=np.float64)
+    shares = surface_tables(fabric, shadow=shadow).shares.reshape(65, 33, 8)
+    (numbers,) = re.findall(r"float shares\[\d+\] = \{(.*?)\}", said)
+    kept = np.array(numbers.split(","), float).reshape(17, 17, 8)
+    assert "int law = 3," in said
+    assert "#define VISIBLE 3" in said
+    assert np.allclose(kept, shares[::4, ::2], rtol=1e-4, atol=1e-7)
+    assert np.abs(kept[..., 1:4]).max() > 0.1
 
 
 # The keys that version 1.1 of the schema requires of a side, and nothing else is allowed.

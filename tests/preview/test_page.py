@@ -69,8 +69,9 @@ def test_the_package_has_the_translation_of_its_kernels():
     assert SHADER.read_text() == shader()
 
 
-# What `visible` evaluates contains `projected`, which the other tests' linen wears.
-@pytest.mark.parametrize(("name", "law"), [("linen_plain", "visible"), ("denim", "masked")])
+@pytest.mark.parametrize(
+    ("name", "law"), [("linen_plain", "projected"), ("linen_plain", "visible"), ("denim", "masked")]
+)
 def test_the_page_s_values_are_those_of_the_surface_laws(browser, tmp_path, name, law):
     fabric = replace(even(fabric_of(name)[0]), surface_law=law)
     shown = opened(browser, tmp_path, fabric)

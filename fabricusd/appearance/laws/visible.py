@@ -14,6 +14,7 @@ there. Without a shadow the law is `projected`. Source: ours, docs/decisions/017
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,18 +24,8 @@ from numpy.typing import NDArray
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.laws import projected
 from fabricusd.appearance.laws.excess import EXCESS_FIELDS
-from fabricusd.appearance.laws.law import Law, no_mask, tables_class, yes
-from fabricusd.appearance.laws.lit import (
-    AZIMUTHS,
-    LIGHT_FIELDS,
-    ROWS,
-    column_of,
-    light_nodes,
-    lit_alone,
-    lit_node,
-    node_room,
-    row_of,
-)
+from fabricusd.appearance.laws.law import tables_class, yes
+from fabricusd.appearance.laws.lit import AZIMUTHS, LIGHT_FIELDS, ROWS, column_of, row_of
 from fabricusd.appearance.weave.quadrature import CurveNodes
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE, index
@@ -130,24 +121,13 @@ def _weight(R, tables, c, s, pair):
     return projected.weight(R, tables, c, s, pair) * max(share, R(LEAST))
 
 
-LAW = Law(
+LAW = replace(
+    projected.LAW,
     summary="as `projected`, less what neighbours hide from the viewer, nearest to traced threads",
     tables=Visible,
     make=_make,
-    absolute=True,
-    shared=projected.LAW.shared,
     hides=yes,
     view_place=_view_place,
     visible_shares=_visible_shares,
     weight=_weight,
-    mask=no_mask,
-    total=projected.LAW.total,
-    openness=projected.LAW.openness,
-    node_room=node_room,
-    light_nodes=light_nodes,
-    lit_node=lit_node,
-    lit_alone=lit_alone,
-    plain_weight=projected.LAW.plain_weight,
-    plain_mask=projected.LAW.plain_mask,
-    plain_total=projected.LAW.plain_total,
 )
