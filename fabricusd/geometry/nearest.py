@@ -41,7 +41,7 @@ NEAREST, PUBLISHED, CONSERVING = "nearest", "published", "conserving"
 TIE = 0.01
 """Errors that differ by less than this are equal: the earlier law of PREFERRED is taken."""
 
-PREFERRED = ("projected", "unmasked", "masked")
+PREFERRED = ("projected", "visible", "unmasked", "masked")
 
 LIKE = {"polyester_satin_charmeuse_back": "polyester_satin_charmeuse"}
 """Presets without a geometry, and those whose law they wear."""
