@@ -44,7 +44,8 @@ def _part(name: str) -> Any:
 
 
 shared, weight, mask, total = (_part(n) for n in ("shared", "weight", "mask", "total"))
-hides, view_place, visible_shares = (_part(n) for n in ("hides", "view_place", "visible_shares"))
+hides, view_place = _part("hides"), _part("view_place")
+visible_shares, view_shares = _part("visible_shares"), _part("view_shares")
 openness, node_room = _part("openness"), _part("node_room")
 light_nodes, lit_node, lit_alone = (_part(n) for n in ("light_nodes", "lit_node", "lit_alone"))
 """Each of these takes (R, tables, ...) as in `Law`."""

@@ -32,6 +32,10 @@ COMMON = ("threads", "nodes", "node_thread", "published", "warp_start", "gap")
 """Fields of the tables of every law, see `tables.SurfaceTables`."""
 
 
+VIEW_SHARES = 8
+"""Numbers that say which places of both sets a view sees, see `Law.view_shares`."""
+
+
 def tables_class(module: str, name: str, *own: str) -> Any:
     """A NamedTuple class with the fields COMMON and `own`.
 
@@ -58,6 +62,8 @@ class Law:
     view_place : (R, tables, ox, oy, oz) -> (entry, c, r), where the table of shares has a view
     visible_shares : (R, tables, thread_set, entry, c, r) -> four coefficients of the share of the
         places of a set that are seen, see `laws.visible`
+    view_shares : (R, tables, entry, c, r, out, first) fills VIEW_SHARES entries of `out`, from
+        `first` on, with the coefficients of weft and warp
     weight : (R, tables, c, s, pair) -> the weight of thread at the tangent angle with cosine c and
         sine s; pair : a `segment.SetPair`
     mask : (R, tables, cos_phi_i, cos_phi_o, cos_half) -> the factor of `f_s`, from azimuths
@@ -80,6 +86,7 @@ class Law:
     hides: Kernel
     view_place: Kernel
     visible_shares: Kernel
+    view_shares: Kernel
     weight: Kernel
     mask: Kernel
     total: Kernel
@@ -121,6 +128,11 @@ def no_place(R, tables, ox, oy, oz):
 def all_visible(R, tables, thread_set, entry, c, r):
     """`Law.visible_shares` of a law whose threads do not hide one another."""
     return R(1), R(0), R(0), R(0)
+
+
+@njit(**INLINE)
+def no_shares(R, tables, entry, c, r, out, first):
+    """`Law.view_shares` of a law whose threads do not hide one another."""
 
 
 @njit(**INLINE)

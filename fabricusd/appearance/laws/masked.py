@@ -20,6 +20,7 @@ from fabricusd.appearance.laws.law import (
     no_nodes,
     no_place,
     no_room,
+    no_shares,
     same_gap,
     tables_class,
 )
@@ -107,6 +108,7 @@ LAW = Law(
     hides=no,
     view_place=no_place,
     visible_shares=all_visible,
+    view_shares=no_shares,
     weight=_weight,
     mask=_mask,
     total=_total,

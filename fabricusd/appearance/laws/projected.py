@@ -28,7 +28,15 @@ from numpy.typing import NDArray
 
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.laws.excess import EXCESS_FIELDS, excess_at, no_excess
-from fabricusd.appearance.laws.law import Law, all_visible, no, no_mask, no_place, tables_class
+from fabricusd.appearance.laws.law import (
+    Law,
+    all_visible,
+    no,
+    no_mask,
+    no_place,
+    no_shares,
+    tables_class,
+)
 from fabricusd.appearance.laws.lit import (
     LIGHT_FIELDS,
     light_fields,
@@ -137,6 +145,7 @@ LAW = Law(
     hides=no,
     view_place=no_place,
     visible_shares=all_visible,
+    view_shares=no_shares,
     weight=weight,
     mask=no_mask,
     total=_total,

@@ -42,9 +42,11 @@ TERMS = 4
 LEAST = 0.01
 """Least share that thread counts with, for views from which the polynomial is below."""
 
-SEEN_FIELDS = ("shares", "share_columns")
-"""shares : (COLUMNS + 1, HEIGHTS, 2 sets, TERMS) real, flat; one entry without a shadow
-share_columns : int - COLUMNS, or 0 without a shadow"""
+SEEN_FIELDS = ("shares", "share_columns", "share_numbers")
+"""shares : (share_columns + 1, HEIGHTS, 2 sets, TERMS) real, flat
+share_columns : int - COLUMNS, or 1 without a shadow
+share_numbers : int - 2 * TERMS, as a number that the compiler does not know. Were it known, the
+    loop over it would be unrolled, and a view would take four times as long"""
 
 Visible = tables_class(
     __name__, "Visible", "wide_2", "tall_2", *LIGHT_FIELDS, *EXCESS_FIELDS, *SEEN_FIELDS
@@ -52,11 +54,16 @@ Visible = tables_class(
 
 
 def _make(fabric: Fabric, nodes: CurveNodes, means: Any, precision: Any) -> dict[str, Any]:
-    shares = np.ones(1) if means is None else _shares(nodes, means).reshape(-1)
+    if means is None:
+        shares = np.zeros((2, HEIGHTS, 2, TERMS))
+        shares[..., 0] = 1.0
+    else:
+        shares = _shares(nodes, means)
     return {
         **projected.LAW.make(fabric, nodes, means, precision),
-        "shares": np.ascontiguousarray(shares, dtype=precision),
-        "share_columns": 0 if means is None else COLUMNS,
+        "shares": np.ascontiguousarray(shares.reshape(-1), dtype=precision),
+        "share_columns": len(shares) - 1,
+        "share_numbers": 2 * TERMS,
     }
 
 
@@ -90,8 +97,6 @@ def _view_place(R, tables, ox, oy, oz):
 @njit(**INLINE)
 def _visible_shares(R, tables, thread_set, entry, c, r):
     """(v0, v1, v2, v4) of a set for a view."""
-    if tables.share_columns == 0:
-        return R(1), R(0), R(0), R(0)
     here = np.int32(entry) + np.int32(thread_set * TERMS)
     beside = here + np.int32(2 * TERMS * HEIGHTS)
     return (
@@ -115,6 +120,23 @@ def _between(R, shares, here, beside, c, r):
 
 
 @njit(**INLINE)
+def _view_shares(R, tables, entry, c, r, out, first):
+    """Fill `out` with the coefficients of both sets for a view; the loop is vectorised."""
+    shares, step = tables.shares, np.int32(2 * TERMS)
+    here, beside = np.int32(entry), np.int32(entry) + step * np.int32(HEIGHTS)
+    c_r, c_1 = c * r, c - c * r
+    one_r = r - c_r
+    one_1 = R(1) - c_1 - r
+    for k in range(tables.share_numbers):
+        out[index(first, k)] = (
+            one_1 * shares[index(here, k)]
+            + c_1 * shares[index(beside, k)]
+            + one_r * shares[index(here + step, k)]
+            + c_r * shares[index(beside + step, k)]
+        )
+
+
+@njit(**INLINE)
 def _weight(R, tables, c, s, pair):
     square = s * s
     share = pair.seen_0 + s * pair.seen_1 + square * (pair.seen_2 + square * pair.seen_4)
@@ -129,5 +151,6 @@ LAW = replace(
     hides=yes,
     view_place=_view_place,
     visible_shares=_visible_shares,
+    view_shares=_view_shares,
     weight=_weight,
 )

@@ -11,6 +11,7 @@ from numba import njit
 
 from fabricusd.appearance import laws
 from fabricusd.appearance.frame import WARP
+from fabricusd.appearance.laws.law import VIEW_SHARES
 from fabricusd.appearance.published.columns import NODE_COS, NODE_SIN, NODE_WEIGHT
 from fabricusd.appearance.published.segment import SetPair, along_set
 from fabricusd.kernels.real import BLOCK, INLINE, index
@@ -23,10 +24,14 @@ NORMALIZATION, RED, GREEN, BLUE = 13 * BLOCK, 14 * BLOCK, 15 * BLOCK, 16 * BLOCK
 """Offsets of the rows: the fields of `segment.SetPair`, then the sums. Laws that hide nothing leave
 the rows SEEN as they are."""
 
-NODE_LIT = 17 * BLOCK
+SHARES = 17 * BLOCK
+"""Offset of VIEW_SHARES rows that `look` fills: the law's `light_shares` of all views, one after
+the other. They are copied to the rows SEEN of one set."""
+
+NODE_LIT = SHARES + VIEW_SHARES * BLOCK
 """Offset of a row that level `far` alone has: the mean of g at a node."""
 
-ROWS = 18
+ROWS = 18 + VIEW_SHARES
 
 NOTHING = 1e-12
 """The value is 0 where `Q` is at or below this. On velvet this loses a tenth of random pairs."""
@@ -42,7 +47,7 @@ def node_range(tables, thread_set):
 
 @njit(**INLINE)
 def prepare(R, tables, thread_set, wi, wo, start, size, block, at=0):
-    """Compute `along_set` for a block of pairs, into the rows that start at offset `at`."""
+    """Compute `along_set` for a block of pairs that `look` has seen, into the rows from `at` on."""
     for y in range(size):
         x, k = at + y, index(start, y)
         iz, oz = wi[2, k], wo[2, k]
@@ -53,22 +58,31 @@ def prepare(R, tables, thread_set, wi, wo, start, size, block, at=0):
         block[UP_O + x], block[SCALE_O + x] = pair.up_o, pair.scale_o
         block[SHARED + x] = pair.shared
     if laws.hides(R, tables):
-        _see(R, tables, thread_set, wo, start, size, block, at)
+        _see(thread_set, size, block, at)
 
 
 @njit(**INLINE)
-def _see(R, tables, thread_set, wo, start, size, block, at):
-    """Fill the rows SEEN. Entries of the table are small enough to be whole in float32."""
-    for y in range(size):
-        x, k = at + y, index(start, y)
+def look(R, tables, wo, start, size, block):
+    """Fill the rows SHARES, which `prepare` reads."""
+    if not laws.hides(R, tables):
+        return
+    # Entries of the table are small enough to be whole in float32.
+    for x in range(size):
+        k = index(start, x)
         entry, c, r = laws.view_place(R, tables, wo[0, k], wo[1, k], wo[2, k])
         block[SEEN_0 + x], block[SEEN_1 + x], block[SEEN_2 + x] = R(entry), c, r
-    for y in range(size):
-        x = at + y
+    for x in range(size):
         entry, c, r = np.int32(block[SEEN_0 + x]), block[SEEN_1 + x], block[SEEN_2 + x]
-        v0, v1, v2, v4 = laws.visible_shares(R, tables, thread_set, entry, c, r)
-        block[SEEN_0 + x], block[SEEN_1 + x] = v0, v1
-        block[SEEN_2 + x], block[SEEN_4 + x] = v2, v4
+        laws.view_shares(R, tables, entry, c, r, block, SHARES + VIEW_SHARES * x)
+
+
+@njit(**INLINE)
+def _see(thread_set, size, block, at):
+    own = SHARES + (VIEW_SHARES // 2 if thread_set == WARP else 0)
+    for y in range(size):
+        x, view = at + y, own + VIEW_SHARES * y
+        block[SEEN_0 + x], block[SEEN_1 + x] = block[view], block[view + 1]
+        block[SEEN_2 + x], block[SEEN_4 + x] = block[view + 2], block[view + 3]
 
 
 @njit(**INLINE)

@@ -24,6 +24,7 @@ from fabricusd.appearance.published.blocks import (
     ROWS,
     add_weight,
     divide,
+    look,
     node_range,
     pair_at,
     prepare,
@@ -116,6 +117,7 @@ def far_values(R, tables, wi, wo, out, begin, end):
             block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
             first = laws.node_room(R, tables, x)
             laws.light_nodes(R, tables, wi[0, k], wi[1, k], wi[2, k], lit, first)
+        look(R, tables, wo, start, size, block)
         for thread_set in (WEFT, WARP):
             first, last = node_range(tables, thread_set)
             if first == last:

@@ -21,6 +21,7 @@ from fabricusd.appearance.published.blocks import (
     ALONG_O,
     BLUE,
     GREEN,
+    NODE_LIT,
     NORMALIZATION,
     NOTHING,
     RED,
@@ -35,6 +36,7 @@ from fabricusd.appearance.published.blocks import (
     UP_O,
     add_weight,
     divide,
+    look,
     prepare,
 )
 from fabricusd.appearance.published.far import normalization
@@ -54,12 +56,12 @@ from fabricusd.kernels.choice import for_each
 from fabricusd.kernels.real import BLOCK, INLINE, KERNEL, PART, cos, index, sin
 from fabricusd.kernels.unrolled import tuple_reader
 
-_WARP = 17 * BLOCK
+_WARP = NODE_LIT
 """Offset of the thirteen rows of the warp; the weft uses the first thirteen rows of the block."""
-_IS_WARP, _COS, _SIN, _ACROSS = 30 * BLOCK, 31 * BLOCK, 32 * BLOCK, 33 * BLOCK
-_THREAD = 34 * BLOCK
+_IS_WARP, _COS, _SIN, _ACROSS = (_WARP + k * BLOCK for k in range(13, 17))
+_THREAD = _WARP + 17 * BLOCK
 """Offset of the columns of each point's own thread."""
-POINT_ROWS = 34 + POINT_COLUMNS
+POINT_ROWS = _THREAD // BLOCK + POINT_COLUMNS
 _NO_MODEL = -1.0
 
 _FEW_TYPES = 6
@@ -127,6 +129,7 @@ def point_block(R, tables, across_too, places, first, wi, wo, out, start, size, 
     for x in range(size):
         block[NORMALIZATION + x] = R(0)
         block[RED + x] = block[GREEN + x] = block[BLUE + x] = R(0)
+    look(R, tables, wo, start, size, block)
     prepare(R, tables, WEFT, wi, wo, start, size, block)
     prepare(R, tables, WARP, wi, wo, start, size, block, _WARP)
     for k in range(tables.warp_start):

@@ -326,9 +326,6 @@ float k_between(int here, int beside, float c, float r) {
 T_ffff k_visible_shares(int thread_set, int entry, float c, float r) {
   int here;
   int beside;
-  if ((published_share_columns == 0)) {
-    return T_ffff(1.0, 0.0, 0.0, 0.0);
-  }
   here = (entry + (thread_set * 4));
   beside = (here + 264);
   return T_ffff(k_between(here, beside, c, r), k_between((here + 1), (beside + 1), c, r), k_between((here + 2), (beside + 2), c, r), k_between((here + 3), (beside + 3), c, r));
