@@ -31,7 +31,7 @@ COMMANDS = (
       for name in ("linen_plain", "denim", "velvet", "polyester_satin_charmeuse")
       for level in ("far", "weave", "thread")),
     *(f"render linen_plain.usda -o o.exr {SMALL} --surface-law {law} --level {level}"
-      for law in ("masked", "unmasked") for level in ("far", "weave")),
+      for law in ("masked", "projected") for level in ("far", "weave")),
     *(f"preview {name} -o o.png --level {level}"
       for name in ("linen_plain", "denim") for level in ("far", "weave", "thread")),
     "bake denim.usda --fit --resolution 128 -o baked -q",

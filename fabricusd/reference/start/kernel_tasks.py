@@ -114,14 +114,26 @@ def _share_lobes() -> None:
     published_mixture(*_cloth())
 
 
-def _shade_far_projected() -> None:
-    tables = _cloth("projected")[1]
+def _shade_far_absolute(law: str) -> None:
+    tables = _cloth(law)[1]
     shade_far(R, tables, no_mixture(R), R(0), _sample().wave.hits.rows, 0, 0)
     pass_published(R, tables, R(1), np.zeros((3, 0), np.float32), np.zeros(0, np.float32))
 
 
+def _shade_far_projected() -> None:
+    _shade_far_absolute("projected")
+
+
 def _share_lobes_projected() -> None:
     published_mixture(*_cloth("projected"))
+
+
+def _shade_far_visible() -> None:
+    _shade_far_absolute("visible")
+
+
+def _share_lobes_visible() -> None:
+    published_mixture(*_cloth("visible"))
 
 
 def _arrive() -> None:
@@ -226,6 +238,10 @@ def _near_projected() -> None:
     _near(_cloth("projected")[1])
 
 
+def _near_visible() -> None:
+    _near(_cloth("visible")[1])
+
+
 def _lit() -> Lit:
     return Lit(*[np.zeros(0, np.float32)] * 2)
 
@@ -246,21 +262,24 @@ def _shadows() -> None:
     )
 
 
-EVERY_PICTURE, CLOSE_UPS, MASKED, PROJECTED, NEAR_MASKED, NEAR_PROJECTED = (
-    "every picture", "close-ups", "cloth that masks", "projected cloth",
-    "close-ups of cloth that masks", "close-ups of projected cloth",
-)  # fmt: skip
+EVERY_PICTURE, CLOSE_UPS = "every picture", "close-ups"
+MASKED, PROJECTED, VISIBLE = "cloth that masks", "projected cloth", "cloth of visible places"
+NEAR_MASKED, NEAR_PROJECTED, NEAR_VISIBLE = (
+    f"close-ups of {cloth}" for cloth in (MASKED, PROJECTED, VISIBLE)
+)
 TASKS: dict[str, tuple[Callable[[], None], ...]] = {
     EVERY_PICTURE: (
         _trace_and_settle, _shade_preview, _depart, _camera_rays, _arrive, _prepare,
     ),
     MASKED: (_shade_far, _share_lobes),
     PROJECTED: (_shadow_table, _mean_table, _share_lobes_projected, _shade_far_projected),
+    VISIBLE: (_shadow_table, _mean_table, _share_lobes_visible, _shade_far_visible),
     CLOSE_UPS: (
         _sample_points, _look_up_uneven, _shadows, _finish_point, _look_up, _shadow_table,
     ),
     NEAR_MASKED: (_near_masked,),
     NEAR_PROJECTED: (_near_projected,),
+    NEAR_VISIBLE: (_near_visible,),
 }  # fmt: skip
 """The tasks of each list. Tasks that take longest stand at both ends, next to those with which they
 share parts. Every picture needs the first list, levels `weave` and `thread` also CLOSE_UPS, and
@@ -273,17 +292,19 @@ def of_law(fabric: Fabric) -> str | None:
     """The list that `fabric` needs at level `far`; None where there is none for its law."""
     if any_conserving(fabric):
         return None
-    return {"masked": MASKED, "projected": PROJECTED}.get(fabric.surface_law)
+    return {"masked": MASKED, "projected": PROJECTED, "visible": VISIBLE}.get(fabric.surface_law)
 
 
 def near_of_law(fabric: Fabric) -> str | None:
     """As `of_law`, for levels `weave` and `thread`."""
-    return {MASKED: NEAR_MASKED, PROJECTED: NEAR_PROJECTED}.get(of_law(fabric) or "")
+    near = {MASKED: NEAR_MASKED, PROJECTED: NEAR_PROJECTED, VISIBLE: NEAR_VISIBLE}
+    return near.get(of_law(fabric) or "")
 
 
 LONGEST = {
     EVERY_PICTURE: prepare, CLOSE_UPS: sample_points, MASKED: shade_far, PROJECTED: pass_published,
-    NEAR_MASKED: point_values, NEAR_PROJECTED: point_values,
+    VISIBLE: pass_published, NEAR_MASKED: point_values, NEAR_PROJECTED: point_values,
+    NEAR_VISIBLE: point_values,
 }  # fmt: skip
 """A kernel of each list that takes long to compile, or comes last: if it is cached, so are the
 others. (Of the laws' own, if that of another law is: the first picture of a second law then waits

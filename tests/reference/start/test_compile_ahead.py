@@ -17,7 +17,9 @@ from fabricusd.reference.start.kernel_tasks import (
     MASKED,
     NEAR_MASKED,
     NEAR_PROJECTED,
+    NEAR_VISIBLE,
     PROJECTED,
+    VISIBLE,
     TASKS,
 )
 from fabricusd.scene.scene import FabricSurface, PreviewSurface, Scene
@@ -57,14 +59,17 @@ def test_a_picture_compiles_nothing_that_was_not_compiled_ahead():
     before = signatures()
     picture("far")
     assert signatures() == before
-    for task in TASKS[PROJECTED]:
-        task()
-    before = signatures()
-    picture("far", law="projected")
-    assert signatures() == before
+    for law, tasks in (("projected", PROJECTED), ("visible", VISIBLE)):
+        for task in TASKS[tasks]:
+            task()
+        before = signatures()
+        picture("far", law)
+        assert signatures() == before
     for task in TASKS[CLOSE_UPS]:
         task()
-    for law, near in (("masked", NEAR_MASKED), ("projected", NEAR_PROJECTED)):
+    for law, near in (
+        ("masked", NEAR_MASKED), ("projected", NEAR_PROJECTED), ("visible", NEAR_VISIBLE)
+    ):  # fmt: skip
         for task in TASKS[near]:
             task()
         before = signatures()

@@ -26,7 +26,7 @@ def test_it_writes_a_fabric_each_and_the_plugin(tmp_path):
     made = export.write(job(notes, linen=load("linen_plain")), tmp_path / "cloth")
     assert [one.name for one in made] == ["linen.json", "fabricusd_cloth.py"]
     said = json.loads(made[0].read_text())
-    assert said["law"] == "projected"
+    assert said["law"] == "visible"
     weight = sum(one["weight"] for one in said["nodes"])
     assert weight + said["gap"] == pytest.approx(1.0)
     shape = said["columns"] + 1, said["elevations"], len(said["nodes"])

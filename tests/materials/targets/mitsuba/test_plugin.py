@@ -16,8 +16,8 @@ from fabricusd.materials.targets.mitsuba.export import fabric_content
 from fabricusd.schema import load
 
 PRESETS = (
-    ("linen_plain", "projected"), ("silk_shot", "projected"),
-    ("polyester_satin_charmeuse", "unmasked"), ("velvet", "masked"), ("silk_shot", "visible"),
+    ("wool_flannel", "projected"), ("silk_shot", "projected"), ("silk_shot", "visible"),
+    ("polyester_satin_charmeuse", "unmasked"), ("velvet", "masked"),
 )  # fmt: skip
 
 
