@@ -127,13 +127,18 @@ def _plain_mask(fabric: Fabric, i: Angles, o: Angles) -> Array:
 
 
 def _plain_total(fabric: Fabric, seen: Array, gap: float, wo: Array) -> Array:
+    return np.asarray(seen / (1.0 - plain_openness(fabric, wo)))
+
+
+def plain_openness(fabric: Fabric, wo: Array) -> Array:
+    """`gap(wo)` in plain NumPy; wo : (..., 3)."""
     wide, tall = _shape(fabric)
     w = np.asarray(wo)
     open_ = np.ones(w.shape[:-1])
     for j, across in ((WEFT, w[..., 1]), (WARP, w[..., 0])):
         slope = across / np.maximum(np.abs(w[..., 2]), 1e-6)
         open_ = open_ * np.maximum(0.0, 1.0 - np.hypot(wide[j], tall[j] * slope))
-    return np.asarray(seen / (1.0 - open_))
+    return np.asarray(open_)
 
 
 LAW = Law(

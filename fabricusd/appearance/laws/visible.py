@@ -9,7 +9,11 @@ viewer sees. Places are hidden from a viewer as they are from a light, so the sh
 which is smooth along a thread, so that means over the curve stay exact. On explicit threads more
 terms gain nothing (`python bench/model/hidden_from_view.py`). Places that are both lit and seen are
 taken to be independent: a dependence that grows as light and viewer come together changes nothing
-there. Without a shadow the law is `projected`. Source: ours, docs/decisions/017.
+there. Without a shadow all places are seen.
+
+Light passes the cloth by the gap(w) that the fabric states, which is that of its tubes
+(`fabricusd.sides`): satin, which has no gap from above, is open from aside beside the dips of its
+warps. Where a fabric states none, gap(w) is that of `projected`. Source: ours, docs/decisions/017.
 """
 
 from __future__ import annotations
@@ -21,11 +25,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fabricusd.appearance.conserving.by_side import by_side
 from fabricusd.appearance.frame import WARP, WEFT
 from fabricusd.appearance.laws import projected
-from fabricusd.appearance.laws.excess import EXCESS_FIELDS
+from fabricusd.appearance.laws.excess import COLUMNS as AROUND
+from fabricusd.appearance.laws.excess import EXCESS_FIELDS, by_view, view
+from fabricusd.appearance.laws.excess import ROWS as RINGS
 from fabricusd.appearance.laws.law import tables_class, yes
 from fabricusd.appearance.laws.lit import AZIMUTHS, LIGHT_FIELDS, ROWS, column_of, row_of
+from fabricusd.appearance.scattering.plain_lobes import Array
 from fabricusd.appearance.weave.quadrature import CurveNodes
 from fabricusd.fabric import Fabric
 from fabricusd.kernels.real import INLINE, index
@@ -42,8 +50,9 @@ TERMS = 4
 LEAST = 0.01
 """Least share that thread counts with, for views from which the polynomial is below."""
 
-SEEN_FIELDS = ("shares", "share_columns", "share_numbers")
-"""shares : (share_columns + 1, HEIGHTS, 2 sets, TERMS) real, flat
+SEEN_FIELDS = ("gaps", "shares", "share_columns", "share_numbers")
+"""gaps : (ROWS, COLUMNS + 1) real, flat - gap(w), as a table of `excess.by_view`
+shares : (share_columns + 1, HEIGHTS, 2 sets, TERMS) real, flat
 share_columns : int - COLUMNS, or 1 without a shadow
 share_numbers : int - 2 * TERMS, as a number that the compiler does not know. Were it known, the
     loop over it would be unrolled, and a view would take four times as long"""
@@ -59,12 +68,25 @@ def _make(fabric: Fabric, nodes: CurveNodes, means: Any, precision: Any) -> dict
         shares[..., 0] = 1.0
     else:
         shares = _shares(nodes, means)
+    views = np.array([[view(row, column) for column in range(AROUND + 1)] for row in range(RINGS)])
+    gaps = _openness_of(fabric, views).reshape(-1)
     return {
         **projected.LAW.make(fabric, nodes, means, precision),
+        "gaps": np.ascontiguousarray(gaps, dtype=precision),
+        "excess": np.ascontiguousarray(1.0 / (1.0 - gaps), dtype=precision),
         "shares": np.ascontiguousarray(shares.reshape(-1), dtype=precision),
         "share_columns": len(shares) - 1,
         "share_numbers": 2 * TERMS,
     }
+
+
+def _openness_of(fabric: Fabric, w: Floats) -> Floats:
+    """(...) gap(w) of unit vectors w (..., 3); below 1 by LEAST at least."""
+    gap = projected.plain_openness(fabric, w)
+    if fabric.sides.gap and not fabric.opaque:
+        theta, phi = np.arccos(np.clip(w[..., 2], -1.0, 1.0)), np.arctan2(w[..., 1], w[..., 0])
+        gap = by_side(fabric, theta, phi).gap
+    return np.minimum(gap, 1.0 - LEAST)
 
 
 def _shares(nodes: CurveNodes, means: Floats) -> Floats:
@@ -137,6 +159,20 @@ def _view_shares(R, tables, entry, c, r, out, first):
 
 
 @njit(**INLINE)
+def _openness(R, tables, ox, oy, oz):
+    return by_view(R, tables.gaps, ox, oy, oz)
+
+
+@njit(**INLINE)
+def _total(R, tables, seen, ox, oy, oz):
+    return seen * by_view(R, tables.excess, ox, oy, oz)
+
+
+def _plain_total(fabric: Fabric, seen: Array, gap: float, wo: Array) -> Array:
+    return np.asarray(seen / (1.0 - _openness_of(fabric, np.asarray(wo))))
+
+
+@njit(**INLINE)
 def _weight(R, tables, c, s, pair):
     square = s * s
     share = pair.seen_0 + s * pair.seen_1 + square * (pair.seen_2 + square * pair.seen_4)
@@ -153,4 +189,7 @@ LAW = replace(
     visible_shares=_visible_shares,
     view_shares=_view_shares,
     weight=_weight,
+    total=_total,
+    openness=_openness,
+    plain_total=_plain_total,
 )

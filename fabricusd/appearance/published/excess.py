@@ -13,16 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fabricusd.appearance.laws.excess import COLUMNS, ROWS
+from fabricusd.appearance.laws.excess import COLUMNS, ROWS, view
 from fabricusd.appearance.published.far import far_values
 
 Floats = NDArray[np.float64]
 
 RINGS, AROUND = 24, 48
 """Directions of the sky: Gauss-Legendre points in the sine of the elevation, and azimuths."""
-
-LOWEST = 0.001
-"""Sine of the lowest view: at 0 the law is not defined."""
 
 FEW, DIM = 4, 0.75
 """Columns that a row is tried at, and the brightness up to which it holds no excess between them.
@@ -32,7 +29,7 @@ Cloth is brighter than white at grazing views only, so most rows need no more.""
 def excess_of(tables: Any, precision: type[np.floating[Any]]) -> Floats:
     """(ROWS, COLUMNS + 1) reflected of a white sky, at least 1.
 
-    tables : of the law in `precision`, with an excess of 1
+    tables : of the law in `precision`, as `Law.make` leaves them
     """
     sky, weight = white_sky()
     found = np.empty((ROWS, COLUMNS + 1))
@@ -41,31 +38,19 @@ def excess_of(tables: Any, precision: type[np.floating[Any]]) -> Floats:
     weight = weight.astype(precision)
     real: Any = precision
 
-    def reflected(z: float, turn: float) -> float:
-        x, y = _on_diamond(turn)
-        flat = np.sqrt(1.0 - z * z) / np.hypot(x, y)
-        wo = np.repeat(np.array([[flat * x], [flat * y], [z]], precision), len(sky), axis=1)
+    def reflected(row: int, column: float) -> float:
+        wo = np.repeat(np.array([view(row, column)], precision).T, len(sky), axis=1)
         far_values(real, tables, wi, wo, out, 0, len(sky))
         return float((out @ weight).max())
 
     for row in range(ROWS):
-        z = max((1.0 - row / (ROWS - 1)) ** 2, LOWEST)
-        if max(reflected(z, 4.0 * k / FEW) for k in range(FEW)) <= DIM:
+        if max(reflected(row, k * COLUMNS / FEW) for k in range(FEW)) <= DIM:
             found[row] = 1.0
             continue
         for column in range(COLUMNS):
-            found[row, column] = max(1.0, reflected(z, 4.0 * column / COLUMNS))
+            found[row, column] = max(1.0, reflected(row, column))
     found[:, COLUMNS] = found[:, 0]
     return found
-
-
-def _on_diamond(turn: float) -> tuple[float, float]:
-    """(x, y) with |x| + |y| = 1 of a diamond angle in [0, 4)."""
-    quadrant, f = divmod(turn, 1.0)
-    x, y = 1.0 - f, f
-    for _ in range(int(quadrant)):
-        x, y = -y, x
-    return x, y
 
 
 def white_sky() -> tuple[Floats, Floats]:

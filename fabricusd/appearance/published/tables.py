@@ -89,7 +89,7 @@ def surface_tables(
     excess = excess_of(made, precision)
     if not (excess > 1.0).any():
         return made
-    return made._replace(excess=np.ascontiguousarray(excess, dtype=precision).reshape(-1))
+    return made._replace(excess=made.excess * excess.astype(precision).reshape(-1))
 
 
 def has_cell_lobes(fabric: Fabric) -> bool:

@@ -90,13 +90,13 @@ def osl_source(fabric: Fabric) -> str:
         f"    float gap = {gap:.9g},\n",
         f"    float open = {0.0 if fabric.opaque else gap:.9g},\n",
         f"    int law = {LAWS.index(fabric.surface_law)},\n",
-        *_unmasked(law, len(nodes.psi0)),
+        *_unmasked(law, len(nodes.psi0), fabric.opaque),
     ]
     text = SOURCE.read_text("utf-8")
     return text.replace("    /* tables */\n", "".join(tables))
 
 
-def _unmasked(law: Any, nodes: int) -> list[str]:
+def _unmasked(law: Any, nodes: int, opaque: bool) -> list[str]:
     """The tables of laws that do not mask, of a single entry each where the law does."""
     means, columns = np.ones(1), 1
     if getattr(law, "columns", 0):
@@ -109,6 +109,10 @@ def _unmasked(law: Any, nodes: int) -> list[str]:
         shares = table[:: law.share_columns // AZIMUTHS, :: (HEIGHTS - 1) // (ELEVATIONS - 1)]
     shape = {name: getattr(law, name, np.zeros(2)) for name in ("wide_2", "tall_2")}
     excess = np.asarray(getattr(law, "excess", np.ones(1)))
+    # Of opaque cloth the shader passes none, and divides by what `excess` holds already.
+    gaps = np.zeros(1) if opaque else getattr(law, "gaps", np.zeros(1))
+    if gaps.size == 1:
+        gaps = np.zeros(ROWS * (AROUND + 1))
     return [
         f"    int columns = {columns},\n",
         f"    int elevations = {ELEVATIONS},\n",
@@ -118,6 +122,7 @@ def _unmasked(law: Any, nodes: int) -> list[str]:
         f"    int excess_rows = {ROWS},\n",
         f"    int excess_columns = {AROUND},\n",
         _array("float", "excess", excess if excess.size > 1 else np.ones(ROWS * (AROUND + 1))),
+        _array("float", "gaps", gaps, digits=5),
     ]
 
 

@@ -734,7 +734,7 @@ float k_total(float seen, float ox, float oy, float oz) {
   return (seen + (published_gap * oz));
 }
 
-float k_excess_at(float x, float y, float z) {
+float k_by_view(float x, float y, float z) {
   float across;
   float turn;
   int row;
@@ -745,9 +745,6 @@ float k_excess_at(float x, float y, float z) {
   int far_;
   float low;
   float high;
-  if ((published_excess_n0 == 1)) {
-    return 1.0;
-  }
   across = ((1.0 - sqrt(max(0.0, min(1.0, z)))) * 23.0);
   turn = (k_diamond(x, y) * 8.0);
   row = max(min(int(across), 22), 0);
@@ -761,6 +758,13 @@ float k_excess_at(float x, float y, float z) {
   high = F(published_excess_at + far_);
   high = (high + ((F(published_excess_at + (far_ + 1)) - high) * b));
   return (low + ((high - low) * a));
+}
+
+float k_excess_at(float x, float y, float z) {
+  if ((published_excess_n0 == 1)) {
+    return 1.0;
+  }
+  return k_by_view(x, y, z);
 }
 
 float k_total_1(float seen, float ox, float oy, float oz) {
@@ -783,6 +787,10 @@ float k_total_2(float seen, float ox, float oy, float oz) {
   return ((seen * most) / (1.0 - k_openness(ox, oy, oz)));
 }
 
+float k_total_3(float seen, float ox, float oy, float oz) {
+  return (seen * k_by_view(ox, oy, oz));
+}
+
 float k_law_total(float a2, float a3, float a4, float a5) {
 #if LAW == MASKED
   return k_total(a2, a3, a4, a5);
@@ -791,7 +799,7 @@ float k_law_total(float a2, float a3, float a4, float a5) {
 #elif LAW == PROJECTED
   return k_total_2(a2, a3, a4, a5);
 #elif LAW == VISIBLE
-  return k_total_2(a2, a3, a4, a5);
+  return k_total_3(a2, a3, a4, a5);
 #endif
 }
 

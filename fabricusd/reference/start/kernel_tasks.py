@@ -227,7 +227,7 @@ def _sample_points() -> None:
 def _near(tables: SurfaceTables) -> None:
     vectors = np.zeros((3, 0), np.float32)
     point_values(R, tables, False, _places(), vectors, vectors, vectors, 0, 0)
-    pass_gaps(R, tables, R(0), vectors, np.zeros(0, np.float32))
+    pass_gaps(R, tables, R(0), _points().sets, vectors, np.zeros(0, np.float32))
 
 
 def _near_masked() -> None:

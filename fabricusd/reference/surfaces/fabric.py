@@ -294,7 +294,7 @@ class FabricShader:
             near: tuple[Any, ...] = (R, law.published, level == THREAD_LEVEL, places)
             call(point_values, *near, wi, wo, towards, 0, count)
             call(point_values, *near, go, wo, onwards, 0, count)
-            call(pass_gaps, R, law.published, self.is_open, wo, passes)
+            call(pass_gaps, R, law.published, self.is_open, points.sets, wo, passes)
         else:
             if law.kind == CONSERVING_ONLY:
                 table, lobes = law.conserving, law.conserving_lobes
@@ -395,19 +395,19 @@ def finish_by_law(R, hits, first, passes, scattering):
 def finish_point(R, published, types, hits, first, scattering, points, passes, lit):
     """Apply the shadows of neighbouring threads, and let paths through.
 
-    passes : (n,) probability with which a path goes straight on at its place; of `published` cloth
-        in gaps alone, where what does not pass ends
+    passes : (n,) probability with which a path goes straight on at its place; what does not pass a
+        gap of `published` cloth ends there
     """
     _, _, go, towards, onwards = scattering
     sets, threads = points.sets, points.threads
     for k in range(go.shape[1]):
         h = first + k
-        keep = R(1) if published else R(1) - passes[k]
+        keep = R(1) - passes[k]
         if sets[k] == GAP and published:
             hits[F, h], hits[F + 1, h], hits[F + 2, h] = R(0), R(0), R(0)
             hits[F_PDF, h] = R(0)
-            hits[KEEP, h], hits[THREAD, h] = R(1) - passes[k], R(-1)
-            hits[GO_PDF, h] = STRAIGHT if hits[CHANCE + 3, h] >= R(1) - passes[k] else R(0)
+            hits[KEEP, h], hits[THREAD, h] = keep, R(-1)
+            hits[GO_PDF, h] = STRAIGHT if hits[CHANCE + 3, h] >= keep else R(0)
             continue
         if sets[k] == GAP:
             for row in range(3):

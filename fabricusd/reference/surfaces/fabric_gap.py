@@ -64,11 +64,17 @@ def pass_published(R, tables, is_open, wo, out):
 
 
 @njit(**LEAN)
-def pass_gaps(R, tables, is_open, wo, out):
-    """Write the probability with which each viewer's ray passes a gap of published cloth."""
+def pass_gaps(R, tables, is_open, sets, wo, out):
+    """Write the probability with which each viewer's ray passes its place of published cloth.
+
+    What gaps seen from above do not let through passes all threads alike, as in `passing`.
+    """
     for k in range(out.size):
         share = laws.openness(R, tables, wo[0, k], wo[1, k], wo[2, k])
-        out[k] = is_open * min(R(1), share / tables.gap) if tables.gap > R(0) else R(0)
+        if sets[k] == GAP:
+            out[k] = is_open * min(R(1), share / tables.gap) if tables.gap > R(0) else R(0)
+        else:
+            out[k] = is_open * max(R(0), share - tables.gap) / (R(1) - tables.gap)
 
 
 @njit(**LEAN)

@@ -98,7 +98,7 @@ def fabric_content(fabric: Fabric) -> dict[str, Any]:
     for name in ("precision", "columns"):
         if hasattr(tables, name):
             own[name] = float(getattr(tables, name))
-    for name in ("means", "excess", "wide_2", "tall_2", "shares"):
+    for name in ("means", "excess", "wide_2", "tall_2", "shares", "gaps"):
         if hasattr(tables, name):
             own[name] = _numbers(getattr(tables, name))
     if "means" in own:

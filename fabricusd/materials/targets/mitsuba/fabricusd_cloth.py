@@ -36,7 +36,7 @@ PROJECTED = ("projected", "visible")
 """Laws that weigh threads by the area that is seen."""
 
 
-TABLES = ("means", "excess", "shares")
+TABLES = ("means", "excess", "shares", "gaps")
 
 
 class Cloth:
@@ -83,6 +83,8 @@ class Cloth:
     def _gap(self, wo: Any) -> Any:
         if self.law not in PROJECTED:
             return mi.Float(self.said["gap"])
+        if self.law == "visible":
+            return self._by_view("gaps", wo)
         wide, tall, up_2 = self.said["wide_2"], self.said["tall_2"], dr.maximum(wo.z**2, 1e-12)
         weft = wide[0] + tall[0] * wo.y**2 / up_2
         warp = wide[1] + tall[1] * wo.x**2 / up_2
@@ -184,12 +186,16 @@ class Cloth:
     def _total(self, seen: Any, wo: Any) -> Any:
         if self.law == "masked":
             return seen + self.said["gap"] * wo.z
-        most = self._excess(wo)
-        return most if self.law == "unmasked" else seen * most / (1 - self._gap(wo))
+        # How much brighter than a white sky the cloth would be in a view, at least 1; under
+        # `visible`, over what does not pass the gaps.
+        most = self._by_view("excess", wo)
+        if self.law == "unmasked":
+            return most
+        return seen * most if self.law == "visible" else seen * most / (1 - self._gap(wo))
 
-    def _excess(self, wo: Any) -> Any:
-        """Return how much brighter than a white sky the cloth would be in a view, at least 1."""
-        table = self.tables["excess"]
+    def _by_view(self, name: str, wo: Any) -> Any:
+        """Return what a table by view holds; a single entry stands for 1."""
+        table = self.tables[name]
         if dr.width(table) == 1:
             return mi.Float(1)
         rows, columns = self.said["excess_shape"]
