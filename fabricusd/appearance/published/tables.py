@@ -75,7 +75,7 @@ def surface_tables(
     if law.absolute and shadow is not None:
         held = node_means(shadow, q, fabric)
     nodes = np.stack((np.cos(q.psi0), np.sin(q.psi0), q.weight, q.half), axis=1)
-    made: SurfaceTables = law.tables(
+    made: Any = law.tables(
         threads=threads.astype(precision),
         nodes=np.ascontiguousarray(nodes, dtype=precision),
         node_thread=q.thread,

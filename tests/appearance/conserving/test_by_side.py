@@ -17,7 +17,7 @@ PHI, THETA = (x.ravel() for x in np.meshgrid(np.radians(AZIMUTHS), np.radians(PO
 
 def _stated():
     found = {name: load(name) for name in published_names()}
-    return {name: fabric for name, fabric in found.items() if fabric.sides.gap}
+    return {name: fabric for name, fabric in found.items() if fabric.sides.forward}
 
 
 def test_the_medians_are_those_of_the_presets():

@@ -19,8 +19,8 @@ from fabricusd.reference.start.kernel_tasks import (
     NEAR_PROJECTED,
     NEAR_VISIBLE,
     PROJECTED,
-    VISIBLE,
     TASKS,
+    VISIBLE,
 )
 from fabricusd.scene.scene import FabricSurface, PreviewSurface, Scene
 from fabricusd.schema import load

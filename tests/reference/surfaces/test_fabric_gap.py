@@ -10,10 +10,19 @@ from numba import njit
 from fabricusd.appearance.conserving.by_side import by_side
 from fabricusd.appearance.conserving.grid import entry_angles
 from fabricusd.appearance.law import CONSERVING_ONLY, surface_law
-from fabricusd.appearance.weave.coverage import coverage
+from fabricusd.appearance.shadow.methods import compile_shadow
+from fabricusd.appearance.weave.compiled import compile_fabric
+from fabricusd.appearance.weave.coverage import GAP, coverage
+from fabricusd.appearance.weave.lookup import lookup
 from fabricusd.kernels.real import LEAN
 from fabricusd.reference.rays.triangles import RECORD, N, T
-from fabricusd.reference.surfaces.fabric_gap import TABLE, gap_along, gap_table
+from fabricusd.reference.surfaces.fabric_gap import (
+    TABLE,
+    gap_along,
+    gap_table,
+    pass_gaps,
+    pass_published,
+)
 from fabricusd.schema import load
 
 LINEN = load("linen_plain")
@@ -45,6 +54,29 @@ def test_a_shadow_ray_meets_the_gap_of_its_direction_in_the_smooth_frame():
     phi = np.arctan2(rays @ np.cross(normal, along), rays @ along)
     np.testing.assert_allclose(out, by_side(LINEN, theta, phi).gap, atol=0.01)
     assert out.min() < 0.01 < 0.3 < out.max()
+
+
+@pytest.mark.parametrize("name", ["linen_plain", "polyester_satin_charmeuse"])
+def test_places_of_published_cloth_pass_what_the_repeat_passes(name):
+    """Linen passes through its gaps alone; satin, which has none from above, everywhere alike."""
+    fabric = load(name)
+    tables = surface_law(fabric, shadow=compile_shadow(fabric)).published
+    uv = np.random.default_rng(2).random((40_000, 2)) * 40
+    sets = lookup(compile_fabric(fabric), uv).set
+    polar = np.radians([0.0, 45.0, 75.0])
+    wo = np.stack((np.sin(polar), 0 * polar, np.cos(polar))).astype(np.float32)
+    whole = np.empty(3, np.float32)
+    pass_published(np.float32, tables, np.float32(1), wo, whole)
+    assert whole.max() > 0.1
+    for k in range(3):
+        out = np.empty(len(uv), np.float32)
+        towards = np.repeat(wo[:, k : k + 1], len(uv), axis=1)
+        pass_gaps(np.float32, tables, np.float32(1), sets, towards, out)
+        assert out.mean() == pytest.approx(whole[k], abs=0.01)
+        assert (out[sets != GAP] == out[sets != GAP][0]).all()
+    # Towards the normal no thread lets light through.
+    pass_gaps(np.float32, tables, np.float32(1), sets, np.repeat(wo[:, :1], len(uv), 1), out)
+    assert out[sets != GAP].max() < 0.01
 
 
 def test_cloth_that_passes_the_same_from_everywhere_or_nothing_has_no_table():
