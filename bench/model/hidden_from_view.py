@@ -13,7 +13,7 @@ that of the tubes at 60, 75 and 80 degrees, brightest channel, mean over azimuth
 cloth is brighter than white. A star is the law that the preset wears.
 `correlated` has places that are lit and seen together, min(g(wi), g(wo)), where the azimuths of
 light and view are less than some 25 degrees apart. The law `visible` is `seen` with the means of a
-set as a polynomial; its own row is the last.
+set as a polynomial, and with the gap(w) that the fabric states; its own row is the last.
 """
 
 from __future__ import annotations
@@ -103,8 +103,10 @@ def _rows(name: str, law: str, forms: tuple[str, ...]) -> None:
     fabric = replace(worn, surface_law=law)
     shadow = compile_shadow(fabric, precision=real)
     tables: Any = surface_law(fabric, precision=real, shadow=shadow).published
-    # The bound of white is applied below: it depends on the form.
-    tables = tables._replace(**no_excess(real))
+    # The bound of white is applied below: it depends on the form. The divisor of `visible` holds
+    # gap(w) as well, and that law has one form.
+    if fabric.surface_law != "visible":
+        tables = tables._replace(**no_excess(real))
     truth = _by_view(found.sky)
     bright = truth.mean(axis=(0, 1)).argmax()
     sky = hemisphere(SKY)

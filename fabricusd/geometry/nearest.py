@@ -39,7 +39,8 @@ NEAREST, PUBLISHED, CONSERVING = "nearest", "published", "conserving"
 """The presets' variant set, and its variants; the last is made by `geometry.conserve`."""
 
 TIE = 0.01
-"""Errors that differ by less than this are equal: the earlier law of PREFERRED is taken."""
+"""Errors that differ by less than this are equal: the earlier law of PREFERRED is taken. `visible`
+costs a third of the speed of `projected`, and comes after it."""
 
 PREFERRED = ("projected", "visible", "unmasked", "masked")
 

@@ -166,7 +166,7 @@ def test_every_fabric_and_its_back_wear_the_law_asked_for() -> None:
     assert (binding.fabric.surface_law, binding.fabric.back.surface_law) == ("masked", "masked")
     assert binding.fabric.threads == satin.threads
     assert binding.rotation == 0.5
-    assert own.binding.fabric.surface_law == "unmasked"
+    assert own.binding.fabric.surface_law == "visible"
 
 
 def test_a_law_that_a_fabric_cannot_wear_is_refused() -> None:
