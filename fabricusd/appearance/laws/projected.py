@@ -142,7 +142,7 @@ def plain_openness(fabric: Fabric, wo: Array) -> Array:
 
 
 LAW = Law(
-    summary="each thread by the area of it that is seen, the law nearest to traced threads",
+    summary="each thread by the area of it that is seen",
     tables=Projected,
     make=_make,
     absolute=True,

@@ -181,7 +181,8 @@ def _weight(R, tables, c, s, pair):
 
 LAW = replace(
     projected.LAW,
-    summary="as `projected`, less what neighbours hide from the viewer, nearest to traced threads",
+    summary="as `projected`, less what neighbours hide from the viewer, and with the gap that the "
+    "fabric states: nearest to traced threads",
     tables=Visible,
     make=_make,
     hides=yes,
