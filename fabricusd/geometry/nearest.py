@@ -40,7 +40,7 @@ NEAREST, PUBLISHED, CONSERVING = "nearest", "published", "conserving"
 
 TIE = 0.01
 """Errors that differ by less than this are equal: the earlier law of PREFERRED is taken. `visible`
-costs a third of the speed of `projected`, and comes after it."""
+costs a fifth of the speed of `projected`, and comes after it."""
 
 PREFERRED = ("projected", "visible", "unmasked", "masked")
 
