@@ -25,7 +25,7 @@ NORMALIZATION, RED, GREEN, BLUE = 13 * BLOCK, 14 * BLOCK, 15 * BLOCK, 16 * BLOCK
 the rows SEEN as they are."""
 
 SHARES = 17 * BLOCK
-"""Offset of VIEW_SHARES rows that `look` fills: the law's `light_shares` of all views, one after
+"""Offset of VIEW_SHARES rows that `look` fills: the law's `view_shares` of one view after
 the other. They are copied to the rows SEEN of one set."""
 
 NODE_LIT = SHARES + VIEW_SHARES * BLOCK
