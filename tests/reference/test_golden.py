@@ -6,7 +6,7 @@ import pytest
 
 from fabricusd.images.files import read_exr_layers
 from fabricusd.quality.statistics import z_test
-from tests.reference.goldens import CASES, FOLDER, SIZE, render_case
+from tests.reference.goldens import CASES, FOLDER, SAMPLES, SIZE, render_case
 from tests.reference.scenes import blocks
 
 ERROR_RATE = 1e-4
@@ -40,4 +40,4 @@ def test_golden_pictures_would_see_a_lamp_five_per_cent_brighter():
 )
 def test_golden_pictures_would_see_facets_where_normals_are_smooth(name):
     # The skirt shows as much of its inside as of its outside: a quarter of the samples miss this.
-    assert not against_golden(name, spp=4096, smooth=False)[0]
+    assert not against_golden(name, spp=4 * SAMPLES, smooth=False)[0]
